@@ -17,6 +17,7 @@ from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.cli.tables import show_carried
 from vegglue.diagnosis.verdict import OF_DISCHARGES
+from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
 from vegglue.measurements.carried_in_words import carried_in_short, carried_in_words, carried_otherwise
@@ -146,7 +147,7 @@ def test_no_name_is_believed_that_does_not_explain_what_sections_carry(name: str
     assert sentence.startswith(
         f"Before anything can be said of the model: {DOUBT}: check the discharge, the velocities"
     )
-    assert name.partition("[")[0] in sentence
+    assert EffectIdentity.parse(name).name in sentence
     assert sentence.count(DOUBT) == 1
     assert said(grounds(step(name)), there)[0] == "identified"
 

@@ -163,7 +163,7 @@ def test_the_ladder_is_of_what_was_added_and_not_of_what_is_left(toy: Run) -> No
     parent, child = replace(a_diagnosis(), name="parent", places=()), replace(NOTHING, name="child", places=place)
     loop = LoopResults(behind=parent, ladder=replace(LADDER, steps=steps))
     assert causes_of(replace(toy, diagnosis=child, loop=loop)) == "eddies"
-    other = replace(LAST, added=("unlisted_object_x9_5_y_0_9",))
+    other = replace(LAST, added=("unlisted_object_x33_y_0_6",))
     assert causes_of(replace(toy, loop=replace(loop, ladder=replace(LADDER, steps=(steps[0], other))))) == ""
     found = replace(parent, places=place)
     both = replace(LADDER, steps=(steps[0], replace(LAST, added=("eddies", *other.added))))

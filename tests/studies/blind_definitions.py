@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from vegglue.effects import sensor
+from vegglue.effects.identity import EffectIdentity
 
 Record = dict[str, Any]
 Thing = dict[str, Any]  # a hidden one, a step, a place or an instrument
@@ -232,7 +233,7 @@ def reading_set_aside(record: Record) -> bool | None:
 
 def sensor_in_set(record: Record) -> bool:
     """An effect of instruments is in the set, or the instrument was found."""
-    return instrument_found(record) is True or any(name.split("[")[0] in SENSORS for name in record["set"])
+    return instrument_found(record) is True or any(EffectIdentity.parse(name).name in SENSORS for name in record["set"])
 
 
 def station_set_aside(record: Record) -> bool:

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from hidden_laws import BY_NAME, HiddenLaw
 
+from vegglue.effects.identity import EffectIdentity
+
 Record = Mapping[str, Any]
 Said = tuple[str, str]  # a term and a quantity
 # What listed effects say in the words of the grammar; others say something else.
@@ -29,7 +31,8 @@ NEAR = 1.25
 def causes(record: Record) -> list[tuple[Said, float, bool]]:
     """What each cause of the set says, its chance, and whether it is a law; the likeliest first."""
     found = [((one["term"], one["quantity"]), one["chance"], True) for one in record["laws"]]
-    others = [(LISTED_SAYS.get(name.partition("[")[0], ("", "")), p, False) for name, p in record["others"].items()]
+    listed = [(EffectIdentity.parse(name).name, p) for name, p in record["others"].items()]
+    others = [(LISTED_SAYS.get(name, ("", "")), p, False) for name, p in listed]
     return sorted([*found, *others], key=lambda one: -one[1])
 
 

@@ -1,7 +1,6 @@
 """Candidates: every effect of the library that a case could lack, as a case with one parameter more."""
 
 import itertools
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -13,6 +12,7 @@ from vegglue.case.parameter_space import middle_value
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case, EffectEntry, Parameter
 from vegglue.effects.definition import Amplitude, Effect
+from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.engine.interface import Cause
 from vegglue.measurements.kinds import velocity_rows
@@ -26,37 +26,33 @@ START_OFF_ENDS = 0.01
 NOT_SEARCHED = {"search", "law"}
 
 
-def key_of(name: str) -> str:
-    """discharge_error_high: the name of a candidate as a word, for a config."""
-    return re.sub(r"\W", "_", name.removesuffix("]"))
-
-
 @dataclass(frozen=True)
 class Candidate:
     """An effect and where it would act; empty tuples mean everywhere.
 
-    at: its patch, or its place, in words; fixed: the shapes that say so; scale: a plausible size in this case, where
-    that of the effect is not meant.
+    at: its patch or its place, as a target of `EffectIdentity`; fixed: the shapes of it; scale: a plausible size in
+    this case, None for that of the effect.
     """
 
     effect: Effect
     experiments: tuple[str, ...] = ()
     sections: tuple[str, ...] = ()
     devices: tuple[str, ...] = ()
-    at: str = ""
+    at: tuple[str, ...] = ()
     fixed: tuple[tuple[str, float], ...] = ()
     scale: float | None = None
 
     @property
+    def identity(self) -> EffectIdentity:
+        return EffectIdentity(self.effect.name, (*self.experiments, *self.sections, *self.devices, *self.at))
+
+    @property
     def name(self) -> str:
-        """discharge_error[high]: the effect, and where it acts if not everywhere."""
-        where = (*self.experiments, *self.sections, *self.devices, *filter(None, [self.at]))
-        return f"{self.effect.name}[{','.join(where)}]" if where else self.effect.name
+        return self.identity.text
 
     @property
     def key(self) -> str:
-        """The same as a word, for a config, where a parameter is named after it."""
-        return key_of(self.name)
+        return self.identity.key
 
     @property
     def amplitude(self) -> Amplitude:
@@ -152,12 +148,13 @@ def _candidate_of(case: Case, key: str, entry: EffectEntry) -> Candidate:
 
 def patch_candidate(effect: Effect, index: int, case: Case) -> Candidate:
     """An effect on one patch of a case, the first of which has the index 0."""
-    return Candidate(effect, at=case.plants.patches[index].name, fixed=(("patch", index + 1.0),))
+    return Candidate(effect, at=(case.plants.patches[index].name,), fixed=(("patch", index + 1.0),))
 
 
 def place_candidate(effect: Effect, place: Mapping[str, float], scale: float | None = None) -> Candidate:
     """Something unlisted at a place, x and y among its shapes [m]; scale: a plausible size."""
-    return Candidate(effect, at=f"x{place['x']:g},y{place['y']:g}", fixed=tuple(place.items()), scale=scale)
+    at = EffectIdentity.at_place(effect.name, place["x"], place["y"]).target
+    return Candidate(effect, at=at, fixed=tuple(place.items()), scale=scale)
 
 
 def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, float]) -> EffectEntry:

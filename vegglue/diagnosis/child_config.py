@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +26,7 @@ from vegglue.case.resolved_config import Tree
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LONGEST_NAME, case_name
 from vegglue.effects.definition import Effect
+from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 from vegglue.results.diagnosis import Location
@@ -42,15 +42,16 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
     searched = {one.name: one for one in candidates_of(case, station)}
     if name in searched:
         return searched[name]
-    found = re.fullmatch(r"(\w+)(?:\[([^\]]+)\])?", name)
-    known = library(case.effect_file)
-    if found is None or found[1] not in known:
-        ending = nearest_effect(name.split("[")[0], known)
-        raise InputError(f"--add: `{name}` is not an effect of the library: {ending}")
-    effect = known[found[1]]
-    where = tuple(part.strip() for part in found[2].split(",")) if found[2] else ()
+    identity, known = EffectIdentity.parse(name), library(case.effect_file)
+    if identity.name not in known or identity.text != name:
+        raise InputError(f"--add: `{name}` is not an effect of the library: {nearest_effect(identity.name, known)}")
+    effect, where = known[identity.name], tuple(part.strip() for part in identity.target)
     if where and "search" in effect.tags:
-        return _named_place(effect, where)
+        place = EffectIdentity(effect.name, where).place
+        if place is None:
+            raise InputError(f"--add: `{name}`: expected a place such as [x47.3,y-0.5]; correct it.")
+        shapes = {shape.name: shape.default for shape in effect.shapes}
+        return place_candidate(effect, shapes | {"x": place[0], "y": place[1]})
     kind = _kind_of_place(case, station, effect, name, where) if where else None
     candidate = _acting_in(case, effect, kind, where)
     if at_work(case, candidate):
@@ -83,18 +84,6 @@ def _acting_in(case: Case, effect: Effect, kind: str | None, where: tuple[str, .
     if kind == "patch":
         return patch_candidate(effect, [patch.name for patch in case.plants.patches].index(where[0]), case)
     return acting_in(effect, kind, where) if kind else Candidate(effect)
-
-
-def _named_place(effect: Effect, where: tuple[str, ...]) -> Candidate:
-    """Something unlisted at `x47.3,y-0.5`, of the default size."""
-    found = [re.fullmatch(rf"{axis}(-?\d+(?:\.\d*)?|-?\.\d+)", part) for axis, part in zip("xy", where, strict=False)]
-    if len(where) != 2 or None in found:
-        raise InputError(
-            f"--add: `{effect.name}[{','.join(where)}]`: expected a place such as [x47.3,y-0.5]; correct it."
-        )
-    x, y = (float(one[1]) for one in found if one is not None)
-    shapes = {shape.name: shape.default for shape in effect.shapes} | {"x": x, "y": y}
-    return place_candidate(effect, shapes)
 
 
 def spread_over_its_error(location: Location) -> Location:

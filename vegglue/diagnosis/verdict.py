@@ -24,6 +24,7 @@ from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.grounds import POOR, Grounds, Statement, is_clear
 from vegglue.diagnosis.remarks import remarks_of
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
+from vegglue.effects.identity import EffectIdentity
 from vegglue.measurements.carried_discharge import CHANGE_DISCHARGE, CarriedDischarge
 from vegglue.measurements.carried_in_words import CHECK, carried_in_short
 from vegglue.results.causes import LawsSuspected
@@ -97,10 +98,9 @@ def _may_be_why(name: str, section: CarriedDischarge) -> bool:
     """Whether a candidate changes what a section carries: everywhere, in its experiment, or there; of a device nobody
     says here which sections it measured.
     """
-    effect, _, where = name.partition("[")
-    places = set(filter(None, where.removesuffix("]").split(",")))
-    acts = not places or effect in OF_DEVICES or bool(places & {section.experiment, section.section})
-    return effect in OF_DISCHARGES and acts
+    one = EffectIdentity.parse(name)
+    acts = not one.target or one.name in OF_DEVICES or bool({section.experiment, section.section} & set(one.target))
+    return one.name in OF_DISCHARGES and acts
 
 
 def _left_over(grounds: Grounds, statement: Statement) -> str:

@@ -3,7 +3,7 @@
 import html
 import math
 
-from vegglue.calibration.candidates import key_of
+from vegglue.effects.identity import EffectIdentity
 from vegglue.report.cause_words import accepted_causes
 from vegglue.report.run import Run
 from vegglue.report.typography import NARROW, short, unit_html
@@ -46,7 +46,7 @@ def _unclear_in_words(ladder: Ladder) -> str:
     if not ladder.unclear:
         return ""
     names = listed([f"<code>{html.escape(name)}</code>" for name in ladder.unclear])
-    whole = {key_of(name) for name in ladder.unclear} >= set(_all_added(ladder))
+    whole = {EffectIdentity.parse(name).key for name in ladder.unclear} >= set(_all_added(ladder))
     what = "this fall" if whole else f"what {names} {'adds' if len(ladder.unclear) == 1 else 'add'} to it"
     return f"By the errors at what was held out, {what} cannot be told from chance."
 
@@ -78,10 +78,9 @@ def causes_of(run: Run) -> str:
     found = next((one for one in known if ladder and one.name == ladder.steps[0].name), None)
     if ladder is None or found is None:
         return ""
-    effects = [key_of(step.accepted) for step in found.steps]
-    places, added = sorted(one.effect for one in found.places), _all_added(ladder)
-    others = sorted(name.partition("_x")[0] for name in added if name not in effects)
-    return accepted_causes(found) if set(effects) <= set(added) and others == places else ""
+    effects = {EffectIdentity.parse(step.accepted).key for step in found.steps}
+    places = {EffectIdentity.at_place(one.effect, one.x, one.y).key for one in found.places}
+    return accepted_causes(found) if effects | places == set(_all_added(ladder)) else ""
 
 
 def ladder_rows(ladder: Ladder) -> dict[str, list[float]]:

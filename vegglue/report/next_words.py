@@ -3,6 +3,7 @@
 import html
 from collections.abc import Iterator
 
+from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.report.cause_words import instrument_at
 from vegglue.report.run import Run, command_about
@@ -109,6 +110,6 @@ def _to_see(question: Question) -> str:
 
 def _told(name: str) -> str:
     """'“Steep banks touch more water than their width says” (steep_bank)': an effect of the library by its title."""
-    known = library().get(name.partition("[")[0])
+    known = library().get(EffectIdentity.parse(name).name)
     code = f"<code>{html.escape(name)}</code>"
     return f"“{html.escape(known.title)}” ({code})" if known is not None else code

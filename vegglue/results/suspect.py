@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vegglue.effects.identity import EffectIdentity
 from vegglue.wording.numbers import so_many
 
 # |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
@@ -90,7 +91,7 @@ class Suspect:
 
 def effects_among(suspects: Sequence[Suspect]) -> int:
     """How many effects they are, wherever each may act."""
-    return len({one.name.partition("[")[0] for one in suspects})
+    return len({EffectIdentity.parse(one.name).name for one in suspects})
 
 
 def counted_in_words(suspects: Sequence[Suspect]) -> str:

@@ -18,6 +18,7 @@ from vegglue.calibration.noise import Noise
 from vegglue.case.messages import nearest
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
+from vegglue.effects.identity import EffectIdentity
 from vegglue.engine.interface import Model, Point, linearise, responses
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import velocity_rows
@@ -97,7 +98,7 @@ def candidate_of(model: Model, name: str) -> Candidate:
         except InputError as error:
             raise InputError(str(error).replace("--add:", "--hide:", 1)) from None
         told = [one for one in candidates_of(model.case, model.station) if one.effect.name == named.effect.name]
-        return told[0] if len(told) == 1 and "[" not in name else named
+        return told[0] if len(told) == 1 and not EffectIdentity.parse(name).target else named
     known = {UNLISTED + effect.name: effect for effect in unlisted_objects.EFFECTS}
     if name not in known:
         raise InputError(f"--hide: `{name}` is unknown: {nearest(name, known)}")

@@ -1,0 +1,54 @@
+"""Which effect acts where, as a value; only this module writes its text and reads it."""
+
+import re
+from dataclasses import dataclass
+
+_NUMBER = r"-?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+
+
+@dataclass(frozen=True)
+class EffectIdentity:
+    """An effect of the library and what it is limited to.
+
+    The text is ``name`` or ``name[target,target]``: ``steep_bank``, ``discharge_error[high]``, ``patch_density[p5]``,
+    ``unlisted_bed[x47.29,y-0.23]``.
+
+    Parameters
+    ----------
+    name
+        Name of the effect in the library.
+    target
+        Names of experiments, sections or devices, of one patch, or the coordinates of a place; empty: everywhere.
+    """
+
+    name: str
+    target: tuple[str, ...] = ()
+
+    @classmethod
+    def parse(cls, text: str) -> "EffectIdentity":
+        """The identity with this text. A text without brackets is a name; a comma in a name of a target divides it."""
+        name, _, target = text.partition("[")
+        return cls(name, tuple(target.removesuffix("]").split(",")) if target.removesuffix("]") else ())
+
+    @classmethod
+    def at_place(cls, name: str, x: float, y: float) -> "EffectIdentity":
+        """An effect that acts around one place x, y [m]."""
+        return cls(name, (f"x{x:g}", f"y{y:g}"))
+
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """The place x, y [m] when the target is one, else None."""
+        found = re.fullmatch(f"x({_NUMBER}),y({_NUMBER})", ",".join(self.target))
+        return (float(found[1]), float(found[2])) if found else None
+
+    @property
+    def key(self) -> str:
+        """The text as a word, for the key of a config and the name of a parameter: ``discharge_error_high``."""
+        return re.sub(r"\W", "_", self.text.removesuffix("]"))
+
+    @property
+    def text(self) -> str:
+        return f"{self.name}[{','.join(self.target)}]" if self.target else self.name
+
+    def __str__(self) -> str:
+        return self.text
