@@ -15,7 +15,7 @@ from reach import COARSE, ENVIRONMENT, command, said_to, write_reach
 
 from vegglue import parallel
 from vegglue.__main__ import enter
-from vegglue.cli.endings import ending_well
+from vegglue.cli.main import ending_well
 from vegglue.errors import InputError, StorageError
 
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))

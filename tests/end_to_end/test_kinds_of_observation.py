@@ -29,8 +29,8 @@ from vegglue.inference.solve_ensemble import solve_ensemble
 from vegglue.measurements.kinds import KINDS
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.report.channel import save_channel_figure
-from vegglue.report.diagnosis_pictures import save_diagnosis_figure, save_fingerprint_figure
-from vegglue.report.error_ladder import save_ladder_figure
+from vegglue.report.diagnosis_figures import save_diagnosis_figure, save_fingerprint_figure
+from vegglue.report.ladder_figure import save_ladder_figure
 from vegglue.report.page import write_report
 from vegglue.report.run import Run
 from vegglue.results.diagnosis import Diagnosis

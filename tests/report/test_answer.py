@@ -19,7 +19,7 @@ from vegglue.report.findings import findings
 from vegglue.report.ladder_words import causes_of, ladder_in_words
 from vegglue.report.next_words import next_steps
 from vegglue.report.run import LoopResults, Run
-from vegglue.report.section_pictures import safe_json
+from vegglue.report.sections import safe_json
 from vegglue.report.tables import station_rows
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Diagnosis, Step
 from vegglue.results.ladder import Ladder, LadderStep

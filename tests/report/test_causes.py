@@ -8,7 +8,6 @@ import pytest
 from diagnoses import EVERY_KIND, NO_LOCATION, NOTHING, a_diagnosis, a_field, a_location, an_instrument
 
 from vegglue.case.config import load_case
-from vegglue.report.cause_pictures import field_picture, outlines, place_picture, plan_marks
 from vegglue.report.cause_words import (
     accepted_causes,
     against_rivals,
@@ -16,6 +15,7 @@ from vegglue.report.cause_words import (
     instrument_rows,
     place_rows,
 )
+from vegglue.report.place_maps import field_picture, outlines, place_picture, plan_marks
 from vegglue.report.run import Run
 from vegglue.results.causes import FieldMapKept
 from vegglue.results.diagnosis import Diagnosis

@@ -18,13 +18,21 @@ from matplotlib.transforms import Bbox
 from vegglue.case.config import load_case
 from vegglue.case.polygons import corners_of
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
-from vegglue.report.diagnosis_pictures import draw_diagnosis, save_diagnosis_figure, save_fingerprint_figure
+from vegglue.report.diagnosis_figures import (
+    MARKS,
+    draw_alike,
+    draw_diagnosis,
+    draw_fingerprint,
+    draw_gauges,
+    draw_suspects,
+    draw_zones,
+    save_diagnosis_figure,
+    save_fingerprint_figure,
+)
 from vegglue.report.diagnosis_words import diagnosis_section, ranked_suspects, rms_residual, suspect_status
-from vegglue.report.error_ladder import draw_ladder, save_ladder_figure
-from vegglue.report.misfit import draw_gauges, draw_zones
-from vegglue.report.plan_view import Outline
+from vegglue.report.flow_maps import Outline
+from vegglue.report.ladder_figure import draw_ladder, save_ladder_figure
 from vegglue.report.style import COLOUR
-from vegglue.report.suspects import MARKS, draw_alike, draw_fingerprint, draw_suspects
 from vegglue.results.diagnosis import Diagnosis, Predictions, Step
 from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
 

@@ -11,10 +11,10 @@ import scipy.special
 from drawings import off_the_sheet, points, texts
 
 from vegglue.flow.sensor import FlowFields
-from vegglue.report.measured import Vertical, draw_quantiles, draw_residuals, draw_verticals
-from vegglue.report.pictures import LONGEST_LABEL
-from vegglue.report.plan_view import draw_reach, stream_function, stretch_of, wet_window
-from vegglue.report.posterior import (
+from vegglue.report.flow_maps import draw_reach, stream_function, stretch_of, wet_window
+from vegglue.report.measured_figures import Vertical, draw_quantiles, draw_residuals, draw_verticals
+from vegglue.report.posterior_figures import (
+    LONGEST_LABEL,
     POSTERIOR_MEMBERS,
     DrawnParameter,
     ReferenceValue,

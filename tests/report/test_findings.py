@@ -14,7 +14,7 @@ from vegglue.cli.brief_posterior import brief_posterior
 from vegglue.report.findings import findings
 from vegglue.report.homogeneity_words import homogeneity_in_words
 from vegglue.report.key_numbers import estimate, key_numbers, verdict_of
-from vegglue.report.measured_pictures import residuals
+from vegglue.report.measured_figures import residuals
 from vegglue.report.posterior_words import parameter_in_words, weights_in_words
 from vegglue.report.prior_words import off_its_prior
 from vegglue.report.run import Run

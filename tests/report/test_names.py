@@ -8,10 +8,10 @@ import pytest
 from drawings import texts
 from matplotlib.figure import Figure
 
-from vegglue.report.measured import draw_quantiles, draw_residuals
-from vegglue.report.posterior import DrawnParameter, draw_cylinder, draw_joint
+from vegglue.report.diagnosis_figures import draw_fingerprint
+from vegglue.report.measured_figures import draw_quantiles, draw_residuals
+from vegglue.report.posterior_figures import DrawnParameter, draw_cylinder, draw_joint
 from vegglue.report.style import canvas, formula_labels, save, styled
-from vegglue.report.suspects import draw_fingerprint
 from vegglue.report.typography import symbol_math, unit_math
 
 NASTY = (

@@ -9,8 +9,7 @@ from diagnoses import a_diagnosis
 from posteriors import changed
 from report_runs import a_toy, kict, told_of
 
-from vegglue.report.interval_rows import DrawnInterval, draw_interval_rows
-from vegglue.report.overview import render_overview, write_overview
+from vegglue.report.overview import DrawnInterval, draw_interval_rows, render_overview, write_overview
 from vegglue.report.run import LoopResults, Run
 from vegglue.results.ladder import Ladder, LadderStep
 

@@ -7,8 +7,8 @@ import pytest
 from report_runs import a_toy
 
 from vegglue.flow.sensor import FlowFields
-from vegglue.report.flow_pictures import channel_caption, scale_in_words
-from vegglue.report.pictures import range_of_figure, references_of
+from vegglue.report.flow_maps import channel_caption, scale_in_words
+from vegglue.report.posterior_figures import range_of_figure, references_of
 from vegglue.report.tables import parameter_rows
 
 

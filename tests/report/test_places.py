@@ -6,7 +6,8 @@ from diagnoses import a_diagnosis
 from drawings import off_the_sheet, points, texts
 from matplotlib.patches import Ellipse
 
-from vegglue.report.places import (
+from vegglue.report.flow_maps import Outline
+from vegglue.report.place_maps import (
     FADED,
     TERM_SIGNS,
     DrawnField,
@@ -16,7 +17,6 @@ from vegglue.report.places import (
     draw_places,
     strongest_spots,
 )
-from vegglue.report.plan_view import Outline
 
 NOWHERE = np.zeros((0, 2))
 MAP = a_diagnosis().place_map

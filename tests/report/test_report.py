@@ -15,7 +15,7 @@ from vegglue.errors import StorageError
 from vegglue.measurements.observations import SET_ASIDE
 from vegglue.report.findings import findings
 from vegglue.report.run import Run, file_name, is_synthetic, station_zones
-from vegglue.report.section_pictures import section_panels
+from vegglue.report.sections import section_panels
 from vegglue.report.tables import parameter_rows
 
 pytestmark = pytest.mark.slow  # whole pages

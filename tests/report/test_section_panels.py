@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from vegglue.report.error_rows import draw_error_rows
-from vegglue.report.field_map import first_crossing
-from vegglue.report.interval_rows import DrawnInterval, draw_interval_rows
-from vegglue.report.section_panels import PanelGround, SectionPanel, draw_panel, value_range
+from vegglue.report.flow_maps import first_crossing
+from vegglue.report.overview import DrawnInterval, draw_interval_rows
+from vegglue.report.sections import PanelGround, SectionPanel, draw_panel, value_range
 from vegglue.report.style import COLOUR
-from vegglue.report.svg_text import area_between, line_through, round_ticks, svg_words, tick_labels, within_width
+from vegglue.report.svg import area_between, line_through, round_ticks, svg_words, tick_labels, within_width
 
 SVG = "{http://www.w3.org/2000/svg}"
 GROUND = PanelGround(np.arange(-3.0, 3.5, 0.5), np.abs(np.arange(-3.0, 3.5, 0.5)), np.arange(13) > 6)

@@ -11,7 +11,7 @@ from vegglue.report.error_rows import draw_error_rows
 from vegglue.report.ladder_words import causes_of, ladder_in_words, ladder_rows
 from vegglue.report.next_words import next_steps
 from vegglue.report.run import Run, command_about, published_svg
-from vegglue.report.section_pictures import SectionPanels, section_panels
+from vegglue.report.sections import SectionPanels, section_panels
 from vegglue.report.style import Picture
 
 STAND_IN = "These parameters are of the model as it is: they may stand in for what is missing."

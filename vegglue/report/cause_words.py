@@ -5,12 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vegglue.report.places import TERM_SIGNS
 from vegglue.report.typography import NARROW, fixed, interval, percent, short, unit_html
 from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD
 from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location, Step
 from vegglue.wording.numbers import so_many
 
+# What a spot of each term means where its score is positive, and where it is negative.
+TERM_SIGNS: Mapping[str, tuple[str, str]] = {
+    "drag": ("more drag", "less drag"),
+    "bed": ("a higher bed", "a lower bed"),
+    "inflow": ("water that enters", "water that leaves"),
+    "viscosity": ("more mixing", "less mixing"),
+}
 # Quantity and unit of a field, as they are told: what has none in %.
 FIELD_WORDS: Mapping[str, tuple[str, str]] = {
     term: (words, UNIT_OF_FIELD[term].replace("-", "%"))

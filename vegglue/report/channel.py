@@ -1,4 +1,4 @@
-"""The channel as the model sees it, for `vegglue check`: bed, friction classes, plants, boundaries and stations."""
+"""The channel as the model has it, for vegglue check: bed, friction classes, plants, boundaries and stations."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,13 +12,41 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch as Swatch
 from matplotlib.patches import Polygon
 
+from vegglue.arrays import Array
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import Site, in_experiment
+from vegglue.case.parameter_space import Bounds
 from vegglue.case.polygons import corners_of
 from vegglue.case.schema import Case
 from vegglue.measurements.observations import Observations
-from vegglue.report.label_places import HALF_LETTER, HALF_POINT, about_a_patch, along_an_edge, freest
 from vegglue.report.style import COLOUR, SMALL, canvas, label, save, styled
+
+# Half of the width of a letter, of a line and of a point in a plan 9.4 inches wide, over the axes [-].
+HALF_LETTER, HALF_LINE, HALF_POINT = 0.0045, 0.035, 0.004
+
+
+def freest(places: Sequence[tuple[float, float]], text: str, axes: Axes, taken: Array) -> tuple[float, float]:
+    """Of places for the middle of a text the first that covers the fewest points; taken: x and y of these (n, 2)."""
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    width = limits[:, 1] - limits[:, 0]
+    half = np.array([HALF_LETTER * len(text) + HALF_POINT, HALF_LINE])
+    covered = [int((np.abs((taken - place) / width) < half).all(axis=1).sum()) for place in places]
+    return places[int(np.argmin(covered))]
+
+
+def along_an_edge(x: float, ends: Bounds) -> list[tuple[float, float]]:
+    """Places at x between two ends [m]: in the middle, then nearer to either end."""
+    low, high = ends
+    return [(x, low + share * (high - low)) for share in (0.5, 0.7, 0.3, 0.9, 0.1)]
+
+
+def about_a_patch(corners: Array, axes: Axes) -> list[tuple[float, float]]:
+    """Its middle, then above and below it, then beside its middle along the channel. corners (k, 2) [m]."""
+    (x, y), (low, high) = corners.mean(axis=0), (corners.min(axis=0), corners.max(axis=0))
+    up = 1.5 * HALF_LINE * float(np.ptp(axes.get_ylim()))
+    beside = [low[0] + share * (high[0] - low[0]) for share in (0.25, 0.75)]
+    return [(x, y), (x, high[1] + up), (x, low[1] - up), *((float(place), y) for place in beside)]
+
 
 CLASS_COLOURS = ("water", "earth", "prior", "narrow", "wide", "rule")
 # Drawn upstream and downstream of patches and stations [m]: room to see the bed around them.

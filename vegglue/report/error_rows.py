@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vegglue.report.style import COLOUR
-from vegglue.report.svg_text import (
+from vegglue.report.svg import (
     Scale,
     axis_below,
     linear_scale,

@@ -4,12 +4,12 @@ from pathlib import Path
 
 from vegglue.case.resolved_config import resolved_yaml
 from vegglue.report.answer import answer_of
-from vegglue.report.diagnosis_pictures import diagnosis_pictures
+from vegglue.report.diagnosis_figures import diagnosis_pictures
 from vegglue.report.diagnosis_words import diagnosis_section
 from vegglue.report.findings import findings
 from vegglue.report.key_numbers import key_numbers, verdict_of
 from vegglue.report.page_file import rendered, write_page
-from vegglue.report.pictures import pictures
+from vegglue.report.posterior_figures import pictures
 from vegglue.report.run import Run, command_about, is_synthetic
 from vegglue.report.tables import (
     failure_reasons,

@@ -133,7 +133,7 @@ def rows_set_aside(aside: pd.DataFrame) -> list[tuple[str | float, ...]]:
 
 def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
     """Draw the ladder in the folder of its last case; returns the picture."""
-    from vegglue.report.error_ladder import save_ladder_figure
+    from vegglue.report.ladder_figure import save_ladder_figure
 
     picture = folder_of(runs, last) / "ladder.png"
     save_ladder_figure(found.rungs, picture)

@@ -34,12 +34,12 @@ def diagnose(case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Wa
     kept = diagnosis_that_fits(path, wanted)
     if kept is not None:
         return kept
-    import_beside("vegglue.report.diagnosis_pictures")  # drawing takes a third of a second to import
+    import_beside("vegglue.report.diagnosis_figures")  # drawing takes a third of a second to import
     with at_most(jobs):
         model = with_command(model_in(case), folder, watch)
         found = diagnose_model(model, watch, validation_of(case, folder, watch))
         found = with_words_on_command(found, model, folder, watch)
-    from vegglue.report.diagnosis_pictures import save_diagnosis_figure
+    from vegglue.report.diagnosis_figures import save_diagnosis_figure
 
     save_diagnosis_figure(found, case, folder / "diagnosis.png")
     keep_best_fit(case, folder, found.parameters.first, wanted)
@@ -60,7 +60,7 @@ def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs"
     amplitude = effect.amplitude
     plausible = amplitude.off + amplitude.scale
     size = f"{effect.name}, {amplitude.name} {plausible:g}{'' if amplitude.unit == '-' else f' {amplitude.unit}'}"
-    from vegglue.report.diagnosis_pictures import save_fingerprint_figure
+    from vegglue.report.diagnosis_figures import save_fingerprint_figure
 
     save_fingerprint_figure(amplitude.gain(plausible) * trace, station, size, path)
     return path

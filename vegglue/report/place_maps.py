@@ -1,9 +1,8 @@
-"""Figures of where something unlisted would help, and of a smooth field: plans of the channel, y stretched.
+"""Maps of places and of a smooth field: where something that is no listed effect would reduce the misfit."""
 
-Every function takes plain arrays and returns a matplotlib Figure; nothing here knows a run or a page.
-"""
-
-from collections.abc import Mapping, Sequence
+import html
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,17 +14,25 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon
 
 from vegglue.arrays import Array
-from vegglue.report.plan_view import Outline
-from vegglue.report.style import COLOUR, EDGE_COLOUR, SMALL, WIDTH, canvas, label, styled
-from vegglue.report.typography import fixed
+from vegglue.case.polygons import corners_of
+from vegglue.case.schema import Case
+from vegglue.report.cause_words import (
+    FIELD_WORDS,
+    TERM_SIGNS,
+    accepted_causes,
+    field_in_words,
+    field_scale,
+    instrument_in_words,
+    place_in_words,
+    what_at,
+    where,
+)
+from vegglue.report.flow_maps import Outline
+from vegglue.report.run import Run, published_picture
+from vegglue.report.style import COLOUR, EDGE_COLOUR, SMALL, WIDTH, Picture, canvas, label, styled
+from vegglue.report.typography import fixed, percent
+from vegglue.results.diagnosis import Diagnosis
 
-# What a spot of each term means where its score is positive, and where it is negative.
-TERM_SIGNS: Mapping[str, tuple[str, str]] = {
-    "drag": ("more drag", "less drag"),
-    "bed": ("a higher bed", "a lower bed"),
-    "inflow": ("water that enters", "water that leaves"),
-    "viscosity": ("more mixing", "less mixing"),
-}
 # Least score [standard errors] in full colour, so that a map of errors alone (scores of 2 to 3) stays pale.
 FULL_COLOUR_SCORE = 6.0
 # Opacity [-] of the colour in each quarter of the largest score of a map; the first quarter stays blank.
@@ -189,3 +196,89 @@ def _colour_bar(axes: Axes, mesh: QuadMesh, title: str) -> None:
     every = ScalarMappable(mesh.norm, mesh.cmap)  # of the mesh itself it would be as pale as most of the field
     bar = axes.figure.colorbar(every, ax=axes, label=title, pad=0.012, aspect=12, fraction=0.05)
     bar.outline.set_visible(False)
+
+
+def outlines(case: Case) -> list[Outline]:
+    """Patches as they are drawn."""
+    return [Outline(patch.name, corners_of(case, patch)) for patch in case.plants.patches]
+
+
+def plan_marks(diagnosis: Diagnosis, patches: Sequence[Outline]) -> PlanMarks:
+    """Patches, stations, those set aside, and all places that were found; one of another term than the map says so."""
+    station, aside = diagnosis.predictions.station, list(diagnosis.errors.flagged)
+    mapped = diagnosis.place_map.term
+    return PlanMarks(
+        patches=patches,
+        stations=station[["x", "y"]].drop_duplicates().to_numpy(float),
+        aside=station.iloc[aside][["x", "y"]].drop_duplicates().to_numpy(float),
+        spots=[
+            MarkedSpot(
+                one.x,
+                one.y,
+                one.length,
+                one.width,
+                ("" if one.term == mapped else f"{what_at(one)}: ") + where(one.x, one.y),
+            )
+            for one in diagnosis.places
+        ],
+    )
+
+
+def place_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
+    """The map of places, if there is any place where something could be."""
+    mapped = diagnosis.place_map
+    if not mapped.x.size:
+        return
+    finding = _finding(diagnosis)
+    more, less = TERM_SIGNS[mapped.term]
+    caption = (
+        f"<b>Where a spot of {_term(mapped.term)} would help</b> the model as it was, y stretched. {finding}. Green: "
+        f"patches; dots: stations; full lines: {more} would help, dashed: {less}."
+    )
+    figure = draw_places(mapped.x, mapped.y, mapped.score, mapped.term, plan_marks(diagnosis, outlines(run.case)))
+    alt = _spoken(f"Plan of the channel with scores of a spot of {_term(mapped.term)}. {finding}.")
+    yield published_picture(run, figure, "missing-places", caption, alt)
+
+
+def _finding(diagnosis: Diagnosis) -> str:
+    """What is marked on the map (HTML)."""
+    if diagnosis.places:
+        marked = "; ".join(place_in_words(one) for one in diagnosis.places)
+        found = f"Marked, with the outline of the spot: {marked}"
+    elif diagnosis.steps:
+        found = f"No place explains as much as {html.escape(accepted_causes(diagnosis))} does"
+    else:
+        found = "No place stands out more than errors alone make it"
+    if diagnosis.instruments:
+        found += f". Crosses: set aside ({'; '.join(instrument_in_words(one) for one in diagnosis.instruments)})"
+    return found
+
+
+def _term(term: str) -> str:
+    return {"drag": "drag", "bed": "the bed level", "inflow": "water that enters", "viscosity": "mixing"}[term]
+
+
+def field_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
+    """The map of the field with its standard error, if a field was found."""
+    mapped, found = diagnosis.field_map, diagnosis.field
+    if mapped is None or found is None:
+        return
+    what, unit = FIELD_WORDS[found.term]
+    scale = field_scale(found.term)
+    drawn = DrawnField(mapped.x, mapped.y, scale * mapped.value, scale * mapped.error, f"change of {what}", unit)
+    marks = plan_marks(diagnosis, outlines(run.case))
+    most = MarkedSpot(found.x, found.y, found.length, found.width, where(found.x, found.y))
+    told = float(np.mean(np.abs(mapped.value) >= TOLD_FROM * mapped.error))
+    finding = f"It acts like {field_in_words(diagnosis)}"
+    caption = (
+        f"<b>The field of {what}</b> that would close the misfit, and its standard error, y stretched. {finding}. "
+        f"Pale: within two standard errors of nothing, {percent(1 - told)} of the plan; dashed: the size of its bumps."
+    )
+    figure = draw_field_map(drawn, PlanMarks(marks.patches, marks.stations, marks.aside, [most]))
+    alt = _spoken(f"Plan of the channel with a field of {what} and its standard error. {finding}.")
+    yield published_picture(run, figure, "missing-field", caption, alt)
+
+
+def _spoken(words: str) -> str:
+    """Without tags, for those who hear the page."""
+    return html.unescape(re.sub("<[^>]+>", "", words))
