@@ -13,15 +13,15 @@ import pytest
 from vegglue.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-OWN_CASE = (ROOT / "docs" / "own_case.md").read_text(encoding="utf-8")
+OWN_CASE, OWN_FILES = ((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("own_case.md", "own_files.md"))
 ENVIRONMENT = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MPLBACKEND": "agg", "COLUMNS": "200"}
 COARSE = ("cell: [1.0, 0.5]", "cell: [1.25, 0.75]")  # solves several members in a hundredth of a second
 
 
 def block(language: str) -> str:
-    """The first code block of the page in a language."""
-    found = re.search(rf"^```{language}\n(.*?)^```", OWN_CASE, re.MULTILINE | re.DOTALL)
-    assert found, f"own_case.md has no {language} block"
+    """The first code block in a language, of own_case.md, else of own_files.md."""
+    found = re.search(rf"^```{language}\n(.*?)^```", f"{OWN_CASE}\n{OWN_FILES}", re.MULTILINE | re.DOTALL)
+    assert found, f"neither page has a {language} block"
     return found[1]
 
 
