@@ -15,7 +15,7 @@ from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import sample_of
 from vegglue.case.schema import Case
-from vegglue.inference.solve_chunk import solve_chunk
+from vegglue.inference.solve_ensemble import solve_chunk
 from vegglue.measurements.observations import read_observations
 
 # Python without site packages: nothing of vegglue is loaded, as in another code.

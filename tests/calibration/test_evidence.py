@@ -8,7 +8,7 @@ import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.calibration import score_test
-from vegglue.calibration.evidence import NULL_DRAWS_TOGETHER, HypothesisKind, alarm_p, kind_of_hypotheses, log_factors
+from vegglue.calibration.score_test import NULL_DRAWS_TOGETHER, HypothesisKind, alarm_p, kind_of_hypotheses, log_factors
 
 ROWS, SLOPES, DRAWS, NULLS = 40, 3, 400, 500
 
@@ -125,5 +125,5 @@ def test_draws_are_counted_alike_however_many_are_worked_on_together(monkeypatch
     kinds, errors = drawn(1)
     assert NULL_DRAWS_TOGETHER < DRAWS
     together = alarm_p(kinds, errors, 1)
-    monkeypatch.setattr("vegglue.calibration.evidence.NULL_DRAWS_TOGETHER", 7)
+    monkeypatch.setattr("vegglue.calibration.score_test.NULL_DRAWS_TOGETHER", 7)
     assert alarm_p(kinds, errors, 1) == together

@@ -6,7 +6,7 @@ import scipy.stats
 
 from vegglue.arrays import Array
 from vegglue.calibration import score_test
-from vegglue.calibration.family_wise_p import Family, family_of
+from vegglue.calibration.score_test import Family, family_of
 
 ROWS, SLOPES, PRINTS, NULLS = 60, 3, 40, 1000
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from vegglue.calibration.instruments import Instrument, error_columns, instruments_of, offset_columns
+from vegglue.calibration.candidates import Instrument, error_columns, instruments_of, offset_columns
 
 
 def readings(*rows: tuple[str, str, float, float]) -> pd.DataFrame:

@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from vegglue.calibration import kept_baselines
-from vegglue.calibration.baseline import Baseline
-from vegglue.calibration.kept_baselines import MOST_KEPT, kept_baseline
+from vegglue.calibration import baseline
+from vegglue.calibration.baseline import MOST_KEPT, Baseline, kept_baseline
 from vegglue.case.config import load_case
 from vegglue.engine.interface import Model
 from vegglue.engine.model import model_of
@@ -33,8 +32,8 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Model]:
         models.append(model)
         return Baseline(model, SimpleNamespace(), SimpleNamespace(), None, None)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(kept_baselines, "baseline", computed)
-    monkeypatch.setattr(kept_baselines, "_kept", type(kept_baselines._kept)())
+    monkeypatch.setattr(baseline, "baseline", computed)
+    monkeypatch.setattr(baseline, "_kept", type(baseline._kept)())
     return models
 
 

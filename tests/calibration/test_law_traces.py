@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vegglue.calibration.candidates import Candidate, cause_of
-from vegglue.calibration.law_traces import law_traces
+from vegglue.calibration.laws_in_case import law_traces
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.case.config import load_case
 from vegglue.case.schema import ModelError

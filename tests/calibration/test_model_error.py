@@ -10,8 +10,14 @@ from linear_baseline import at_best, stations_of
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import with_own_error
 from vegglue.calibration.candidates import effect_entry, place_candidate, with_effect
-from vegglue.calibration.cell_responses import CellResponses, cell_responses
-from vegglue.calibration.model_error import bumps, field_columns, model_error_columns, responses_to_bumps
+from vegglue.calibration.model_error import (
+    CellResponses,
+    bumps,
+    cell_responses,
+    field_columns,
+    model_error_columns,
+    responses_to_bumps,
+)
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.grid import Grid
 from vegglue.case.parameter_space import z_of

@@ -8,13 +8,13 @@ import scipy.stats
 from vegglue.calibration.noise import (
     covariance_of,
     draw_whitened_errors,
+    estimate_noise,
     noise_of,
     with_correlation,
     with_grid_error,
     with_scale,
     with_unknown_errors,
 )
-from vegglue.calibration.noise_estimate import estimate_noise
 from vegglue.errors import InputError
 
 SECTIONS, STATIONS, TRIES = 8, 20, 60

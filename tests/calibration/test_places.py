@@ -5,7 +5,14 @@ import pytest
 from coarse_twin import CASE, coarse_twin
 
 from vegglue.calibration.candidates import cause_of, place_candidate
-from vegglue.calibration.places import EFFECT_AT_PLACE, SPOT_LENGTHS, Places, places_around, places_of, plausible_size
+from vegglue.calibration.fingerprints import (
+    EFFECT_AT_PLACE,
+    SPOT_LENGTHS,
+    Places,
+    places_around,
+    places_of,
+    plausible_size,
+)
 from vegglue.case.channel_geometry import half_width
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, flow_at_centres, responses
@@ -91,7 +98,7 @@ def test_shapes_are_those_of_the_effect_to_a_centimetre() -> None:
 @pytest.mark.filterwarnings("error")
 def test_water_too_shallow_for_a_spot_has_none(flowing: tuple[Model, Point], monkeypatch: pytest.MonkeyPatch) -> None:
     """A flume of 4 cm: the mean of no depth was a warning on the screen, and a plausible size of nan."""
-    monkeypatch.setattr("vegglue.calibration.places.LEAST_DEPTH", 10.0)
+    monkeypatch.setattr("vegglue.calibration.fingerprints.LEAST_DEPTH", 10.0)
     for one in places_of(*flowing, half_width(flowing[0].site)):
         assert (one.x.size, one.fingerprints.shape[1]) == (0, 0)
         assert np.isfinite(one.plausible)

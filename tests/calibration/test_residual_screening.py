@@ -9,12 +9,11 @@ import scipy.stats
 from linear_baseline import at_best, stations_of
 
 from vegglue.arrays import Array
-from vegglue.calibration.evidence import HypothesisKind, alarm_p
-from vegglue.calibration.fingerprints import Fingerprints
+from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Fingerprints, Places
 from vegglue.calibration.fit import at_point, chi2, covariance
 from vegglue.calibration.noise import noise_of, with_correlation
-from vegglue.calibration.places import EFFECT_AT_PLACE, Places
 from vegglue.calibration.residual_screening import Screening, _estimated_noise, screen
+from vegglue.calibration.score_test import HypothesisKind, alarm_p
 from vegglue.case.config import load_case
 from vegglue.effects.definition import Amplitude
 

@@ -7,7 +7,7 @@ from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_
 
 from vegglue.calibration.baseline import SearchModel, search_model
 from vegglue.calibration.fit import objective
-from vegglue.calibration.second_looks import MOST_LOOKS, OFF, places_of_looks
+from vegglue.calibration.residual_screening import MOST_LOOKS, OFF, places_of_looks
 from vegglue.case.schema import EffectEntry
 from vegglue.engine.interface import Point
 

@@ -7,8 +7,7 @@ import pytest
 from coarse_twin import CASE, coarse_twin
 
 from vegglue.arrays import Array
-from vegglue.calibration.cell_responses import CellResponses, cell_responses
-from vegglue.calibration.site_error import site_error_columns
+from vegglue.calibration.model_error import CellResponses, cell_responses, site_error_columns
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case, ModelError
 from vegglue.engine.interface import Model, Point, linearise

@@ -9,8 +9,7 @@ from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel, search_model
-from vegglue.calibration.cell_responses import CellResponses
-from vegglue.calibration.model_error import bumps, field_columns
+from vegglue.calibration.model_error import CellResponses, bumps, field_columns
 from vegglue.calibration.noise import covariance_of
 from vegglue.case.gridded_site import build_site
 from vegglue.diagnosis.field_scan import FIELD_SIZES, FieldHypothesis, best_field, map_of_field, scanned_fields

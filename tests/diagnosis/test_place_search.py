@@ -10,9 +10,9 @@ from coarse_twin import CASE, coarse_twin
 
 from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.calibration.candidates import place_candidate, with_effect
+from vegglue.calibration.fingerprints import Places
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
-from vegglue.calibration.places import Places
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.case.parameter_space import z_of
 from vegglue.diagnosis.competition import promising_spots

@@ -9,8 +9,8 @@ import pytest
 from diagnoses import a_field, a_location, a_suspect, an_instrument, laws_suspected_of
 from verdicts import ABSURD, AS_STATED, MISSES, NONE, grounds, said, step
 
+from vegglue.calibration.candidates import Instrument
 from vegglue.calibration.fit import chance_of_misfit
-from vegglue.calibration.instruments import Instrument
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.rivals import undecided_of

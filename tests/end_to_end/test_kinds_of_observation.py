@@ -24,8 +24,7 @@ from vegglue.engine.model import model_of
 from vegglue.flow.sensor import FlowFields
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refine
-from vegglue.inference.solve_chunk import solve_flow
-from vegglue.inference.solve_ensemble import solve_ensemble
+from vegglue.inference.solve_ensemble import solve_ensemble, solve_flow
 from vegglue.measurements.kinds import KINDS
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.report.channel import save_channel_figure

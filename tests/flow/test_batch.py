@@ -24,8 +24,13 @@ from vegglue.flow.problem import Problem
 from vegglue.flow.status import FAILED, SOLVED_BY_NEWTON
 from vegglue.flow.wet_band import widen
 from vegglue.inference.glue import glue
-from vegglue.inference.solve_chunk import solve_chunk
-from vegglue.inference.solve_ensemble import LARGEST_CHUNK, solve_ensemble, solved_members, starts_and_chunks
+from vegglue.inference.solve_ensemble import (
+    LARGEST_CHUNK,
+    solve_chunk,
+    solve_ensemble,
+    solved_members,
+    starts_and_chunks,
+)
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.results.result_files import read_ensemble
 

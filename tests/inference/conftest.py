@@ -5,9 +5,8 @@ from refined_reach import FEW_MEMBERS, STATED_ERRORS, SolvedReach, solved_reach
 
 from vegglue.calibration.noise import Noise
 from vegglue.engine.model import model_of
-from vegglue.inference.map_and_errors import modes_and_errors
+from vegglue.inference.posterior_modes import members_of, modes_and_errors
 from vegglue.inference.refine import refine
-from vegglue.inference.tried_members import members_of
 from vegglue.parallel import at_most
 from vegglue.progress import silent
 from vegglue.results.posterior import Posterior

@@ -23,8 +23,7 @@ from vegglue.flow import nested_grids
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL
 from vegglue.flow.sensor import read_sensors
 from vegglue.flow.status import FAILED
-from vegglue.inference.solve_chunk import solve_chunk, solve_flow
-from vegglue.inference.solve_ensemble import solve_ensemble
+from vegglue.inference.solve_ensemble import solve_chunk, solve_ensemble, solve_flow
 from vegglue.measurements.observations import read_observations
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.fields import Fields, megabytes, predict_at, window_of
@@ -140,7 +139,7 @@ def test_a_failed_member_has_no_fields(finished: Finished, monkeypatch: pytest.M
         solved = solve(*arguments)
         return replace(solved, status=np.where(np.arange(len(solved.status)) == 1, FAILED, solved.status))
 
-    monkeypatch.setattr("vegglue.inference.solve_chunk.solve_nested", fail_second)
+    monkeypatch.setattr("vegglue.inference.solve_ensemble.solve_nested", fail_second)
     rows = solve_chunk(case, build_site(case), read_observations(case), sample_at(case, np.full((3, 2), 0.4)))
     assert [bool(np.isfinite(fields).any()) for fields in rows["fields"]] == [True, False, True]
 

@@ -16,9 +16,8 @@ from vegglue.case.schema import CanopyCorrection, Case, Parameter
 from vegglue.effects.plant_laws import baptist_chezy
 from vegglue.errors import InputError
 from vegglue.flow.status import FAILED
-from vegglue.inference.canopy_correction import correct_phi_for_canopy
 from vegglue.inference.glue import glue
-from vegglue.inference.posterior_summary import marginals, prior_mass_near_bounds
+from vegglue.inference.posterior_summary import correct_phi_for_canopy, marginals, prior_mass_near_bounds
 from vegglue.measurements.observations import Observations
 from vegglue.report.posterior_words import posterior_in_words
 from vegglue.results.ensemble import Ensemble
@@ -357,7 +356,7 @@ def test_correction_stands_on_the_law_of_the_solver(monkeypatch: pytest.MonkeyPa
     corrected = correct_phi_for_canopy(phi, 0.8, 1.06, 1.36, bare)
     law = np.vectorize(baptist_chezy)
     assert law(corrected, 1.06, 1.36, bare) == pytest.approx(law(phi, 0.8, 1.36, bare), rel=1e-14)
-    monkeypatch.setattr("vegglue.inference.canopy_correction.above_canopy", lambda top, depth: 0.0)
+    monkeypatch.setattr("vegglue.inference.posterior_summary.above_canopy", lambda top, depth: 0.0)
     assert correct_phi_for_canopy(phi, 1.36, 1.06, 1.36, bare) == pytest.approx(phi, rel=1e-13)
 
 

@@ -7,9 +7,18 @@ import pytest
 import scipy.stats
 
 from vegglue.errors import InputError
-from vegglue.inference.emulator import emulator_of_density, fit_emulator
-from vegglue.inference.importance_sampling import Sample, sample
-from vegglue.inference.student_mixture import Mixture, draw, log_density, mixture_at_modes, pooled_weights, tempered
+from vegglue.inference.importance_sampling import (
+    Mixture,
+    Sample,
+    draw,
+    emulator_of_density,
+    fit_emulator,
+    log_density,
+    mixture_at_modes,
+    pooled_weights,
+    sample,
+    tempered,
+)
 from vegglue.inference.weighted_statistics import effective_size, pareto_shape
 
 pytestmark = pytest.mark.slow

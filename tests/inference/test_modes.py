@@ -13,9 +13,9 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
+from vegglue.inference.posterior_modes import grids_of
 from vegglue.inference.refine import refine
 from vegglue.inference.solve_ensemble import solve_ensemble
-from vegglue.inference.tried_members import grids_of
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.parallel import at_most
 from vegglue.results.posterior import Posterior

@@ -33,7 +33,7 @@ def test_stored_parameters_are_those_solved_bit_for_bit(tmp_path: Path, monkeypa
         built.append(np.column_stack(list(given[-1].values())))
         return build_problem(*given)
 
-    monkeypatch.setattr("vegglue.inference.solve_chunk.build_problem", watched)
+    monkeypatch.setattr("vegglue.inference.solve_ensemble.build_problem", watched)
     path = tmp_path / "ensemble.h5"
     solve_ensemble(case, read_observations(case), path, 1, lambda progress: None)
     stored = np.column_stack(list(read_ensemble(path).parameters.values()))

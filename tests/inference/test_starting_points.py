@@ -15,10 +15,15 @@ from vegglue.case.parameter_space import z_at
 from vegglue.engine.interface import Point, linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
-from vegglue.inference import map_and_errors
-from vegglue.inference.map_and_errors import distinct_modes, find_modes, standardised_residual, starting_points
+from vegglue.inference import posterior_modes
+from vegglue.inference.posterior_modes import (
+    distinct_modes,
+    find_modes,
+    points_of_prior,
+    standardised_residual,
+    starting_points,
+)
 from vegglue.inference.refine import log_posterior, refine
-from vegglue.inference.tried_members import points_of_prior
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most
 from vegglue.progress import silent
@@ -106,7 +111,7 @@ def test_where_no_flow_is_found_from_coarse_cells_the_search_goes_on(
     with at_most(1):
         tried = points_of_prior(model)
         usual = find_modes(model, noise, tried, watch=silent)
-        monkeypatch.setattr(map_and_errors, "_refine", lambda *_: None)
+        monkeypatch.setattr(posterior_modes, "_refine", lambda *_: None)
         anew = find_modes(model, noise, tried, watch=silent)
     assert usual.on_coarse, "there are coarse cells to begin with"
     assert anew.fits[0].objective == pytest.approx(usual.fits[0].objective, abs=0.1)

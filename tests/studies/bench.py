@@ -31,8 +31,7 @@ from vegglue.flow.reference_member import settled
 from vegglue.flow.sensor import read_sensors
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, members_with
 from vegglue.flow.wet_band import rows_inside, widen
-from vegglue.inference.solve_chunk import linearised_medians, solve_chunk
-from vegglue.inference.solve_ensemble import solve_ensemble, starts_and_chunks
+from vegglue.inference.solve_ensemble import linearised_medians, solve_chunk, solve_ensemble, starts_and_chunks
 from vegglue.measurements.observations import read_observations
 from vegglue.results.result_files import read_ensemble
 

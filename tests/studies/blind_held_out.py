@@ -28,7 +28,7 @@ from vegglue.diagnosis.nominations import (
 from vegglue.diagnosis.stepwise_choice import Names
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
-from vegglue.inference.likelihood import root_mean_square
+from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.workflow.run_folder import calibrated_anew
 

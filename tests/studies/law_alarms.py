@@ -18,11 +18,10 @@ from blind_sets import PLACES, place_of
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.calibration.candidates import with_effect
-from vegglue.calibration.evidence import alarm_p
-from vegglue.calibration.law_screening import law_fingerprints, screen_laws
+from vegglue.calibration.law_screening import law_fingerprints, screen_laws, screen_products
 from vegglue.calibration.noise import noise_of
-from vegglue.calibration.product_screening import screen_products
 from vegglue.calibration.residual_screening import screen
+from vegglue.calibration.score_test import alarm_p
 from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.product import PRODUCT_ALARMS
 from vegglue.diagnosis.unlisted_laws import LAW_ALARMS

@@ -26,9 +26,9 @@ from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.calibration.candidates import Candidate, cause_of
-from vegglue.calibration.evidence import log_factors
 from vegglue.calibration.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
 from vegglue.calibration.residual_screening import GROUPS
+from vegglue.calibration.score_test import log_factors
 from vegglue.diagnosis.chances import chances_in_set
 from vegglue.diagnosis.search import HELD, MOST_QUANTITIES
 from vegglue.engine.interface import responses

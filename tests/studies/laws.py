@@ -30,7 +30,7 @@ from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.search import laws_beyond
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
-from vegglue.inference.likelihood import root_mean_square
+from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.parallel import at_most
 from vegglue.progress import silent
 

@@ -25,12 +25,11 @@ from scipy.special import logsumexp
 from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
-from vegglue.calibration.candidates import cause_of
-from vegglue.calibration.evidence import HypothesisKind
+from vegglue.calibration.candidates import cause_of, instruments_of, offset_columns
 from vegglue.calibration.fingerprints import Fingerprints, fingerprints_of
-from vegglue.calibration.instruments import instruments_of, offset_columns
 from vegglue.calibration.noise import Noise, noise_of
 from vegglue.calibration.residual_screening import kind_of_listed, kinds_of_instruments, kinds_of_places
+from vegglue.calibration.score_test import HypothesisKind
 from vegglue.case.channel_geometry import half_width
 from vegglue.diagnosis.competition import LEAST_ODDS
 from vegglue.diagnosis.contender_choice import What, chosen_contender

@@ -12,8 +12,7 @@ import numpy as np
 import scipy.optimize
 import scipy.stats
 
-from vegglue.inference.importance_sampling import sample
-from vegglue.inference.student_mixture import mixture_at_modes
+from vegglue.inference.importance_sampling import mixture_at_modes, sample
 from vegglue.inference.weighted_statistics import systematic_draws
 
 TWINS, DRAWS, PARAMETERS, STATIONS = 200, 99, 3, 12

@@ -19,7 +19,7 @@ from vegglue.case.centreline import centreline_of, heading_at
 from vegglue.case.schema import Case
 from vegglue.flow.sensor import FlowFields
 from vegglue.importers.placement import Placement
-from vegglue.inference.solve_chunk import solve_flow
+from vegglue.inference.solve_ensemble import solve_flow
 
 ROOT = Path(__file__).parents[2]
 BEND, FLUME = ROOT / "data/samples/bend", ROOT / "data/samples/flume"

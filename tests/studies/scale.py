@@ -25,8 +25,7 @@ from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import sobol_sample
 from vegglue.cluster import on_cluster
 from vegglue.flow.status import FAILED, members_with
-from vegglue.inference.solve_chunk import solve_chunk
-from vegglue.inference.solve_ensemble import solve_ensemble, starts_and_chunks
+from vegglue.inference.solve_ensemble import solve_chunk, solve_ensemble, starts_and_chunks
 from vegglue.measurements.observations import read_observations
 from vegglue.results.result_files import read_ensemble
 

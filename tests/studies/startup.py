@@ -38,7 +38,7 @@ def main() -> None:
 ONE_MEMBER = """
 import sys, vegglue
 case = vegglue.load_case(sys.argv[1])
-from vegglue.inference.solve_chunk import solve_flow
+from vegglue.inference.solve_ensemble import solve_flow
 from vegglue.case.parameter_space import middle_value
 vegglue.diagnose
 solve_flow(case, {name: middle_value(case, name) for name in case.parameters})

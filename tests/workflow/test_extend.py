@@ -10,7 +10,7 @@ from linear_baseline import stations_of
 from reach import said_to
 
 from vegglue.calibration.candidates import candidates_in_case, candidates_of, with_effect
-from vegglue.calibration.places import EFFECT_AT_PLACE
+from vegglue.calibration.fingerprints import EFFECT_AT_PLACE
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case

@@ -1,8 +1,15 @@
-"""The calibrated model that a diagnosis starts from: its MAP estimate, its noise, and the error of its grid."""
+"""The calibrated model that a diagnosis starts from: its MAP estimate, its noise, and the error of its grid.
 
+The baselines of a case and of its child, which several steps of a run begin with, each computed once.
+"""
+
+import hashlib
+import json
+from collections import OrderedDict
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import MapEstimate, at_point, fit, log_evidence_under, objective
@@ -16,8 +23,10 @@ from vegglue.calibration.noise import (
 )
 from vegglue.case.channel_geometry import cells_across
 from vegglue.case.parameter_space import refuse_without_parameters
+from vegglue.case.resolved_config import dumped, plain_tree
 from vegglue.engine.interface import Model, Point, by_itself, linearise, linearise_from
 from vegglue.engine.model import coarser
+from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
 from vegglue.parallel import in_threads
 
@@ -242,3 +251,39 @@ def _starts(model: Model, noise: Noise) -> list[Point]:
             "`vegglue check` says of outlet, inflow and bed, and correct the levels, discharges or priors."
         )
     return sorted(found, key=lambda point: objective(noise, point))[:FITTED_POINTS]
+
+
+# A case and its child [-]: each holds factors of all its experiments, each 0.2 GB by its size at 1142 x 40 cells.
+MOST_KEPT = 2
+# Keys of a case on which no calibration hangs, as pydantic wants those to leave out.
+ONLY_NAMED = dict.fromkeys(
+    ("name", "title", "simulate", "infer", "survey", "validation", "reference", "canopy_correction"), True
+) | {"frame": True, "imported": True}
+_kept: OrderedDict[str, Baseline] = OrderedDict()
+
+
+def kept_baseline(model: Model) -> Baseline:
+    """`baseline` of a model from its prior; of the same grid, measurements and priors it is not made again."""
+    if model.engine is not NEWTON or model.case.effect_file is not None:  # codes of others, which may have changed
+        return baseline(model)
+    key = _content_of(model)
+    found = _kept.pop(key, None)
+    if found is None:
+        found = baseline(model)
+    else:
+        found = replace(found, model=model, coarse=None if found.coarse is None else coarser(model))
+    _kept[key] = found
+    while len(_kept) > MOST_KEPT:
+        _kept.popitem(last=False)
+    return found
+
+
+def _content_of(model: Model) -> str:
+    """A digest of what the predictions of a model and its misfit hang on, as it was read."""
+    tree = plain_tree(dumped(model.case, ONLY_NAMED), str)
+    digest = hashlib.sha256(json.dumps(tree).encode())
+    for site in (model.site, *model.site.own.values()):
+        for values in (site.bed, site.friction_class, site.patch, site.cover):
+            digest.update(values.tobytes())
+    digest.update(pd.util.hash_pandas_object(model.station, index=False).to_numpy().tobytes())
+    return digest.hexdigest()

@@ -3,22 +3,34 @@
 A law is measured by what its term has seen: the quantity in the cells of the term that lie under water at the measured
 sections, at the calibrated flow; in all cells of the term under water where hardly any lie there, for what is beside a
 section shows in it too. Of these the references and the range of validity are quantiles.
+
+Fingerprints of laws by the answers of predictions to each cell: one product for a law, and no flow.
+
+    d prediction_n / d a = sum_cells  d prediction_n / d ln k  g share,   the same with ln nu and ln h U U
+
+Terms of the grammar are multiplied by exp(a g), and g at the flow of the point says how much in each cell. So a form
+may be tried at many references for nothing.
+
+Laws where nobody has seen them: experiments in which a discovered law is used beyond the range it was found in.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.candidates import Candidate
-from vegglue.calibration.places import LEAST_DEPTH
+from vegglue.calibration.fingerprints import LEAST_DEPTH
+from vegglue.calibration.model_error import CellResponses, cell_responses
+from vegglue.case.case_effects import effect_of
 from vegglue.case.channel_geometry import channel_geometry
-from vegglue.effects.definition import Effect, Shape
+from vegglue.effects.definition import Effect, SeenRange, Shape
 from vegglue.effects.grammar import LAWS, PRODUCTS, SAME_AS
 from vegglue.effects.law import PLAUSIBLE_STRENGTH, Law
 from vegglue.effects.surroundings import Cells
-from vegglue.engine.interface import Model, Point, flow_at_centres
+from vegglue.engine.interface import Model, Point, by_itself, flow_at_centres
+from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
 
 # Quantiles between which a law counts as seen, and the fewest cells that say what a term sees. Chosen, not measured.
@@ -155,3 +167,76 @@ def at_sections(model: Model, cells: Cells, experiment: str) -> Cells:
     measured = np.zeros((grid.x.size, 1, 1), dtype=bool)
     measured[np.abs(grid.x[:, None] - x).argmin(axis=0)] = True
     return replace(cells, depth=np.where(measured, cells.depth, 0.0))
+
+
+# What a law changes, relative to what is there, by the name of its term.
+RELATIVE_TERM: Mapping[str, Term] = {
+    "floor": "friction", "bank": "friction", "plants": "friction", "viscosity": "mixing", "advection": "advection",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LawTraces:
+    """Answers to each cell (station, nx, ny) by term, and the flow of each experiment with the rows of its stations."""
+
+    responses: CellResponses
+    flows: tuple[tuple[Array, Cells], ...]
+
+    def of(self, law: Law, settings: Sequence[Mapping[str, float]]) -> Array:
+        """d prediction / d strength (station, setting) [m/s or m], at each value of the reference."""
+        answers = self.responses.of[RELATIVE_TERM[law.term.name]]
+        found = np.zeros((len(answers), len(settings)))
+        for rows, cells in self.flows:
+            share = law.term.share(cells)
+            fields = [np.broadcast_to(law.g(cells, **one) * share, cells.depth.shape).ravel() for one in settings]
+            of_cells = answers[rows].reshape(rows.size, answers[0].size)
+            found[rows] = of_cells @ np.array(fields, dtype=np.float32).T
+        return found
+
+
+def law_traces(model: Model, point: Point) -> LawTraces:
+    """Of a model at a point."""
+    responses = cell_responses(model, by_itself(model, point), tuple(dict.fromkeys(RELATIVE_TERM.values())))
+    flows = tuple((rows, centre_cells(model, point, experiment)) for experiment, rows in model.rows.items())
+    return LawTraces(responses, flows)
+
+
+# Share of the cells above which a law is said to be used beyond its range. A range holds 90 % of what was seen, so that
+# a tenth lies outside by definition; twice that is another flow.
+SHARE_BEYOND = 0.2
+
+
+def laws_beyond_their_range(model: Model, point: Point) -> Iterator[str]:
+    """One sentence for each experiment in which a law of the case is used where it was not seen; point: of its flow."""
+    for key in model.case.effects:
+        effect, only = effect_of(model.case, key), model.case.effects[key].experiments
+        if effect.seen is None:
+            continue
+        for experiment in (one for one in model.case.experiments if only is None or one in only):
+            cells = centre_cells(model, point, experiment)
+            measured = at_sections(model, cells, experiment)
+            at_stations = _seen_values(effect, effect.seen, measured)
+            q = at_stations if at_stations.size else _seen_values(effect, effect.seen, cells)
+            beyond = float(np.mean((q < effect.seen.low) | (q > effect.seen.high))) if q.size else 0.0
+            if beyond > SHARE_BEYOND:
+                where = "under its measured sections" if at_stations.size else "under water"
+                yield _beyond_sentence(key, effect.seen, experiment, beyond, where)
+
+
+def _beyond_sentence(key: str, seen: SeenRange, experiment: str, beyond: float, where: str) -> str:
+    unit = "" if seen.unit == "-" else f" {seen.unit}"
+    return (
+        f"`{key}` was seen for {seen.symbol} from {seen.low:g} to {seen.high:g}{unit}; in experiment `{experiment}` "
+        f"{beyond:.0%} of the cells that it acts on {where} lie outside, where it is a guess."
+    )
+
+
+def _seen_values(effect: Effect, seen: SeenRange, cells: Cells) -> Array:
+    """The quantity (k,) of the cells under water that the effect changes."""
+    shapes = {shape.name: np.array(shape.default) for shape in effect.shapes}
+    # Of a flux the part along x says where it acts.
+    strength = {effect.amplitude.name: np.array(effect.amplitude.scale)}
+    changed = next(iter(effect.act(cells, **strength, **shapes).values()))
+    off = 0.0 if effect.stage == "exchange" else cells.rate
+    q = np.broadcast_to(seen.of(cells), cells.depth.shape)
+    return np.asarray(q[(changed != off) & (cells.depth > LEAST_DEPTH) & np.isfinite(q)])

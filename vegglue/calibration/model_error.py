@@ -1,4 +1,15 @@
-"""The model's own error: friction and bed are a little wrong everywhere, and the same in all experiments.
+"""How predictions answer to a term of the equations that is changed in one cell, by adjoints of each station.
+
+Errors of a site that nobody would call a missing effect: a site is like that.
+
+    S = s_y^2 diag((du/dy)^2) + s_q^2 sum_e Q_e Q_e' + s_n^2 sum_p P_p P_p' + s_e^2/2 sum_s (O_s O_s' + I_s I_s')
+
+du/dy is how a velocity changes where a probe stands beside its place, Q_e answers to the discharge of experiment e, P_p
+to the friction of patch p, O_s to side s of a patch that lies 1 m further out and I_s to one 1 m further in, all in
+units of a station. A side lies out or in, with the same chance.
+Source: definition; which errors are meant, and of which size, is chosen (see DECISIONS).
+
+The model's own error: friction and bed are a little wrong everywhere, and the same in all experiments.
 
     M = (s_f^2 / v) sum_k T_k T_k' + (s_b^2 / v) sum_k B_k B_k' + S,   v = mean over cells of sum_k bump_k^2 [-]
 
@@ -17,23 +28,147 @@ Source: a model has its own error in weak-constraint data assimilation (Tremolet
 checked against it); the fields of bumps are a definition of this project.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.calibration.cell_responses import CellResponses, cell_responses
-from vegglue.calibration.site_error import site_error_columns
 from vegglue.case.case_effects import effect_of, value_of
-from vegglue.case.channel_geometry import half_width
+from vegglue.case.channel_geometry import half_width, patches_present
 from vegglue.case.grid import Grid
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.parts import Value
-from vegglue.case.schema import Case, ModelError
-from vegglue.engine.interface import Model, Point
+from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
+from vegglue.engine.interface import Cause, Model, Point, responses, responses_to_cells
 from vegglue.flow.local_changes import Term
+from vegglue.measurements.kinds import velocity_rows
+from vegglue.parallel import in_threads
+
+
+@dataclass(frozen=True)
+class CellResponses:
+    """How predictions of all stations answer to a term changed in each cell of a grid, (station, nx, ny) by term."""
+
+    grid: Grid
+    of: dict[Term, NDArray[np.float32]]
+
+
+def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellResponses:
+    """Those of all experiments, side by side."""
+    shape = (len(model.station), model.site.grid.x.size, model.site.grid.y.size)
+    found = {term: np.zeros(shape, dtype=np.float32) for term in terms}
+    tasks = [(model, point, experiment, terms) for experiment in point.flows]
+    for experiment, of in zip(point.flows, in_threads(responses_to_cells, tasks), strict=True):
+        for term in terms:
+            found[term][model.rows[experiment]] = of[term]
+    return CellResponses(model.site.grid, found)
+
+
+# The name of an effect that is tried alone, and of its amplitude; no case has it.
+TRIED, AMOUNT = "error_of_the_site", "error_of_the_site_amount"
+UNKNOWN = Parameter(distribution="uniform", low=-1.0, high=1.0, unit="-")
+
+
+def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: CellResponses) -> Array:
+    """Columns (station, k) with S = columns columns'; cells: how predictions answer to friction."""
+    parts: list[tuple[float, Callable[[], Array]]] = [
+        (allowed.probes, lambda: _beside_their_places(model, point)),
+        (allowed.discharge, lambda: _discharges(model, point)),
+        (allowed.stems, lambda: _patches(model, cells)),
+        (allowed.edges, lambda: _sides(model, cells)),
+    ]
+    none = np.zeros((len(model.station), 0))
+    return np.hstack([none, *(size * columns() for size, columns in parts if size)])
+
+
+def _beside_their_places(model: Model, point: Point) -> Array:
+    """diag(du/dy) of velocities (station, velocities) [1/s]."""
+    cause = _cause(model.case, "station_shift")
+    rows = velocity_rows(model.station)
+    return np.diag(responses(model, point, [cause])[:, 0])[:, np.flatnonzero(rows)]
+
+
+def _discharges(model: Model, point: Point) -> Array:
+    """Answers to the relative error of the discharge of each experiment (station, experiments)."""
+    causes = [_cause(model.case, "discharge_error", name) for name in model.case.experiments]
+    return responses(model, point, causes)
+
+
+def _cause(case: Case, effect: str, *experiments: str) -> Cause:
+    """An effect of the library that acts alone, in some experiments or in all."""
+    with_it = case.model_copy(update={"effects": {**case.effects, TRIED: EffectEntry(effect=effect, values={})}})
+    amplitude = effect_of(with_it, TRIED).amplitude
+    entry = EffectEntry(effect=effect, values={amplitude.name: AMOUNT}, experiments=experiments or None)
+    changed = case.model_copy(
+        update={
+            "effects": {**case.effects, TRIED: entry},
+            "parameters": {**case.parameters, AMOUNT: UNKNOWN},
+        }
+    )
+    return Cause(changed, AMOUNT, amplitude, experiments)
+
+
+def _sides(model: Model, cells: CellResponses) -> Array:
+    """Answers to each side of each patch further out and further in, over 2^(1/2) (station, 2 sides) [unit of a
+    station per m]; see `_side`.
+    """
+    patch, parts = model.site.main_patch, [np.zeros((len(model.station), 0))]
+    rate = {name: _friction_rate(cells, rows) for name, rows in model.rows.items()}
+    for index in np.unique(patch[patch >= 0]):
+        parts += [_side(model, cells, rate, int(index), axis, step) for axis in (0, 1) for step in (-1, 1)]
+    return np.hstack(parts) / np.sqrt(2.0)
+
+
+def _side(model: Model, cells: CellResponses, rate: Mapping[str, Array], index: int, axis: int, outwards: int) -> Array:
+    """O and I of one side of a patch (station, 2) [unit of a station per m]; rate k (nx, ny) [1/m] by experiment.
+
+        O = (I + sum of dk / w over the cells beside it) / 2,   I = sum of dk / w over the cells within
+
+    w is the width of these cells and dk the k of those within less that of those beside them. A strip that is gained
+    stands where water was fast, and slows it: half of it counts as if water were slow there already. Of what a second
+    solver does where all sides lie up to 0.1 m off, this leaves a twentieth of the squares; with I alone half was left.
+    """
+    inside, width = model.site.main_patch == index, (model.site.grid.dx, model.site.grid.dy)[axis]
+    within, found = inside & ~_next(inside, axis, outwards), np.zeros((len(model.station), 2))
+    # Cells that are covered in part differ by that part of what plants and bed differ by.
+    width = width * np.maximum(model.site.cover - _next(model.site.cover, axis, outwards), 0.5)
+    for experiment, rows in model.rows.items():
+        if index in patches_present(model.case, experiment):
+            excess = within * (rate[experiment] - _next(rate[experiment], axis, outwards)) / width
+            beside = ~inside * _next(excess, axis, -outwards)
+            answers = cells.of["drag"][rows].reshape(rows.size, inside.size)
+            inwards, beyond = answers @ excess.ravel(), answers @ beside.ravel()
+            found[rows] = np.stack([0.5 * (inwards + beyond), inwards], axis=1)
+    return found
+
+
+def _next(field: NDArray[Any], axis: int, step: int) -> NDArray[Any]:
+    """What the next cell along an axis has, (nx, ny); at the end of the grid the cell itself."""
+    count = field.shape[axis]
+    return np.take(field, np.clip(np.arange(count) + step, 0, count - 1), axis)
+
+
+def _friction_rate(cells: CellResponses, rows: NDArray[np.int_]) -> Array:
+    """k (nx, ny) [1/m] in the experiment of some stations: what answers to friction made larger by its own part is k
+    times what answers to drag.
+    """
+    friction, drag = (cells.of[term][rows].astype(float) for term in ("friction", "drag"))
+    return np.asarray((friction * drag).sum(axis=0) / np.maximum((drag**2).sum(axis=0), np.finfo(float).tiny))
+
+
+def _patches(model: Model, cells: CellResponses) -> Array:
+    """Answers to the relative friction of each patch (station, patches); none in experiments without it."""
+    patch, columns = model.site.main_patch, [np.zeros((len(model.station), 0))]
+    for index in np.unique(patch[patch >= 0]):
+        answers = cells.of["friction"][:, patch == index].sum(axis=1)
+        for experiment, rows in model.rows.items():
+            answers[rows] *= index in patches_present(model.case, experiment)
+        columns.append(answers[:, None])
+    return np.hstack(columns)
+
 
 # The term that each unlisted effect of the library changes at its place.
 TERM_OF: dict[str, Term] = {

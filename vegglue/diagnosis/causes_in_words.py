@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from vegglue.calibration.instruments import Instrument
-from vegglue.calibration.places import EFFECT_AT_PLACE
+from vegglue.calibration.candidates import Instrument
+from vegglue.calibration.fingerprints import EFFECT_AT_PLACE
 from vegglue.case.parameter_space import shown_bounds
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Findings, Undecided

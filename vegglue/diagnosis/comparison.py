@@ -21,7 +21,7 @@ from vegglue.calibration.fit import interval95
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.engine.interface import Model, linearise
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
-from vegglue.inference.likelihood import root_mean_square
+from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
 from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
 from vegglue.wording.numbers import in_digits, so_many

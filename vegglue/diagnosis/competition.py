@@ -18,12 +18,10 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
-from vegglue.calibration.candidates import place_candidate
-from vegglue.calibration.evidence import HypothesisKind, kind_named
-from vegglue.calibration.instruments import Instrument
-from vegglue.calibration.places import EFFECT_AT_PLACE, Places
-from vegglue.calibration.residual_screening import Screening, refit_start
-from vegglue.calibration.second_looks import SecondLook, second_looks
+from vegglue.calibration.candidates import Instrument, place_candidate
+from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Places
+from vegglue.calibration.residual_screening import Screening, SecondLook, refit_start, second_looks
+from vegglue.calibration.score_test import HypothesisKind, kind_named
 from vegglue.diagnosis.place_search import found_place
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.diagnosis.tempered_chances import tempered_chances, tempering

@@ -7,11 +7,11 @@ import numpy as np
 
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, log_evidence
-from vegglue.calibration.evidence import kind_named
 from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
 from vegglue.calibration.law_screening import LawScreening
 from vegglue.calibration.noise import with_correlation
 from vegglue.calibration.residual_screening import Screening
+from vegglue.calibration.score_test import kind_named
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.channel_geometry import half_width
 from vegglue.diagnosis.between_sections import largest_error_between
@@ -29,7 +29,7 @@ from vegglue.diagnosis.unlisted_laws import clearly_a_law, law_goes_first, laws_
 from vegglue.diagnosis.unseen import UnseenErrors, unseen_errors
 from vegglue.diagnosis.verdict import judged
 from vegglue.engine.interface import Model
-from vegglue.inference.likelihood import root_mean_square
+from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.carried_in_words import carried_otherwise
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.results.diagnosis import (

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.instruments import InstrumentKind
+from vegglue.calibration.candidates import InstrumentKind
 from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
 from vegglue.diagnosis.tempered_chances import tempering
 

@@ -14,14 +14,12 @@ from functools import partial
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, log_evidence
-from vegglue.calibration.candidates import candidate_in_case
-from vegglue.calibration.evidence import alarm_p
+from vegglue.calibration.baseline import Baseline, kept_baseline, log_evidence
+from vegglue.calibration.candidates import Instrument, candidate_in_case, error_columns
 from vegglue.calibration.fit import chi2, fit, interval95
-from vegglue.calibration.instruments import Instrument, error_columns
-from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.calibration.noise import with_unknown_errors
 from vegglue.calibration.residual_screening import Screening, screen
+from vegglue.calibration.score_test import alarm_p
 from vegglue.diagnosis.competition import (
     Contender,
     chances_of,

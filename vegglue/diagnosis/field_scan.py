@@ -16,8 +16,7 @@ import scipy.linalg
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
-from vegglue.calibration.cell_responses import CellResponses, cell_responses
-from vegglue.calibration.model_error import Bumps, bumps, field_columns
+from vegglue.calibration.model_error import Bumps, CellResponses, bumps, cell_responses, field_columns
 from vegglue.calibration.noise import covariance_of
 from vegglue.calibration.residual_screening import GROUPS
 from vegglue.flow.local_changes import Term

@@ -16,8 +16,8 @@ from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import place_candidate, with_effect
-from vegglue.calibration.evidence import HypothesisKind, expected_gain, log_factors
-from vegglue.calibration.places import Places, places_around
+from vegglue.calibration.fingerprints import Places, places_around
+from vegglue.calibration.score_test import HypothesisKind, expected_gain, log_factors
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.diagnosis.tempered_chances import tempered_chances
 

@@ -11,9 +11,8 @@ import numpy as np
 from vegglue.calibration.baseline import Baseline, SearchModel
 from vegglue.calibration.candidates import with_effect
 from vegglue.calibration.fingerprints import Fingerprints
-from vegglue.calibration.law_screening import LARGEST_GAIN
+from vegglue.calibration.law_screening import LARGEST_GAIN, ProductScreening, screen_products
 from vegglue.calibration.laws_in_case import LawInCase
-from vegglue.calibration.product_screening import ProductScreening, screen_products
 from vegglue.case.parameter_space import theta_at
 from vegglue.diagnosis.chances import chances_in_set
 from vegglue.diagnosis.discovered import LawFound, ProductFound

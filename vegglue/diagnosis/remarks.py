@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from vegglue.calibration.places import LEAST_DEPTH
+from vegglue.calibration.fingerprints import LEAST_DEPTH
 from vegglue.diagnosis.causes_in_words import TO_DISCOVER, instruments_in_words, law_in_words, model_error_in_words
 from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, Statement, is_clear
 from vegglue.measurements.carried_in_words import carried_in_words

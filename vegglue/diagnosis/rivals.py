@@ -8,10 +8,10 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline
-from vegglue.calibration.evidence import kind_named, prior_shrinkage
+from vegglue.calibration.candidates import Instrument, error_columns
 from vegglue.calibration.fit import chi2
-from vegglue.calibration.instruments import Instrument, error_columns
 from vegglue.calibration.residual_screening import Screening
+from vegglue.calibration.score_test import kind_named, prior_shrinkage
 from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
 from vegglue.diagnosis.findings import Undecided
 from vegglue.diagnosis.refits import Refit

@@ -3,9 +3,9 @@
 import numpy as np
 
 from vegglue.calibration import score_test
-from vegglue.calibration.evidence import prior_shrinkage
 from vegglue.calibration.fit import objective
 from vegglue.calibration.residual_screening import Screening
+from vegglue.calibration.score_test import prior_shrinkage
 from vegglue.normal_range import NORMAL95
 from vegglue.results.suspect import AmplitudeEstimate, Detectability, ScoreTest, Suspect
 

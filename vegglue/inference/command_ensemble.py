@@ -14,8 +14,14 @@ from vegglue.case.schema import Case
 from vegglue.engine.command_run import CommandEnd
 from vegglue.engine.command_runs import CommandRuns, ended_runs, own_parameters
 from vegglue.flow.status import FAILED, RUN_BY_COMMAND
-from vegglue.inference.solve_chunk import Rows, section_positions
-from vegglue.inference.solve_ensemble import left_to_do, make_header, refuse_too_many, solved_members
+from vegglue.inference.solve_ensemble import (
+    Rows,
+    left_to_do,
+    make_header,
+    refuse_too_many,
+    section_positions,
+    solved_members,
+)
 from vegglue.measurements.observations import Observations
 from vegglue.progress import Progress, Watch
 from vegglue.results.resume import ensemble_writer

@@ -1,6 +1,7 @@
 """Statistics of weighted members: quantiles, moments, the effective number of members, and draws of equal weight."""
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr, ndtri
 
@@ -159,3 +160,14 @@ def _generalised_pareto(excess: Array) -> tuple[float, float]:
     best = (b * share).sum() / share.sum()
     shape = float(np.log1p(-best * excess).mean())
     return (shape * count + 0.5 * 10) / (count + 10), float(-shape / best)
+
+
+def root_mean_square(values: Array) -> float:
+    """sqrt(mean x^2), in the unit of the values; NaN without any, or with one that is unknown."""
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+
+
+def stations_by_kind(station: pd.DataFrame) -> dict[str, NDArray[np.intp]]:
+    """Rows of the used stations by kind of measurement."""
+    used = station["used"].to_numpy(bool)
+    return {str(kind): np.flatnonzero(used & (station["kind"] == kind)) for kind in station["kind"][used].unique()}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.inference.likelihood import root_mean_square
+from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.report.cause_words import InstrumentRow, PlaceRow, instrument_rows, place_rows
 from vegglue.report.key_numbers import KeyNumber

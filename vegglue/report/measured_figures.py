@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from vegglue.arrays import Array
-from vegglue.inference.glue import member_weights
-from vegglue.inference.likelihood import fit_members
+from vegglue.inference.glue import fit_members, member_weights
 from vegglue.inference.weighted_statistics import weighted_quantile
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import fitted_curve

@@ -6,8 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from vegglue.inference.likelihood import root_mean_square, sizes_as_stated
-from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
+from vegglue.inference.glue import sizes_as_stated
+from vegglue.inference.weighted_statistics import TRUSTED_K_HAT, root_mean_square
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import SET_ASIDE
 from vegglue.report.homogeneity_words import homogeneity_in_words

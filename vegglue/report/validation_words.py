@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vegglue.inference.refinement_summary import groups_left_out
+from vegglue.inference.refine import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.results.posterior import Posterior
 from vegglue.results.refinement import GroupsLeftOut, LeaveOneOut, MisfitTest, Refinement

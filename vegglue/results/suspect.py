@@ -44,7 +44,7 @@ class AmplitudeEstimate:
 class ScoreTest:
     """Score T of an effect [standard errors], and the chance that errors alone make any effect score as high [-].
 
-    p_family: counted among bootstrap draws, never below one over their number; see `screening/family_wise_p`.
+    p_family: counted among bootstrap draws, never below one over their number; see `calibration/score_test`.
     """
 
     score: float

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vegglue.calibration.beyond_seen import laws_beyond_their_range
+from vegglue.calibration.laws_in_case import laws_beyond_their_range
 from vegglue.case.case_effects import effect_of
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case

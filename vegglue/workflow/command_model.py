@@ -19,7 +19,7 @@ from vegglue.engine.command_runs import command_predictions, command_runs, ended
 from vegglue.engine.corrected import corrected, correction_at, without_effects
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.errors import InputError, shown_path
-from vegglue.inference.likelihood import root_mean_square, stations_by_kind
+from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.progress import Watch
 from vegglue.results.diagnosis import Diagnosis, Verdict

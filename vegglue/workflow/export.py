@@ -17,7 +17,7 @@ from vegglue.diagnosis.excluded_stations import without_stations
 from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
-from vegglue.inference.solve_chunk import solve_flow
+from vegglue.inference.solve_ensemble import solve_flow
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent

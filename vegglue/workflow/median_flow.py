@@ -5,7 +5,7 @@ from pathlib import Path
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.flow.sensor import FlowFields
-from vegglue.inference.solve_chunk import solve_flow
+from vegglue.inference.solve_ensemble import solve_flow
 from vegglue.results.posterior import Posterior
 from vegglue.results.result_files import flow_that_fits, write_flow
 

@@ -10,7 +10,7 @@ from vegglue.case.schema import Case
 from vegglue.case.text_files import case_name, write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
-from vegglue.inference.solve_chunk import solve_flow
+from vegglue.inference.solve_ensemble import solve_flow
 from vegglue.whole_files import failed_writes_told
 from vegglue.workflow.new_texts import CASE, README
 

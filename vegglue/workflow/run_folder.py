@@ -13,9 +13,8 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, baseline, for_prediction, log_evidence
+from vegglue.calibration.baseline import Baseline, baseline, for_prediction, kept_baseline, log_evidence
 from vegglue.calibration.fit import fit
-from vegglue.calibration.kept_baselines import kept_baseline
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case

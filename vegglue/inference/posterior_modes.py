@@ -1,4 +1,6 @@
-"""The modes of the posterior (MAP estimates) and the errors of the data, which importance sampling starts from.
+"""Members that a search for modes begins with: those of an ensemble, or points of the prior on coarse cells.
+
+The modes of the posterior (MAP estimates) and the errors of the data, which importance sampling starts from.
 
 Fits start from several of the best members of an ensemble, or of points of the prior, on cells of four times the size
 where the grid can be coarsened so far, and are finished on ever finer ones. Fits that end at the same point count once.
@@ -16,13 +18,62 @@ from vegglue.calibration.baseline import Baseline, grid_difference, with_own_err
 from vegglue.calibration.fit import MapEstimate, determined, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_scale
 from vegglue.calibration.residual_screening import noise_given_all
-from vegglue.engine.interface import Model, Point, linearise, linearise_from
-from vegglue.engine.model import coarser
+from vegglue.case.channel_geometry import cells_across
+from vegglue.case.parameter_space import refuse_without_parameters, z_at
+from vegglue.case.prior import sample_prior
+from vegglue.engine.interface import Model, Point, linearise, linearise_from, predict
+from vegglue.engine.model import coarser, ever_coarser
 from vegglue.errors import InputError, shown_command
-from vegglue.inference.likelihood import fit_members, sizes_as_stated
-from vegglue.inference.tried_members import TriedMembers, grids_of
+from vegglue.inference.glue import fit_members, sizes_as_stated
 from vegglue.parallel import in_threads, side_by_side
 from vegglue.progress import Progress, Watch, counted
+from vegglue.results.ensemble import Ensemble
+
+# Grids that fits go through: chosen. With the third the search for modes of the demo takes 24 s of one core, not 31; a
+# fourth hardly resolves a section.
+MOST_GRIDS = 3
+# Cells across the floor of the channel below which a grid is left out: with two of them, two patches beside each other
+# had one mode, which way round they lay was no longer told (DECISIONS), with four both were found.
+FEWEST_ACROSS = 4.0
+# Points of the prior that are tried where there is no ensemble: as many as the best members that starts are chosen
+# from. Chosen: on 100 x 12 cells with three experiments they take 1.5 s of a core.
+TRIED_POINTS = 64
+
+
+@dataclass(frozen=True)
+class TriedMembers:
+    """Members at z (m, p) and what each predicts at the stations (m, station), NaN where it failed."""
+
+    z: Array
+    prediction: Array
+
+
+def members_of(ensemble: Ensemble, model: Model) -> TriedMembers:
+    """The members of an ensemble."""
+    return TriedMembers(z_at(model.case, ensemble.parameters), ensemble.prediction)
+
+
+def points_of_prior(model: Model) -> TriedMembers:
+    """TRIED_POINTS of the prior, Sobol' points, on the coarsest cells that fits go through.
+
+    Errors: InputError for a case without parameters.
+    """
+    refuse_without_parameters(model.case)
+    coarsest = grids_of(model)[0]
+    z = z_at(model.case, sample_prior(model.case.parameters, TRIED_POINTS, model.case.simulate.seed))
+    middle = linearise(coarsest, np.zeros(z.shape[1]))
+    if middle is None:
+        middle = next((one for one in (linearise(coarsest, place) for place in z) if one is not None), None)
+    known = np.full((len(z), len(model.station)), np.nan)
+    return TriedMembers(z, known if middle is None else predict(coarsest, [middle], z))
+
+
+def grids_of(model: Model) -> list[Model]:
+    """The model on the grids that fits go through, the coarsest first, and its own at last."""
+    *coarse, own = ever_coarser(model.case, model.site)[-MOST_GRIDS:]
+    places = [*((case, site) for case, site in coarse if cells_across(site) >= FEWEST_ACROSS), own]
+    return [replace(model, case=case, site=site) for case, site in places]
+
 
 # Members that fits start from at most, among how many of the best, and their least distance [standard deviations of the
 # prior]. Chosen, not measured: more starts find more modes and each costs a fit.
