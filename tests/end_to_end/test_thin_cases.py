@@ -78,6 +78,6 @@ def test_velocities_no_flow_comes_near_are_told_before_priors(
     monkeypatch.setattr("vegglue.diagnosis.diagnose.kept_baseline", none_found)
     code, told = said_to(monkeypatch, capsys, "diagnose", config, "--jobs", 1)
     assert (code, "widen the priors" in told) == (2, True), told
-    monkeypatch.setattr("vegglue.diagnosis.diagnose.absurd_values", lambda *_: ["All velocities are in cm/s."])
+    monkeypatch.setattr("vegglue.diagnosis.diagnose.implausible_values", lambda *_: ["All velocities are in cm/s."])
     code, told = said_to(monkeypatch, capsys, "diagnose", config, "--jobs", 1)
     assert (code, told) == (2, "brook: no flow comes near what was measured. All velocities are in cm/s.\n")

@@ -19,9 +19,13 @@ from vegglue.cli.tables import show_carried
 from vegglue.diagnosis.verdict import OF_DISCHARGES
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
-from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
-from vegglue.measurements.carried_in_words import carried_in_short, carried_in_words, carried_otherwise
 from vegglue.measurements.observations import read_observations
+from vegglue.measurements.section_discharge import (
+    CarriedDischarge,
+    carried_discharges,
+    discharge_mismatches,
+    mismatched_discharges,
+)
 from vegglue.report.answer_words import why_not_to_rely
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE
 
@@ -62,20 +66,22 @@ def test_sections_of_campaigns_carry_what_is_stated(tmp_path: Path, name: str) -
     )
     others = [standard_errors_off(one) for one in found if name not in REALLY_OTHERWISE]
     assert np.abs(others).max(initial=0.0) < 1.2
-    assert carried_otherwise(case, build_site(case), table) == []
+    assert mismatched_discharges(case, build_site(case), table) == []
 
 
 def test_velocities_that_carry_half_as_much_again_are_said_of_each_experiment(tmp_path: Path) -> None:
     case, table = read(imported("open-b", tmp_path))
-    off = carried_otherwise(case, build_site(case), faster(table, 1.5))
+    off = mismatched_discharges(case, build_site(case), faster(table, 1.5))
     assert [one.ratio for one in off] == pytest.approx([1.5] * 12, rel=0.02)
-    (together,) = carried_in_words(off)
-    assert together.startswith(
-        "The velocities of 12 sections in experiments low, mid and high carry 1.5 times the stated discharge (D0, x = "
-        "36 m, in low: 2.07 m3/s, 1.9 to 2.24, where 1.4 m3/s is stated): check the discharge"
-    )
-    (alone,) = carried_in_words(carried_otherwise(case, build_site(case), faster(table, 0.7, "mid")))
-    assert "4 sections in experiment mid carry 0.7 to 0.71 times the stated discharge" in alone
+    (together,) = discharge_mismatches(off)
+    assert (len(together.sections), together.experiments) == (12, ("low", "mid", "high"))
+    first = together.sections[0]
+    assert (first.experiment, first.section, first.x, first.stated) == ("low", "D0", 36.0, (1.4, 1.4))
+    assert (first.value, *first.interval95) == pytest.approx((2.07, 1.9, 2.24), abs=5e-3)
+    alone = mismatched_discharges(case, build_site(case), faster(table, 0.7, "mid"))
+    (less,) = discharge_mismatches(alone)
+    assert (len(less.sections), less.experiments, less.ratios) == (4, ("mid",), pytest.approx((0.7, 0.71), abs=5e-3))
+    assert [len(one.sections) for one in discharge_mismatches([*alone, *off])] == [12, 4]
 
 
 def test_what_was_not_measured_makes_it_less_certain(tmp_path: Path) -> None:
@@ -122,14 +128,14 @@ def test_an_experiment_whose_discharge_is_calibrated_is_not_doubted(tmp_path: Pa
     case, table = read(imported("open-b", tmp_path))
     of_one = {"discharge_error": {"experiments": ["low"], "values": {"relative_error": 0.5}}}
     told = Case.model_validate({**case.model_dump(exclude_unset=True), "effects": of_one, "source": case.source})
-    off = carried_otherwise(told, build_site(told), faster(table, 1.5))
+    off = mismatched_discharges(told, build_site(told), faster(table, 1.5))
     assert {one.experiment for one in off} == {"mid", "high"}
 
 
 def test_values_that_no_flow_can_have_are_said_instead(tmp_path: Path) -> None:
     case, table = read(imported("open-b", tmp_path))
     assert all(one.clearly_off for one in carried(case, faster(table, 100.0)))
-    assert carried_otherwise(case, build_site(case), faster(table, 100.0)) == []
+    assert mismatched_discharges(case, build_site(case), faster(table, 100.0)) == []
 
 
 DOUBT = "sections carry 1.5 times the stated discharge in experiment low"
@@ -180,7 +186,7 @@ def test_water_of_an_effect_in_the_model_is_no_doubt(tmp_path: Path) -> None:
     for x, experiments in ((0.0, set()), (40.0, {"D0"}), (60.0, {"D0", "D3", "D5", "D7"})):
         spring = {"unlisted_inflow": {"values": {"discharge": 0.5, "x": x, "y": 0.0}}}
         told = Case.model_validate({**case.model_dump(exclude_unset=True), "effects": spring, "source": case.source})
-        off = carried_otherwise(told, build_site(told), faster(table, 1.5))
+        off = mismatched_discharges(told, build_site(told), faster(table, 1.5))
         assert {one.section for one in off} == experiments
 
 
@@ -201,10 +207,10 @@ def test_the_page_says_that_the_verdict_is_not_to_be_relied_on(tmp_path: Path, m
     doubting = a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}{DOUBT}: check it."})
     explained, toy = (replace(a_toy(tmp_path), diagnosis=one) for one in (a_diagnosis(), doubting))
     before = why_not_to_rely(toy)
-    monkeypatch.setattr("vegglue.report.answer_words.carried_otherwise", lambda *_: [HIGHER])
-    assert carried_in_short([HIGHER]) in why_not_to_rely(toy)
-    assert carried_in_short([HIGHER]) not in before
-    assert carried_in_short([HIGHER]) not in why_not_to_rely(explained)  # what was found may be why
+    monkeypatch.setattr("vegglue.report.answer_words.mismatched_discharges", lambda *_: [HIGHER])
+    assert DOUBT in why_not_to_rely(toy)
+    assert DOUBT not in before
+    assert DOUBT not in why_not_to_rely(explained)  # what was found may be why
 
 
 def test_every_section_stands_in_the_table_of_a_check(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from vegglue.measurements.sections import section_in_words, section_places
+from vegglue.measurements.sections import section_places
 
 
 def station(**columns: list[float] | list[str]) -> pd.DataFrame:
@@ -29,10 +29,3 @@ def test_stations_along_the_channel_and_nameless_ones_have_places_of_their_own()
 def test_a_name_means_another_section_in_another_experiment() -> None:
     both = station(x=[1.0, 1.2, 7.0, 7.2], y=[0.0, 3.0, 0.0, 3.0], experiment=["low", "low", "high", "high"])
     assert section_places(both).tolist() == [1.1, 1.1, 7.1, 7.1]
-
-
-def test_a_section_named_after_its_place_is_told_once() -> None:
-    assert section_in_words("D3", 42.004) == "D3, x = 42 m"
-    assert section_in_words("x45.00", 45.0) == "x = 45 m"
-    assert section_in_words("x+0.50", 0.5) == "x = 0.5 m"
-    assert section_in_words("x1", 3.0) == "x1, x = 3 m"

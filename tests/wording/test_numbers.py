@@ -13,14 +13,21 @@ from rungs import a_rung
 from stored import ALL, a_header, write_chunks
 
 from vegglue.case.config import load_case
-from vegglue.case.parameter_space import shown_bounds
 from vegglue.cli.tables import show_ladder
 from vegglue.diagnosis.excluded_stations import MEASUREMENT
 from vegglue.flow.status import FAILED
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.results.result_files import read_ensemble
-from vegglue.wording.numbers import duration_in_short, in_digits, in_short, interval_in_short, so_many
+from vegglue.wording.numbers import (
+    duration_in_short,
+    in_digits,
+    in_short,
+    interval_in_short,
+    range_in_digits,
+    section_in_words,
+    so_many,
+)
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.stepwise_extension import StepwiseExtension
 
@@ -84,7 +91,7 @@ def test_large_numbers_have_one_form_in_tables_and_sentences(capsys: pytest.Capt
     show_ladder(Comparison((worse, after), pd.DataFrame(columns=MEASUREMENT)))
     assert "1900 ± 800" in capsys.readouterr().out, "it was 1.9e+03 ± 8e+02"
     assert interval_in_short("force", 1523.4, 1200.0, 1900.0, "N") == "force: 1520, 95 % 1200 to 1900 N"
-    assert shown_bounds((1234.0, 5678.0)) == "1230 to 5680"
+    assert range_in_digits((1234.0, 5678.0)) == "1230 to 5680"
 
 
 @pytest.mark.parametrize("found", [a_diagnosis(), NOTHING])
@@ -146,3 +153,10 @@ def test_a_time_is_told_in_the_unit_that_it_is_twice() -> None:
     """A terminal told minutes from 90 s on, a page from 120 s on."""
     told = [duration_in_short(seconds) for seconds in (0.4, 119.0, 120.0, 7199.0, 7200.0, 9000.0)]
     assert told == ["0 s", "119 s", "2 min", "120 min", "2.0 h", "2.5 h"]
+
+
+def test_a_section_named_after_its_place_is_told_once() -> None:
+    assert section_in_words("D3", 42.004) == "D3, x = 42 m"
+    assert section_in_words("x45.00", 45.0) == "x = 45 m"
+    assert section_in_words("x+0.50", 0.5) == "x = 0.5 m"
+    assert section_in_words("x1", 3.0) == "x1, x = 3 m"

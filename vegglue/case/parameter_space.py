@@ -15,7 +15,6 @@ from vegglue.case.parts import Value
 from vegglue.case.prior import probability, quantile, sobol_points
 from vegglue.case.schema import Case, Parameter
 from vegglue.errors import InputError, shown_path
-from vegglue.wording.numbers import in_digits
 
 Bounds = tuple[float, float]
 # Largest |z|: beyond it lies a probability of 1e-9, as good as the bound of the prior.
@@ -101,9 +100,3 @@ def prior_range(case: Case, value: Value) -> Bounds:
         low, high = quantile(case.parameters[value], [0.025, 0.975])
         return float(low), float(high)
     return value, value
-
-
-def shown_bounds(bounds: Bounds) -> str:
-    """`low to high`, or one number where both are the same."""
-    low, high = bounds
-    return in_digits(low) if low == high else f"{in_digits(low)} to {in_digits(high)}"

@@ -9,7 +9,7 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import rung_json
 from vegglue.diagnosis.discovered import LawFound
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
-from vegglue.measurements.carried_discharge import CarriedDischarge
+from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.report.posterior_words import posterior_in_words
 from vegglue.report.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis

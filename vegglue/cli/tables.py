@@ -4,17 +4,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vegglue.case.parameter_space import shown_bounds
 from vegglue.cli.output import console, print_table
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
-from vegglue.measurements.carried_discharge import CarriedDischarge
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
+from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.report.homogeneity_words import REJECTED_BELOW
 from vegglue.results.diagnosis import Diagnosis, Suspect
 from vegglue.results.open_questions import Question
 from vegglue.results.rung import Rung
-from vegglue.wording.numbers import in_digits, so_many
+from vegglue.wording.numbers import in_digits, range_in_digits, so_many
 from vegglue.workflow.compare import Comparison
 
 # Said where parameters differ between experiments, as `infer` may say of the same that they do not.
@@ -98,8 +97,8 @@ def _carried_cells(one: CarriedDischarge) -> tuple[str, ...]:
         one.section,
         f"{one.x:g}",
         in_digits(one.value),
-        shown_bounds(one.interval95),
-        shown_bounds(one.stated) if one.stated else "-",
+        range_in_digits(one.interval95),
+        range_in_digits(one.stated) if one.stated else "-",
         _error(one.ratio, ".2f"),
         f"{one.share:.0%}",
         "measured" if one.gauged else "estimated",

@@ -13,9 +13,10 @@ from vegglue.case.schema import Case, Experiment
 from vegglue.case.zones import centres_within, inflow_cells
 from vegglue.diagnosis.directions import misdirected
 from vegglue.effects.physical_constants import GRAVITY
-from vegglue.measurements.carried_in_words import carried_in_words, carried_otherwise
 from vegglue.measurements.observations import Observations
+from vegglue.measurements.section_discharge import discharge_mismatches, mismatched_discharges
 from vegglue.wording.numbers import in_digits
+from vegglue.wording.sentences import sentence
 
 # Width of the grid over the radius of its centreline [-] from which its ends should be straight: chosen, not measured.
 LEAST_TURN = 0.02
@@ -98,5 +99,5 @@ def remarks_on_discharges(case: Case, site: Site, observations: Observations) ->
     """Sections whose velocities clearly carry another discharge than stated, in one sentence; none of an experiment
     whose velocities or levels run the wrong way, as that is why.
     """
-    off, told = carried_otherwise(case, site, observations.table), misdirected(case, observations)
-    yield from carried_in_words([one for one in off if one.experiment not in told])
+    off, told = mismatched_discharges(case, site, observations.table), misdirected(case, observations)
+    yield from map(sentence, discharge_mismatches([one for one in off if one.experiment not in told]))

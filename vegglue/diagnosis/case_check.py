@@ -41,7 +41,7 @@ from vegglue.diagnosis.turned_velocities import remarks_on_turned_velocities
 from vegglue.diagnosis.units_of_places import remarks_on_units_of_places
 from vegglue.diagnosis.verticals import remarks_on_exchanged_heights, remarks_on_heights, remarks_on_lost_points
 from vegglue.measurements.observations import Observations
-from vegglue.measurements.suspicious_values import with_absurd_levels
+from vegglue.measurements.plausibility import implausible_levels
 
 
 def doubts_about(case: Case, site: Site, observations: Observations) -> list[str]:
@@ -73,7 +73,7 @@ def doubts_about(case: Case, site: Site, observations: Observations) -> list[str
 def _with_possible_levels(case: Case, site: Site, observations: Observations) -> Observations:
     """Without levels that are told as absurd: that water rises from such a gauge to the next follows from it."""
     table = observations.table
-    absurd = with_absurd_levels(case, site, table).to_numpy(bool)
+    absurd = implausible_levels(case, site, table).to_numpy(bool)
     return replace(observations, table=table.assign(used=table["used"].astype(bool) & ~absurd))
 
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from vegglue.calibration.candidates import Instrument
 from vegglue.calibration.fingerprints import EFFECT_AT_PLACE
-from vegglue.case.parameter_space import shown_bounds
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Findings, Undecided
 from vegglue.diagnosis.rivals import HARDLY
@@ -20,7 +19,7 @@ from vegglue.results.diagnosis import (
     Step,
     Suspect,
 )
-from vegglue.wording.numbers import in_digits, listed
+from vegglue.wording.numbers import in_digits, listed, range_in_digits
 
 # Chance of what is named, below which it is stated: above, it would be told as 100 %.
 STATED_BELOW = 0.995
@@ -46,7 +45,7 @@ def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
 def _place_words(place: Location) -> str:
     low, high = place.interval95
     at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
-    range95 = shown_bounds((low, high))
+    range95 = range_in_digits((low, high))
     size = f"{in_digits(place.amplitude)} {place.unit}"
     told = f"{range95} {place.unit}" if place.term in TOLD_BY_SIZE else f"{size}, {range95}"
     what = _what_acts(place.term, place.amplitude)
@@ -128,7 +127,7 @@ def _instrument_words(one: FaultyInstrument) -> str:
     }[one.kind]
     low, high = one.interval95
     rather = "" if np.isnan(one.factor) else f", rather by a factor of {one.factor:.3g} than by the same everywhere"
-    return f"{what} by {in_digits(one.offset)} {one.unit} ({shown_bounds((low, high))}){rather}; it was set aside"
+    return f"{what} by {in_digits(one.offset)} {one.unit} ({range_in_digits((low, high))}){rather}; it was set aside"
 
 
 def _where(x: float, y: float) -> str:
@@ -143,7 +142,7 @@ def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
     best = by_name[step.accepted]
     low, high = best.amplitude.interval95
     unit = "" if best.amplitude.unit == "-" else f" {best.amplitude.unit}"
-    size, range95 = f"{in_digits(best.amplitude.value)}{unit}", shown_bounds((low, high))
+    size, range95 = f"{in_digits(best.amplitude.value)}{unit}", range_in_digits((low, high))
     words = f"{step.accepted} of {size} ({range95}; {best.title.lower()})"
     alike = next(group for group in step.groups if step.accepted in group)
     same = [name for name in alike if name != step.accepted]

@@ -7,7 +7,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.channel_geometry import expected_depth, patches_present
 from vegglue.case.gridded_site import Site, in_experiment
-from vegglue.case.parameter_space import Bounds, prior_range, shown_bounds, value_at
+from vegglue.case.parameter_space import Bounds, prior_range, value_at
 from vegglue.case.parts import Value
 from vegglue.case.plant_cover import share_in_patch
 from vegglue.case.polygons import area_of, corners_of
@@ -15,7 +15,7 @@ from vegglue.case.schema import Case, Experiment
 from vegglue.case.zones import BANK_SLOPE, slope
 from vegglue.diagnosis.boundaries import dry_outlets
 from vegglue.measurements.observations import Observations
-from vegglue.wording.numbers import experiments_in_words, in_digits
+from vegglue.wording.numbers import experiments_in_words, in_digits, range_in_digits
 
 # By `numerics.emergent`: what is taken for plants that stand out of the water.
 DRAG_OF_EMERGENT = {
@@ -168,7 +168,7 @@ def _emergent_in_words(case: Case, stand: str, height: Bounds, deepest: Mapping[
     depths = shallow if shallow == deep else f"{shallow} to {deep}"
     reaches = "reaches" if height[0] >= max(deepest.values()) else "may reach"
     return (
-        f"The canopy of {stand}, {shown_bounds(height)} m, {reaches} above the water of "
+        f"The canopy of {stand}, {range_in_digits(height)} m, {reaches} above the water of "
         f"{experiments_in_words(list(deepest))}, about {depths} m deep: "
         f"{DRAG_OF_EMERGENT[case.numerics.emergent]}."
     )
@@ -187,7 +187,7 @@ def _measured_canopy(observations: Observations, name: str, stand: str, height: 
         if experiment == name and max(height[0] - canopy.value, canopy.value - height[1]) > margin:
             yield (
                 f"The verticals of {section} in experiment {name} put the canopy at {canopy.value:.2f} m, "
-                f"the case puts {stand} at {shown_bounds(height)} m."
+                f"the case puts {stand} at {range_in_digits(height)} m."
             )
 
 

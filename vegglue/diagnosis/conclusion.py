@@ -30,8 +30,8 @@ from vegglue.diagnosis.unseen import UnseenErrors, unseen_errors
 from vegglue.diagnosis.verdict import judged
 from vegglue.engine.interface import Model
 from vegglue.inference.weighted_statistics import root_mean_square
-from vegglue.measurements.carried_in_words import carried_otherwise
 from vegglue.measurements.kinds import velocity_rows
+from vegglue.measurements.section_discharge import mismatched_discharges
 from vegglue.results.diagnosis import (
     Diagnosis,
     EstimatedErrors,
@@ -137,7 +137,7 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         stretch=stretch_in_words(model.case, model.station),
         on_map=places_on_map_in_words(model.case, places_told(found)),
         places_searched=any(one.x.size for one in last.fingerprints.places),
-        carried=tuple(carried_otherwise(model.case, model.site, model.station)),
+        carried=tuple(mismatched_discharges(model.case, model.site, model.station)),
         standing_out=beside,
         remainder=bool(beside) and not standing_out(last, found, found.slack),
     )

@@ -45,10 +45,11 @@ from vegglue.diagnosis.verdict import MOST_GROUPS
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
-from vegglue.measurements.suspicious_values import absurd_values
+from vegglue.measurements.plausibility import implausible_values
 from vegglue.parallel import begun, in_threads
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis, Step, Suspect
+from vegglue.wording.sentences import sentence
 
 # How often errors alone sound the first alarm; 5 % is usual. Later alarms are sounded five times less often.
 FALSE_ALARMS, STRICTER_LATER = 0.05, 0.2
@@ -75,7 +76,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
     watch(Progress(with_compilation("calibrating the model as it is")))
-    absurd = tuple(absurd_values(model.case, model.site, model.station))
+    absurd = tuple(map(sentence, implausible_values(model.case, model.site, model.station)))
     base = _calibrated_unless_absurd(model, absurd)
     watch(Progress("looking for what is missing"))
     first = screening = screen(base)

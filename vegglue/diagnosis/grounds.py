@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from dataclasses import field as by_default
 
 from vegglue.diagnosis.findings import Findings
-from vegglue.measurements.carried_discharge import CarriedDischarge
+from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import FaultyInstrument, LawsSuspected
 from vegglue.results.diagnosis import EstimatedErrors, FieldFound, Misfit, ModelErrorUsed, VerdictKind

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from vegglue.calibration.fingerprints import LEAST_DEPTH
 from vegglue.diagnosis.causes_in_words import TO_DISCOVER, instruments_in_words, law_in_words, model_error_in_words
 from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, Statement, is_clear
-from vegglue.measurements.carried_in_words import carried_in_words
+from vegglue.measurements.section_discharge import discharge_mismatches
 from vegglue.results.causes import FaultyInstrument
 from vegglue.results.diagnosis import Step, Suspect
 from vegglue.results.small_misfit import small_misfit_in_words
 from vegglue.results.suspect import counted_in_words
+from vegglue.wording.sentences import sentence
 
 # Amplitude over a plausible one, above which it is said to be too large to be believed.
 IMPLAUSIBLE = 3.0
@@ -26,7 +27,8 @@ TOO_SHALLOW = (
 def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement) -> list[str]:
     """All of them, those on what is carried and on what is named first; statement: beside which they stand."""
     found, misfit = grounds.findings, grounds.misfit
-    remarks = [*carried_in_words(grounds.carried), *filter(None, [small_misfit_in_words(misfit.chi2, misfit.freedom)])]
+    remarks = [*map(sentence, discharge_mismatches(grounds.carried))]
+    remarks += filter(None, [small_misfit_in_words(misfit.chi2, misfit.freedom)])
     remarks += _implausible(found.steps, suspects)
     remarks += _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
     remarks += _besides(grounds, suspects, statement)

@@ -15,7 +15,8 @@ from vegglue.diagnosis.directions import exchanged_components
 from vegglue.diagnosis.units_of_places import fitting_unit
 from vegglue.measurements.kinds import kind_of, velocity_rows
 from vegglue.measurements.observations import OUTSIDE, Observations
-from vegglue.measurements.suspicious_values import absurd_values
+from vegglue.measurements.plausibility import implausible_values
+from vegglue.wording.sentences import sentence
 
 # Nearer to a patch edge than this share of a cell [-], a station is on it.
 ON_THE_EDGE = 0.02
@@ -125,7 +126,7 @@ def remarks_on_absurd_values(case: Case, site: Site, observations: Observations)
     """
     table, exchanged = observations.table, exchanged_components(case, observations)
     told = velocity_rows(table) & table["experiment"].isin(exchanged).to_numpy(bool)
-    yield from absurd_values(case, site, table.assign(used=table["used"].astype(bool) & ~told))
+    yield from map(sentence, implausible_values(case, site, table.assign(used=table["used"].astype(bool) & ~told)))
 
 
 def station_in_words(row: Mapping[Hashable, Any]) -> str:

@@ -25,11 +25,11 @@ from vegglue.diagnosis.grounds import POOR, Grounds, Statement, is_clear
 from vegglue.diagnosis.remarks import remarks_of
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
 from vegglue.effects.identity import EffectIdentity
-from vegglue.measurements.carried_discharge import CHANGE_DISCHARGE, CarriedDischarge
-from vegglue.measurements.carried_in_words import CHECK, carried_in_short
+from vegglue.measurements.section_discharge import CHANGE_DISCHARGE, CarriedDischarge, discharge_mismatches
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Misfit, Suspect, Verdict, VerdictKind
 from vegglue.results.suspect import counted_in_words
+from vegglue.wording.sentences import phrase
 
 # A set of more groups than this says nothing.
 MOST_GROUPS = 3
@@ -81,7 +81,11 @@ def judged(grounds: Grounds, suspects: Sequence[Suspect]) -> Verdict:
 def _explained(grounds: Grounds, statement: Statement) -> str:
     """That what was named may be why sections carry another discharge than stated; '' where none does."""
     untold = grounds.carried and not statement.sentence.startswith(BEFORE_ALL_ELSE)
-    return f"What was found may be why {carried_in_short(grounds.carried)}." if untold else ""
+    return f"What was found may be why {_in_short(grounds.carried)}." if untold else ""
+
+
+def _in_short(off: Sequence[CarriedDischarge]) -> str:
+    return phrase("mismatches_in_short", discharge_mismatches(off))
 
 
 def _unexplained(grounds: Grounds, suspects: Sequence[Suspect]) -> list[CarriedDischarge]:
@@ -118,8 +122,9 @@ def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
         return Statement("cannot-tell", BEFORE_ALL_ELSE + found.absurd[0])
     named = causes_in_words(found, suspects)
     if off := _unexplained(grounds, suspects):
+        check = phrase("check_discharge")
         made_up = f" What may make up for it: {named}." if named else ""
-        return Statement("cannot-tell", f"{BEFORE_ALL_ELSE}{carried_in_short(off)}: {CHECK}.{made_up}")
+        return Statement("cannot-tell", f"{BEFORE_ALL_ELSE}{_in_short(off)}: {check}.{made_up}")
     doubt = _doubt(grounds, suspects)
     nothing = not (found.places or found.steps or found.undecided or grounds.field)
     if grounds.laws is not None and (nothing or (not doubt and law_goes_first(grounds.laws, found))):

@@ -10,7 +10,7 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import Role
 from vegglue.importers.loose_table import LooseTable
-from vegglue.measurements.missing_marks import (
+from vegglue.measurements.plausibility import (
     LARGEST_COORDINATE,
     MARKS_OF_ANY_COLUMN,
     MARKS_OR_VALUES,

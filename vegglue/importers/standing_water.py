@@ -4,7 +4,7 @@ from pathlib import Path
 
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.field_site import Channel, FieldSite, MeasuredFlow
-from vegglue.measurements.suspicious_values import DEEPEST_CHANNEL, STANDING_WATER
+from vegglue.measurements.plausibility import DEEPEST_CHANNEL, STANDING_WATER
 
 
 def refuse_standing_water(path: Path, site: FieldSite) -> None:

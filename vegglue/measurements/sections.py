@@ -1,7 +1,5 @@
 """Sections: stations that were measured together across the channel, though a boat does not keep its line."""
 
-import re
-
 import pandas as pd
 
 
@@ -21,9 +19,3 @@ def section_place(station: pd.DataFrame, experiment: str, section: str) -> float
     """The x of a section of one experiment [m]: the median of its stations; NaN without any."""
     own = (station["experiment"] == experiment) & (station["section"].astype(str) == section)
     return float(station.loc[own, "x"].median())
-
-
-def section_in_words(name: str, x: float) -> str:
-    """`D3, x = 42 m`; `x = 42 m` alone of a section that was only named after its place. x [m], to centimetres."""
-    place = f"x = {round(x, 2):g} m"
-    return place if re.fullmatch(r"x[-+]?\d+\.\d\d", name) else f"{name}, {place}"

@@ -4,8 +4,8 @@ import html
 from collections.abc import Iterator
 
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
-from vegglue.measurements.carried_in_words import carried_in_short, carried_otherwise
 from vegglue.measurements.kinds import KINDS
+from vegglue.measurements.section_discharge import discharge_mismatches, mismatched_discharges
 from vegglue.report.cause_words import (
     accepted_causes,
     field_in_words,
@@ -26,6 +26,7 @@ from vegglue.results.posterior import Posterior
 from vegglue.results.small_misfit import small_misfit_in_short
 from vegglue.results.suspect import AmplitudeEstimate
 from vegglue.wording.numbers import listed, so_many, without_asides
+from vegglue.wording.sentences import phrase
 
 # Rivals that the headline names, the likeliest: more are in the table.
 RIVALS_NAMED = 2
@@ -187,8 +188,8 @@ def _of_verdict(found: Diagnosis | None) -> Iterator[str]:
 
 
 def _of_discharges(run: Run) -> Iterator[str]:
-    if off := carried_otherwise(run.case, run.site, run.observations.table):
-        yield html.escape(carried_in_short(off))
+    if off := mismatched_discharges(run.case, run.site, run.observations.table):
+        yield html.escape(phrase("mismatches_in_short", discharge_mismatches(off)))
 
 
 def _of_posterior(posterior: Posterior) -> Iterator[str]:

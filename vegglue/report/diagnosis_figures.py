@@ -18,7 +18,6 @@ from vegglue.arrays import Array
 from vegglue.calibration.score_test import ALIKE, alike_groups
 from vegglue.case.schema import Case
 from vegglue.measurements.kinds import KINDS, WATER_LEVEL, Kind
-from vegglue.measurements.sections import section_in_words
 from vegglue.report.cause_words import accepted_causes
 from vegglue.report.diagnosis_words import (
     ranked_suspects,
@@ -32,7 +31,7 @@ from vegglue.report.run import Run, published_picture
 from vegglue.report.style import COLOUR, HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, save, styled
 from vegglue.report.typography import fixed, short, unit_math
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.wording.numbers import listed, so_many
+from vegglue.wording.numbers import listed, section_in_words, so_many
 
 # How each status is drawn: marker, face, edge. Form and fill tell them apart without colour.
 MARKS: dict[str, tuple[str, str, str]] = {

@@ -14,10 +14,10 @@ from vegglue.case.channel_geometry import discharges_upstream_of
 from vegglue.case.schema import Case
 from vegglue.flow.status import FAILED, STATUS_WORDS, members_with
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
-from vegglue.measurements.carried_discharge import changing_discharge
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
+from vegglue.measurements.section_discharge import changing_discharge
 from vegglue.measurements.sections import section_place
 from vegglue.report.homogeneity_words import homogeneity_in_words, homogeneity_rejected
 from vegglue.report.key_numbers import (

@@ -13,7 +13,6 @@ from vegglue.arrays import Array
 from vegglue.case.gridded_site import in_experiment
 from vegglue.case.text_files import unused
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
-from vegglue.measurements.sections import section_in_words
 from vegglue.normal_range import NORMAL95
 from vegglue.report.cause_words import accepted_causes
 from vegglue.report.run import Run, file_name, planted_cells, published_svg, stamp
@@ -31,7 +30,7 @@ from vegglue.report.svg import (
     within_width,
 )
 from vegglue.report.typography import as_given, short
-from vegglue.wording.numbers import so_many
+from vegglue.wording.numbers import section_in_words, so_many
 
 # A panel [px]: four of them stand side by side on a screen of 1,200; letters of the size of the captions.
 PANEL_WIDTH, PANEL_HEIGHT, PANEL_LETTERS, NOTE_LETTERS = 240.0, 222.0, 11.5, 9.0

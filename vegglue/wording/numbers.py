@@ -51,6 +51,18 @@ def in_digits(value: float, digits: int = 3) -> str:
     return f"{float(text):.0f}" if "e+" in text and abs(float(text)) <= LARGEST_IN_FULL else text
 
 
+def range_in_digits(bounds: Sequence[float], digits: int = 3) -> str:
+    """`low to high`, or one number if both read the same."""
+    low, high = (in_digits(one, digits) for one in bounds)
+    return low if low == high else f"{low} to {high}"
+
+
+def section_in_words(name: str, x: float) -> str:
+    """`D3, x = 42 m`; `x = 42 m` alone of a section that was only named after its place. x [m], to centimetres."""
+    place = f"x = {round(x, 2):g} m"
+    return place if re.fullmatch(r"x[-+]?\d+\.\d\d", name) else f"{name}, {place}"
+
+
 def interval_in_short(name: str, value: float, low: float, high: float, unit: str = "") -> str:
     """`phi: 8.1, 95 % 7.2 to 9.3`, with the unit behind unless it is none."""
     digits = telling_digits(low, high)

@@ -7,7 +7,16 @@ from enum import Enum
 from functools import cache
 from typing import Any
 
-from vegglue.wording.numbers import duration_in_short, in_digits, listed, so_many, telling_digits
+from vegglue.wording.numbers import (
+    duration_in_short,
+    experiments_in_words,
+    in_digits,
+    listed,
+    range_in_digits,
+    section_in_words,
+    so_many,
+    telling_digits,
+)  # fmt: skip
 
 
 def sentence(value: Any) -> str:
@@ -30,7 +39,12 @@ def sentence(value: Any) -> str:
     """
     if isinstance(value, str):
         return value
-    return " ".join(str(macros()[tag_of(value)](value)).split())
+    return phrase(tag_of(value), value)
+
+
+def phrase(macro: str, *values: Any) -> str:
+    """A part of a sentence: the macro of that name, rendered on one line."""
+    return " ".join(str(macros()[macro](*values)).split())
 
 
 def sentences(values: Any) -> tuple[str, ...]:
@@ -78,9 +92,11 @@ def macros() -> dict[str, Callable[..., str]]:
         "listed": listed,
         "many": so_many,
         "duration": duration_in_short,
+        "experiments": experiments_in_words,
+        "range": range_in_digits,
         "percent": lambda share: f"{share:.0%}",
     }
-    environment.globals |= {"sentence": sentence, "digits_of_range": telling_digits}
+    environment.globals |= {"sentence": sentence, "digits_of_range": telling_digits, "section_at": section_in_words}
     found: dict[str, Callable[..., str]] = {}
     for name in environment.list_templates():
         for macro, render in vars(environment.get_template(name).module).items():

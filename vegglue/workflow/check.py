@@ -14,8 +14,8 @@ from vegglue.effects.library import effects_of
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
-from vegglue.measurements.carried_discharge import CarriedDischarge, carried_discharges
 from vegglue.measurements.observations import read_observations
+from vegglue.measurements.section_discharge import CarriedDischarge, carried_discharges
 from vegglue.parallel import one_thread
 from vegglue.workflow.command_model import command_tried
 from vegglue.workflow.run_folder import folder_of, model_in, validation_of
