@@ -11,9 +11,10 @@ from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 from verdicts import grounds, step
 
 from vegglue.calibration.candidates import with_effect
-from vegglue.calibration.noise import GRID_ERROR_SHARE, with_correlation, with_grid_error
+from vegglue.calibration.noise import with_correlation, with_grid_error
 from vegglue.calibration.residual_screening import Screening
 from vegglue.case.parameter_space import theta_at
+from vegglue.decision_constants import constants
 from vegglue.diagnosis import conclusion
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.conclusion import estimated_errors, misfit_of, standing_out
@@ -26,7 +27,7 @@ def test_the_error_of_the_grid_is_that_of_velocities(kinds: tuple[str, str], tol
     station = stations_of(CASE_OF_TWINS, ("A",), 4)
     station = station.assign(kind=np.resize(kinds, len(station)))
     base = at_best(CASE_OF_TWINS, station, np.zeros(len(station)), np.zeros((len(station), 2)))
-    difference = np.where(station["kind"] == "velocity", 0.001, 0.02) / GRID_ERROR_SHARE
+    difference = np.where(station["kind"] == "velocity", 0.001, 0.02) / constants().grid_error_share
     screening: Any = SimpleNamespace(base=replace(base, noise=with_grid_error(base.noise, difference)))
     assert estimated_errors(screening, Findings()).grid_error == pytest.approx(told, nan_ok=True)
 

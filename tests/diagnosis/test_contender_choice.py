@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.contender_choice import (
-    KNOWN_FIRST_ODDS,
     MOST_FOLLOWED,
     What,
     chance_of_a_place,
@@ -34,8 +34,8 @@ def test_no_more_are_followed_than_are_worth_it() -> None:
     ("what", "odds", "expected"),
     [
         (("effect", "place"), (1.0, 1.1), 0),  # what is known is the likeliest
-        (("place", "effect"), (1.0, 1.1 * KNOWN_FIRST_ODDS), 0),  # what is vague leads by enough
-        (("place", "effect"), (1.0, 0.9 * KNOWN_FIRST_ODDS), 1),  # and by too little
+        (("place", "effect"), (1.0, 1.1 * constants().known_first_odds), 0),  # what is vague leads by enough
+        (("place", "effect"), (1.0, 0.9 * constants().known_first_odds), 1),  # and by too little
         (("place", "effect", "effect"), (1.0, 8.0, 8.0), None),  # by enough of each, and not of both
         (("place", "instrument"), (1.0, 3.0), None),
         (("place", "place"), (1.0, 1.1), 0),  # both say the same: none of what is known

@@ -11,10 +11,11 @@ import pytest
 from diagnoses import a_location, laws_suspected_of
 
 from vegglue.case.config import load_case
+from vegglue.decision_constants import constants
 from vegglue.diagnosis import unlisted_laws
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.findings import Charge, Findings
-from vegglue.diagnosis.unlisted_laws import LAW_ALARMS, clearly_a_law, laws_beside, laws_suspected
+from vegglue.diagnosis.unlisted_laws import clearly_a_law, laws_beside, laws_suspected
 from vegglue.effects.grammar import LAWS
 from vegglue.results.causes import LawsSuspected
 from vegglue.results.diagnosis import Step
@@ -68,7 +69,7 @@ def test_laws_compete_with_what_is_listed(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_their_alarm_keeps_its_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert suspected(monkeypatch, Findings(), p=LAW_ALARMS) is None
+    assert suspected(monkeypatch, Findings(), p=constants().law_alarm_rate) is None
     assert suspected(monkeypatch, Findings(absurd=("levels lie below the bed.",))) is None
 
 

@@ -22,9 +22,8 @@ from vegglue.calibration.law_screening import law_fingerprints, screen_laws, scr
 from vegglue.calibration.noise import noise_of
 from vegglue.calibration.residual_screening import screen
 from vegglue.calibration.score_test import alarm_p
-from vegglue.diagnosis.diagnose import FALSE_ALARMS
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.product import PRODUCT_ALARMS
-from vegglue.diagnosis.unlisted_laws import LAW_ALARMS
 from vegglue.engine.interface import Point, linearise
 from vegglue.parallel import at_most
 
@@ -45,11 +44,18 @@ class AlarmsDrawn:
     @property
     def rates(self) -> list[tuple[str, int]]:
         """What was counted in words, and how often."""
-        silent = self.listed >= FALSE_ALARMS
+        silent = self.listed >= constants().false_alarm_rate
+        rate = constants().law_alarm_rate
         return [
-            (f"alarm of everything listed, at {FALSE_ALARMS:.0%}", int(np.sum(~silent))),
-            (f"alarm of laws, at {LAW_ALARMS:.0%}", int(np.sum(self.laws < LAW_ALARMS))),
-            ("alarm of laws where nothing listed sounds one", int(np.sum(silent & (self.laws < LAW_ALARMS)))),
+            (f"alarm of everything listed, at {constants().false_alarm_rate:.0%}", int(np.sum(~silent))),
+            (
+                f"alarm of laws, at {constants().law_alarm_rate:.0%}",
+                int(np.sum(self.laws < constants().law_alarm_rate)),
+            ),
+            (
+                "alarm of laws where nothing listed sounds one",
+                int(np.sum(silent & (self.laws < rate))),
+            ),
         ]
 
 

@@ -26,9 +26,10 @@ from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.calibration.candidates import Candidate, cause_of
-from vegglue.calibration.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
+from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.calibration.residual_screening import GROUPS
 from vegglue.calibration.score_test import log_factors
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.chances import chances_in_set
 from vegglue.diagnosis.search import HELD, MOST_QUANTITIES
 from vegglue.engine.interface import responses
@@ -88,7 +89,7 @@ def true_rival(base: Baseline, screening: LawScreening, law: HiddenLaw) -> Rival
     residual = np.zeros(noise.rows.size)
     trace = noise.whiten(noise.used(values))
     seen = score_test.project(listed.whitened_slopes, residual, base.fitted.point.z, trace)
-    prior = np.full(1, -np.log(GROUPS * LISTED_ODDS * len(screening.subjects)))
+    prior = np.full(1, -np.log(GROUPS * constants().listed_over_laws * len(screening.subjects)))
     return Rival(
         (law.term, law.quantity), seen.units, effect.amplitude.scale * seen.length, prior, np.zeros(1, bool), True
     )

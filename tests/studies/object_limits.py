@@ -31,9 +31,8 @@ from vegglue.calibration.noise import Noise, noise_of
 from vegglue.calibration.residual_screening import kind_of_listed, kinds_of_instruments, kinds_of_places
 from vegglue.calibration.score_test import HypothesisKind
 from vegglue.case.channel_geometry import half_width
-from vegglue.diagnosis.competition import LEAST_ODDS
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.contender_choice import What, chosen_contender
-from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.tempered_chances import tempered_chances
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most
@@ -48,7 +47,7 @@ GROUPS = ("unlisted", "listed6", "listed3")
 class Observer:
     """Who knows the site, its errors, and all that may be missing. noise: those errors; slopes (n, p): of predictions,
     whitened; kinds: of hypotheses, see `Screening`; alarm: ln of the sum of evidence that errors alone exceed in
-    FALSE_ALARMS of draws [-].
+    false_alarm_rate of draws [-].
     """
 
     noise: Noise
@@ -93,7 +92,9 @@ def observer_at(study: str, place: int) -> Observer:
     )
     unalarmed = Observer(noise, slopes, fingerprints, kinds, 0.0)
     alone = np.random.default_rng(1).standard_normal((unalarmed.rows, NULL_DRAWS))
-    return replace(unalarmed, alarm=float(np.quantile(_total(_evidence(unalarmed, alone)), 1.0 - FALSE_ALARMS)))
+    return replace(
+        unalarmed, alarm=float(np.quantile(_total(_evidence(unalarmed, alone)), 1.0 - constants().false_alarm_rate))
+    )
 
 
 def projected_on(noise: Noise, slopes: Array, values: Array) -> score_test.Projected:
@@ -163,7 +164,7 @@ def _is_told(effects: Array, terms: Array, instruments: Array) -> bool:
     evidence = np.concatenate([effects, terms, instruments])
     chances = tempered_chances(evidence)
     best = int(np.argmax(evidence))
-    alone = np.sum(chances * LEAST_ODDS >= chances[best]) == 1
+    alone = np.sum(chances * constants().strong_odds >= chances[best]) == 1
     at_a_place = float(chances[effects.size : effects.size + terms.size].sum())
     taken = best if alone else chosen_contender(what, evidence, at_a_place)
     return taken is not None and what[taken] == "place"

@@ -21,6 +21,7 @@ from vegglue.case.case_effects import effect_of
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case, EffectEntry, Parameter
+from vegglue.decision_constants import constants
 from vegglue.effects.definition import Amplitude, Effect
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
@@ -219,9 +220,6 @@ def start_amplitude(amplitude: Amplitude, gain: float) -> float:
 
 
 InstrumentKind = Literal["reading", "position", "probe", "gauge"]
-# Plausible offsets over the median standard error of the readings [-]: of a reading that went wrong, and of an
-# instrument that is off wherever it reads. Chosen, not measured.
-PLAUSIBLE_OFFSET = {"reading": 10.0, "position": 5.0, "probe": 5.0, "gauge": 10.0}
 
 
 @dataclass(frozen=True)
@@ -232,6 +230,13 @@ class Instrument:
     readings: tuple[int, ...]
     x: float
     y: float
+
+
+def plausible_offset(kind: InstrumentKind) -> float:
+    """Over the median standard error of its readings [-]: a reading that went wrong, or an instrument that is off."""
+    of = constants()
+    of_probe = {"position": of.probe_offset, "probe": of.probe_offset}
+    return {"reading": of.reading_offset, "gauge": of.gauge_offset, **of_probe}[kind]
 
 
 def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument, ...]]:

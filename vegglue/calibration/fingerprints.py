@@ -30,6 +30,7 @@ from vegglue.case.grid import Grid, cell_stretch
 from vegglue.case.gridded_site import in_experiment
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case
+from vegglue.decision_constants import constants
 from vegglue.effects.definition import Amplitude
 from vegglue.engine.interface import Cause, Model, Point, flow_at_centres, responses
 from vegglue.errors import InputError
@@ -51,9 +52,6 @@ SPOT_LENGTHS: Mapping[Term, tuple[float, ...]] = {
 SPOT_CELLS = 1.0
 # Spots around a place on either side of it: chosen, not measured.
 STEPS_AROUND = 4
-# Plausible sizes: of drag [1/m] ten times the friction of a bed of n = 0.04 under 1 m of water; of a bed over the mean
-# depth [-]; of the discharge that enters over that of the inflows [-]; of viscosity [m2/s]. Chosen, not measured.
-SPOT_DRAG, SPOT_RISE, SPOT_SHARE, SPOT_VISCOSITY = 1.0, 0.3, 0.05, 0.03
 # Share of a spot that has to lie under water, of water that enters in all experiments, else in one of them [-].
 LEAST_SHARE = 0.5
 # Depth [m] above which a cell counts as under water.
@@ -124,12 +122,13 @@ def _places_over(model: Model, point: Point, rasters: Mapping[Term, Sequence[Bum
 def plausible_size(case: Case, term: Term, depth: float) -> float:
     """Of the effect that stands for a term at a place, in its unit, in water of a mean depth [m]."""
     if term != "inflow":
-        return {"drag": SPOT_DRAG, "bed": SPOT_RISE * depth, "viscosity": SPOT_VISCOSITY}[term]
+        of = constants()
+        return {"drag": of.spot_drag, "bed": of.spot_rise * depth, "viscosity": of.spot_viscosity}[term]
     totals = [
         sum(middle_value(case, value) for value in experiment.discharge.values())
         for experiment in case.experiments.values()
     ]
-    return SPOT_SHARE * float(np.mean(totals))
+    return constants().spot_inflow * float(np.mean(totals))
 
 
 def _places_of_term(

@@ -27,10 +27,8 @@ from vegglue.calibration.laws_in_case import LawInCase, law_traces, laws_in_case
 from vegglue.calibration.residual_screening import GROUPS, Screening, kind_of_listed, screen
 from vegglue.calibration.score_test import HypothesisKind, alarm_p, family_of, kind_of_hypotheses
 from vegglue.case.channel_geometry import half_width
+from vegglue.decision_constants import constants
 
-# All listed effects together are so many times as likely before the data as all laws together: strong evidence, as
-# between kinds elsewhere, is asked of a law before it is preferred to an effect that others have seen in nature.
-LISTED_ODDS = 10.0
 # Largest strength to first order, over the plausible one [-]: beyond, a flow may not be found.
 LARGEST_GAIN = 3.0
 LAW_SEED = 1  # of the draws of errors alone, as in `screen`
@@ -179,9 +177,10 @@ def kind_of_laws(
     part: where the fingerprints of these laws stand in `full`; columns: of each law, in that part.
     """
     plausible = np.array([one.plausible_gain for one in full.fingerprints.amplitudes[part]])
+    less = GROUPS * constants().listed_over_laws
     prior, forms = np.empty(plausible.size), Counter(one.law.subject for one in laws)
     for one, of_law in zip(laws, columns, strict=True):
-        prior[of_law] = 1.0 / (GROUPS * LISTED_ODDS * len(forms) * forms[one.law.subject] * of_law.size)
+        prior[of_law] = 1.0 / (less * len(forms) * forms[one.law.subject] * of_law.size)
     return kind_of_hypotheses("law", _part(full.projected, part), plausible, prior)
 
 
@@ -222,7 +221,9 @@ class ProductScreening:
             for one, some in zip(found.candidates, found.columns, strict=True)
             if some.max(initial=0) < cosine.size
         }
-        return tuple(name for name in sorted(near, key=lambda name: -near[name]) if near[name] > score_test.ALIKE)
+        return tuple(
+            name for name in sorted(near, key=lambda name: -near[name]) if near[name] > constants().alike_cosine
+        )
 
 
 def screen_products(
@@ -262,5 +263,5 @@ def _columns(laws: Sequence[LawInCase]) -> list[np.ndarray]:
 def _all_else(listed: Screening, laws: HypothesisKind) -> float:
     """ln evidence of all that is no product; something at a place is as vague as a law."""
     places = {one.term for one in listed.fingerprints.places}
-    totals = [kind.total - np.log(LISTED_ODDS) * (kind.name in places) for kind in listed.kinds]
+    totals = [kind.total - np.log(constants().listed_over_laws) * (kind.name in places) for kind in listed.kinds]
     return float(np.logaddexp.reduce([*totals, laws.total]))

@@ -18,11 +18,11 @@ S: see site_error.py.
 T_k and B_k are how predictions answer to friction made larger by its own part, and to a bed 1 m higher, in a bump
 exp(-d^2 / l^2) around place k; bumps stand a radius apart, so that their sum is a smooth random field of standard
 deviation s_f [-] or s_b [m]. Something unlisted at a place, once it is in the model, is a spot there and something else
-in nature: of all that it does, its force, water or volume A, SHAPE_ERROR may act in the n bumps around it instead,
+in nature: of all that it does, its force, water or volume A, shape_error may act in the n bumps around it instead,
 
-    S_k = SHAPE_ERROR A / (A_k sqrt(n)) bump_k,   A_k = sum of bump_k over the cells, times their area,
+    S_k = shape_error A / (A_k sqrt(n)) bump_k,   A_k = sum of bump_k over the cells, times their area,
 
-so that in all of them together it has a standard deviation of SHAPE_ERROR A. What of that would look like another size
+so that in all of them together it has a standard deviation of shape_error A. What of that would look like another size
 of the spot is left out, since the size is calibrated: water that enters at a place was all error of shape before.
 Source: a model has its own error in weak-constraint data assimilation (Tremolet 2006, doi:10.1256/qj.05.224; not
 checked against it); the fields of bumps are a definition of this project.
@@ -42,6 +42,7 @@ from vegglue.case.grid import Grid
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.parts import Value
 from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
+from vegglue.decision_constants import constants
 from vegglue.engine.interface import Cause, Model, Point, responses, responses_to_cells
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
@@ -180,10 +181,8 @@ TERM_OF: dict[str, Term] = {
 # Radius of a bump over the half width of the floor [-]: friction differs from one stone, tuft or stem count to the
 # next, a survey from one line of points to the next. Chosen, not measured.
 FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
-# What a spot leaves of an object of another shape, over all that the spot does [-], and how far around it, over its
-# size. Chosen, not measured, after open-f: beside the spot two more places were accepted there without this error, and
-# none with it.
-SHAPE_ERROR, AROUND = 0.5, 2.0
+# How far around a spot what it leaves of an object of another shape may act, over its size [-]. Chosen.
+AROUND = 2.0
 # Least radius of a bump in cells: below, bumps look unlike, as their middles lie in cells or between them.
 BUMP_CELLS = 1.5
 # Below it a bump counts as zero [-]: responses hold seven digits. Smaller ones are not told from zero in single
@@ -294,7 +293,7 @@ def _columns_of_shape(model: Model, point: Point, responses: CellResponses, one:
     near = _are_around(over, place)
     size = float(value_of(one.amplitude, theta, 1)[0])
     whole = size if one.term == "inflow" else size * float(_areas(grid, spot)[0, 0])
-    in_each = SHAPE_ERROR * whole / np.sqrt(max(int(near.sum()), 1))
+    in_each = constants().shape_error * whole / np.sqrt(max(int(near.sum()), 1))
     own = responses_to_bumps(responses, one.term, spot)[:, 0, 0]
     acts = np.ones(len(own)) if one.experiments is None else model.station["experiment"].isin(one.experiments)
     columns = _without(own, responses_to_bumps(responses, one.term, over)[:, near], _weights_of(model) * acts)

@@ -22,19 +22,12 @@ import scipy.linalg
 import scipy.special
 
 from vegglue.arrays import Array
+from vegglue.decision_constants import constants
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import kind_of, unstated_errors
 from vegglue.measurements.sections import section_places
 from vegglue.parallel import in_threads
 
-# Error of the grid over the difference of predictions to a grid of twice the cell size [-]: 1/(2^p - 1) for an order p
-# between one (at edges and at the waterline) and two. From 0.3 to 1 the sets for open-a to open-f are the same and
-# amplitudes move by 1.5 %; with 0 something is found where nothing is hidden.
-GRID_ERROR_SHARE = 0.6
-# Correlation c of that error between two stations [-]. It is above 0 because a grid that is too fast is so everywhere:
-# the misfit then looks like the difference to another grid, and is no evidence of a missing effect. It is below 1
-# because the difference is not known exactly. Chosen, not measured: a higher one hides effects of that pattern.
-GRID_ERROR_CORRELATION = 0.5
 # What an instrument that is off adds, over the largest standard error of its readings [-]: so large that it is free,
 # and the covariance can still be factored.
 UNKNOWN_ERROR = 1e3
@@ -108,7 +101,7 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
             error=error,
             separation=_separation(used),
             grid_error=zero,
-            grid_correlation=GRID_ERROR_CORRELATION,
+            grid_correlation=constants().grid_error_correlation,
             correlation=0.0,
             scale=1.0,
             lower=np.diag(error),
@@ -120,8 +113,8 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
 
 
 def with_grid_error(noise: Noise, difference: Array) -> Noise:
-    """The noise with g = GRID_ERROR_SHARE difference (station,), that of predictions to cells of twice the size."""
-    return _with_cholesky(replace(noise, grid_error=GRID_ERROR_SHARE * difference[noise.rows]))
+    """The noise with g = grid_error_share difference (station,), that of predictions to cells of twice the size."""
+    return _with_cholesky(replace(noise, grid_error=constants().grid_error_share * difference[noise.rows]))
 
 
 def with_independent_grid_errors(noise: Noise) -> Noise:
@@ -209,9 +202,6 @@ def _separation(used: pd.DataFrame) -> Array:
     return separation
 
 
-# Rise of twice the log-likelihood with a free scale s, above which stated errors count as too small [-]: the 99 % point
-# of chi2 with one degree of freedom.
-SCALE_EVIDENCE = 6.6
 # Correlations rho and sizes t [-] of a coarse grid, from the best pair of which the maximum likelihood is searched.
 # Chosen, not measured: more pairs cost time and guard against a local maximum.
 START_CORRELATIONS, START_SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
@@ -240,7 +230,7 @@ def estimate_noise(noise: Noise, residual: Array, gram: Array) -> Noise:
     correlations = [[0.0], START_CORRELATIONS] if neighbours else [[0.0]]
     fits = in_threads(partial(_likeliest, deviance), itertools.product(correlations, [False, True]))
     (stated_without, free_without), (stated, free) = fits[:2], fits[-2:]
-    rejected = stated.deviance - free.deviance > SCALE_EVIDENCE and free.scale > 1.0
+    rejected = stated.deviance - free.deviance > constants().scale_evidence and free.scale > 1.0
     scale = free.scale if rejected else 1.0
     if not neighbours:
         return with_correlation(noise, 0.0, scale)

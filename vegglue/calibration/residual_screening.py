@@ -20,11 +20,11 @@ from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model, searched_by_itself
 from vegglue.calibration.candidates import (
-    PLAUSIBLE_OFFSET,
     Instrument,
     InstrumentKind,
     instruments_of,
     offset_columns,
+    plausible_offset,
     start_amplitude,
     with_effect,
 )
@@ -42,6 +42,7 @@ from vegglue.calibration.score_test import (
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.channel_geometry import half_width
 from vegglue.case.parameter_space import z_of
+from vegglue.decision_constants import constants
 from vegglue.engine.interface import Point, linearise, responses
 from vegglue.flow.local_changes import Term
 from vegglue.parallel import in_threads
@@ -53,9 +54,6 @@ FREE_SIZE = 1e4
 # Longest that it is made, before what calibration can mimic is taken off [standard errors]: at the largest of the sizes
 # that are tried, ten, its square is 1e15, the last that is factored beside errors of 1.
 LONGEST_FREE = 3e6
-# Sizes of spots over plausible ones when the noise is estimated [-]. Hundreds of spots overlap, one of them is there:
-# at their full sizes they explain, together, whatever neighbours share. Chosen, not measured.
-SPOTS_IN_NOISE = 0.3
 # Groups of kinds that are as likely before the data [-]: listed effects, places, instruments, fields (`field_scan`).
 GROUPS = 4
 
@@ -187,7 +185,7 @@ def kinds_of_instruments(
     """A kind each for single readings, probes and gauges, without those that are known to be off."""
     kinds = []
     for name, of_kind in projected.items():
-        plausible = PLAUSIBLE_OFFSET[name] * np.array(
+        plausible = plausible_offset(name) * np.array(
             [np.median(noise.error[list(i.readings)]) for i in instruments[name]]
         )
         known = np.array([set(i.readings) <= set(flagged) for i in instruments[name]])
@@ -200,14 +198,15 @@ def _plausible(
     noise: Noise, fingerprints: Fingerprints, instruments: Mapping[InstrumentKind, tuple[Instrument, ...]]
 ) -> Array:
     """Changes of predictions at used stations by all that could be missing or off, each of plausible size (n, c);
-    spots of SPOTS_IN_NOISE of theirs.
+    spots of spots_in_noise of theirs.
     """
     sizes = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     parts = [noise.used(fingerprints.values) * sizes]
-    parts += [noise.used(one.fingerprints) * (SPOTS_IN_NOISE * one.plausible) for one in fingerprints.places]
+    of_spots = constants().spots_in_noise
+    parts += [noise.used(one.fingerprints) * (of_spots * one.plausible) for one in fingerprints.places]
     for name in ("position", "probe", "gauge"):
         columns = offset_columns(instruments[name], noise.rows.size)
-        parts.append(columns * (PLAUSIBLE_OFFSET[name] * float(np.median(noise.error))))
+        parts.append(columns * (plausible_offset(name) * float(np.median(noise.error))))
     return np.hstack(parts)
 
 

@@ -33,14 +33,12 @@ import numpy as np
 from scipy.special import logsumexp
 
 from vegglue.arrays import Array, Single
+from vegglue.decision_constants import constants
 from vegglue.parallel import in_threads
 
 Name = TypeVar("Name", str, int)
 # Residuals drawn of errors alone [-]: 150 of them lie beyond the 95 % point, so that p = 0.05 is known to 8 %.
 NULL_DRAWS = 3000
-# Cosine [-] between projected fingerprints above which the data cannot tell them apart. Chosen, not measured: at
-# 0.9 the score of the wrong one is 90 % of that of the right one.
-ALIKE = 0.9
 
 
 @dataclass(frozen=True)
@@ -137,12 +135,12 @@ def cosines(projected: Projected) -> Array:
 
 
 def alike_groups(names: Sequence[Name], cosine: Array) -> list[list[Name]]:
-    """Names, or numbers, that the data cannot tell apart, linked where |cosine| > ALIKE."""
+    """Names, or numbers, that the data cannot tell apart, linked where |cosine| > alike_cosine."""
     remaining, found = list(range(len(names))), []
     while remaining:
         group, grown = [remaining.pop(0)], True
         while grown:
-            near = [j for j in remaining if np.abs(cosine[j, group]).max() > ALIKE]
+            near = [j for j in remaining if np.abs(cosine[j, group]).max() > constants().alike_cosine]
             grown = bool(near)
             group += near
             remaining = [j for j in remaining if j not in near]

@@ -18,6 +18,7 @@ import scipy.linalg
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs
 from vegglue.calibration.model_error import model_error_columns
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.field_scan import free_of_prior
 from vegglue.engine.interface import linearise, predict
 from vegglue.measurements.kinds import leading_velocities
@@ -26,10 +27,6 @@ from vegglue.measurements.sections import section_places
 # Share of the cases in which the errors are to be smaller than what is told, and draws of them: the 95 % point of 2,000
 # is known to half a per cent of the share.
 SHARE_BELOW, DRAWN_ERRORS = 0.95, 2000
-# Largest change halfway between the sections over that at the stations, from which something at a place is no longer
-# added. Chosen after one of 68 objects of the blind study, where it was 6.0 and errors there grew 2.7 times; of others
-# it was 0.1 to 2.2.
-MOSTLY_ELSEWHERE = 3.0
 
 
 def largest_error_between(base: Baseline) -> float:
@@ -50,7 +47,7 @@ def largest_error_between(base: Baseline) -> float:
 
 def acts_elsewhere(before: Baseline, after: Baseline) -> str:
     """Why something at a place is not to be believed where nobody measured, '' when it acts where was measured as well:
-    its largest change of the velocity halfway between sections, over that at the stations, is below MOSTLY_ELSEWHERE.
+    its largest change of the velocity halfway between sections, over that at the stations, is below mostly_elsewhere.
     """
     station = before.model.station
     velocity = leading_velocities(station)
@@ -61,7 +58,7 @@ def acts_elsewhere(before: Baseline, after: Baseline) -> str:
         return ""
     most = int(np.argmax(changed))
     at_stations = float(np.abs(after.fitted.point.prediction - before.fitted.point.prediction)[velocity].max())
-    if changed[most] < MOSTLY_ELSEWHERE * at_stations:
+    if changed[most] < constants().mostly_elsewhere * at_stations:
         return ""
     return (
         "it acts mostly where nobody measured, measure there first: it changes the velocity by "

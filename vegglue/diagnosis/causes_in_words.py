@@ -6,9 +6,9 @@ import numpy as np
 
 from vegglue.calibration.candidates import Instrument
 from vegglue.calibration.fingerprints import EFFECT_AT_PLACE
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import Contender
 from vegglue.diagnosis.findings import Findings, Undecided
-from vegglue.diagnosis.rivals import HARDLY
 from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD, LawsSuspected
 from vegglue.results.diagnosis import (
     EstimatedErrors,
@@ -27,9 +27,6 @@ STATED_BELOW = 0.995
 TOLD_ERROR = 0.3
 # Terms whose size is part of what acts, in words.
 TOLD_BY_SIZE = ("bed", "inflow")
-# Odds of a place against what is known above which they are not told: as of a rival that is told apart whatever its
-# trace.
-KNOWN_TOLD_ODDS = 1.0 / HARDLY
 # Contenders that are told where none is surely it, and effects that stand out beside what was accepted.
 UNDECIDED_TOLD, STANDING_OUT_TOLD = 3, 3
 # p below which it is one over the number of draws: none of them was as large.
@@ -56,7 +53,8 @@ def _against(place: Location) -> list[str]:
     """Odds against the nearest other term, and against what is known where that is near."""
     nearest = sorted(place.odds.items(), key=lambda one: one[1])
     terms = [one for one in nearest if one[0] in EFFECT_AT_PLACE][:1]
-    known = [(name, odds) for name, odds in nearest if name not in EFFECT_AT_PLACE and odds < KNOWN_TOLD_ODDS][:1]
+    most = 1.0 / constants().rival_share
+    known = [(name, odds) for name, odds in nearest if name not in EFFECT_AT_PLACE and odds < most][:1]
     return [f"{_odds(odds)} against {FAULT_WORDS.get(name, name)}" for name, odds in (*terms, *known)]
 
 

@@ -31,9 +31,6 @@ from vegglue.progress import Progress, Watch
 # Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
 # to be refitted, after w: e^-6 is one in 400. Chosen, not measured: more cost runs of the model.
 MOST_REFITTED, REACH = 8, 6.0
-# Odds by which the best must lead, or others are followed too, and by which a law must beat all else: 10 to 1, where
-# strong evidence begins (Jeffreys 1961, by Kass and Raftery 1995, doi:10.2307/2291091).
-LEAST_ODDS = 10.0
 # Shares of the size that its score promises from which something at a place is refitted: at all of it a flow may not be
 # found. Chosen, not measured.
 START_SHARES = (1.0, 0.3)

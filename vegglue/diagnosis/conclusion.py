@@ -14,16 +14,17 @@ from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.channel_geometry import half_width
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.causes_in_words import places_told
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.findings import Findings
-from vegglue.diagnosis.grounds import POOR, Grounds
+from vegglue.diagnosis.grounds import Grounds
 from vegglue.diagnosis.measured_stretch import stretch_in_words
 from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.places_on_map import places_on_map_in_words
-from vegglue.diagnosis.suspects import FALSE_ALARMS_OF_EFFECTS, not_excluded, suspects_of
+from vegglue.diagnosis.suspects import not_excluded, suspects_of
 from vegglue.diagnosis.tempered_chances import tempering
 from vegglue.diagnosis.unlisted_laws import clearly_a_law, law_goes_first, laws_suspected
 from vegglue.diagnosis.unseen import UnseenErrors, unseen_errors
@@ -48,10 +49,6 @@ from vegglue.results.diagnosis import (
 )
 from vegglue.version import VERSION
 
-# Odds by which a field must beat the rest: 100 to 1, where evidence is decisive (Jeffreys 1961, by Kass and Raftery
-# 1995, doi:10.2307/2291091), for it is the vaguest answer. Chosen after 10 to 1 had told three fields on 53 sites
-# of the blind study on which nothing is hidden.
-ODDS_OF_FIELD = 100.0
 # Chance that errors alone make any effect look as strong, below which one is told as standing out: the rate of the
 # alarm beside what was accepted (`diagnose`), which places, instruments and slack may keep silent all the same.
 STANDS_OUT = 0.01
@@ -209,7 +206,7 @@ def _field(
     accepted, or closes a misfit in which nothing was; None where there is nothing to explain, or where a place of the
     same term says it in fewer words.
     """
-    if found.absurd or (not (found.accepted or found.undecided) and misfit.p >= POOR):
+    if found.absurd or (not (found.accepted or found.undecided) and misfit.p >= constants().poor_fit_chance):
         return None, None
     screening = first if found.accepted else last
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
@@ -236,9 +233,9 @@ def _field(
 
 
 def field_goes_first(log_factor: float, gained: float) -> bool:
-    """Whether a field beats nothing, and all that was accepted, by ODDS_OF_FIELD; both as ln evidence [-]."""
+    """Whether a field beats nothing, and all that was accepted, by field_odds; both as ln evidence [-]."""
     ahead = (log_factor - max(gained, 0.0)) / tempering(np.array(log_factor))
-    return bool(ahead > np.log(ODDS_OF_FIELD))
+    return bool(ahead > np.log(constants().field_odds))
 
 
 def _neighbours_aside(screening: Screening, found: Findings) -> bool:
@@ -264,7 +261,7 @@ def _first_screening(screening: Screening) -> FirstScreening:
     candidates, strongest = screening.fingerprints.candidates, screening.ranking[:COMPARED]
     columns = [screening.best_column(j) for j in strongest]
     return FirstScreening(
-        threshold=screening.effects.threshold(FALSE_ALARMS_OF_EFFECTS),
+        threshold=screening.effects.threshold(constants().effect_alarm_rate),
         scores={one.name: screening.best_score(j) for j, one in enumerate(candidates)},
         compared=tuple(candidates[j].name for j in strongest),
         cosine=score_test.cosines(screening.projected)[np.ix_(columns, columns)],

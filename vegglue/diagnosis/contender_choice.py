@@ -2,8 +2,8 @@
 lead.
 
 Something at a place says "none of what is known", which is vague: all places together have to lead all that is known by
-KNOWN_FIRST_ODDS. Which of the places is taken need not be sure: they say the same. A place that nothing rivals within
-LEAST_ODDS is taken as it is: nothing is followed beside it.
+known_first_odds. Which of the places is taken need not be sure: they say the same. A place that nothing rivals within
+strong_odds is taken as it is: nothing is followed beside it.
 """
 
 from collections.abc import Sequence
@@ -13,17 +13,12 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.candidates import InstrumentKind
-from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
+from vegglue.decision_constants import constants
+from vegglue.diagnosis.competition import Contender, chances_of
 from vegglue.diagnosis.tempered_chances import tempering
 
 # Contenders of different kinds that are followed a step further at most: each costs a calibration and a screening.
 MOST_FOLLOWED = 3
-# Odds within which another of the same kind is followed: the grid that hypotheses are searched on decides no closer.
-SAME_KIND_ODDS = 3.0
-# Odds by which places have to lead: what is known goes before what is vague. A listed effect that is led by less is
-# taken all the same. Chosen after open-n, where a push far upstream of all sections led the skewed inflow by 4.7, and
-# after eight objects of the blind study that led by 5 to 10, or rivalled each other.
-KNOWN_FIRST_ODDS = 5.0
 
 What = Literal["effect", "place", "instrument"]
 # Kinds of contenders that are in a list.
@@ -31,11 +26,13 @@ KNOWN = ("effect", *get_args(InstrumentKind))
 
 
 def nearly_as_likely(contenders: Sequence[Contender]) -> list[int]:
-    """Contenders of the best one's kind within SAME_KIND_ODDS, of others within LEAST_ODDS; MOST_FOLLOWED at most, what
-    is known among them where any of it is so likely.
+    """Contenders of the best one's kind within same_kind_odds, of others within strong_odds; MOST_FOLLOWED at most,
+    what is known among them where any of it is so likely.
     """
     chance = chances_of(contenders)
-    odds = [SAME_KIND_ODDS if one.kind == contenders[0].kind else LEAST_ODDS for one in contenders]
+    odds = [
+        constants().same_kind_odds if one.kind == contenders[0].kind else constants().strong_odds for one in contenders
+    ]
     likely = [j for j, p in enumerate(chance) if p * odds[j] >= chance[0]]
     known = [j for j in likely if contenders[j].kind in KNOWN]
     last = known[0] if known and known[0] not in likely[: MOST_FOLLOWED - 1] else None
@@ -49,7 +46,7 @@ def chance_of_a_place(contenders: Sequence[Contender], chances: Sequence[float])
 
 def chosen_contender(what: Sequence[What], evidence: Array, at_a_place: float) -> int | None:
     """The likeliest of those followed; where that is a place, the likeliest listed effect that it leads by less than
-    KNOWN_FIRST_ODDS, and None without one where places do not lead all that is known by so much.
+    known_first_odds, and None without one where places do not lead all that is known by so much.
 
     what, evidence (k,): what each is, and the ln of its evidence [-]; at_a_place: chance of all places together, those
     that were not followed among them.
@@ -58,7 +55,7 @@ def chosen_contender(what: Sequence[What], evidence: Array, at_a_place: float) -
     if what[best] != "place":
         return best
     ahead = (evidence[best] - evidence) / tempering(evidence[best])
-    listed = [j for j, one in enumerate(what) if one == "effect" and ahead[j] < np.log(KNOWN_FIRST_ODDS)]
+    listed = [j for j, one in enumerate(what) if one == "effect" and ahead[j] < np.log(constants().known_first_odds)]
     if listed:
         return min(listed, key=lambda j: float(ahead[j]))
-    return best if at_a_place >= KNOWN_FIRST_ODDS * (1.0 - at_a_place) else None
+    return best if at_a_place >= constants().known_first_odds * (1.0 - at_a_place) else None

@@ -20,6 +20,7 @@ from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.noise import with_unknown_errors
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.calibration.score_test import alarm_p
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import (
     Contender,
     chances_of,
@@ -41,7 +42,6 @@ from vegglue.diagnosis.rivals import (
 from vegglue.diagnosis.rivals_again import refitted, with_rivals_again
 from vegglue.diagnosis.suspects import suspects_of
 from vegglue.diagnosis.unlisted_laws import laws_beside
-from vegglue.diagnosis.verdict import MOST_GROUPS
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
@@ -51,8 +51,6 @@ from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis, Step, Suspect
 from vegglue.wording.sentences import sentence
 
-# How often errors alone sound the first alarm; 5 % is usual. Later alarms are sounded five times less often.
-FALSE_ALARMS, STRICTER_LATER = 0.05, 0.2
 # Effects and places that are accepted at most, and instruments.
 MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
 
@@ -120,7 +118,9 @@ def _calibrated_unless_absurd(model: Model, absurd: Sequence[str]) -> Baseline:
 
 
 def _with_alarm(screening: Screening, found: Findings) -> Findings:
-    rate = FALSE_ALARMS * (STRICTER_LATER if found.accepted or found.instruments else 1.0)
+    rate = constants().false_alarm_rate * (
+        constants().later_alarm_share if found.accepted or found.instruments else 1.0
+    )
     return replace(found, p=alarm_p(screening.kinds, screening.errors, 1, found.slack), rate=rate)
 
 
@@ -232,7 +232,7 @@ def _with_accepted(
         found = replace(found, places=places, charges=(*found.charges, charge), of_shape=found.of_shape + lost)
         return Following("place", found, further)
     step = step_found(screening, contenders, j, further, found.p)
-    if found.accepted and len(step.groups) > MOST_GROUPS:
+    if found.accepted and len(step.groups) > constants().most_groups:
         return None
     further, unneeded = pruned(further, found.effects, watch)
     return Following("effect", _with_step(found, step, unneeded, before - further.fitted.chi2, log_prior), further)

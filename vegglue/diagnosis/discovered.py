@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vegglue.calibration.laws_in_case import VALUES_SEEN
-from vegglue.diagnosis.diagnose import FALSE_ALARMS
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.refits import Refit
 from vegglue.effects.law import Law
 from vegglue.wording.numbers import in_short
@@ -142,7 +142,7 @@ class Discovery:
             return f"No law is needed: {name} explains as much, with a chance of {chance_told(chance)}."
         if self.tried == 0:
             return "No law is tried: these data have seen too little of every quantity."
-        if self.p <= FALSE_ALARMS:
+        if self.p <= constants().false_alarm_rate:
             rarely = f"errors alone leave as much in {100 * max(self.p, 0.001):.1g} % of cases"
             return f"No law is found: {rarely}, but no law or known effect explains enough of it."
         return f"No law is found: errors alone leave as much in {100 * self.p:.0f} % of cases, {self.tried} laws tried."

@@ -2,12 +2,9 @@
 
 from dataclasses import dataclass
 
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import Contender
 from vegglue.results.diagnosis import FaultyInstrument, Location, Step
-
-# Share of an accepted fingerprint, in standard errors, that the model may have put wrong and something else then picks
-# up: with the true effect in open-c and open-e 0.1 of their length was left along one other, at the waterline.
-MISPLACED_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,7 @@ class Findings:
     @property
     def slack(self) -> float:
         """By how much a remainder of what was accepted may make others score higher [standard errors]."""
-        return MISPLACED_SHARE * float(max(self.explained, 0.0) ** 0.5)
+        return constants().misplaced_share * float(max(self.explained, 0.0) ** 0.5)
 
     @property
     def log_prior(self) -> float:

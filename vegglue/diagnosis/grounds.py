@@ -4,17 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field as by_default
 
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.findings import Findings
 from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import FaultyInstrument, LawsSuspected
 from vegglue.results.diagnosis import EstimatedErrors, FieldFound, Misfit, ModelErrorUsed, VerdictKind
-
-# Chance of the last misfit under errors alone, below which something is still missing.
-POOR = 1e-3
-# Standard errors that an instrument is to be off before it is a verdict. Chosen after seven false alarms of 3.1 to 3.6,
-# one of them on a perfect site: what two codes differ by looks like a probe or a gauge that is a little off.
-CLEARLY_OFF = 4.5
 
 
 @dataclass(frozen=True)
@@ -65,6 +60,6 @@ class Statement:
 
 
 def is_clear(instrument: FaultyInstrument) -> bool:
-    """Whether an instrument is off by CLEARLY_OFF of its standard errors."""
+    """Whether an instrument is off by instrument_errors of its standard errors."""
     low, high = instrument.interval95
-    return abs(instrument.offset) > CLEARLY_OFF * (high - low) / (2.0 * NORMAL95)
+    return abs(instrument.offset) > constants().instrument_errors * (high - low) / (2.0 * NORMAL95)

@@ -29,6 +29,7 @@ from vegglue.calibration.candidates import Candidate, candidate_in_case, start_a
 from vegglue.calibration.fit import MapEstimate, at_point, fit, interval95, log_evidence_under
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
+from vegglue.decision_constants import constants
 from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse, linearise_from
 from vegglue.normal_range import NORMAL95
 from vegglue.parallel import side_by_side
@@ -42,8 +43,6 @@ REFIT_STEPS = 10
 SHARES_OF_START = (1.0, 0.3, 0.1)
 # Fall of the objective that a later start has to promise [-]: half of it is evidence, e^0.25. Chosen, not measured.
 WORTH_FOLLOWING = 0.5
-# An earlier effect whose amplitude lies closer to off than this many standard errors is dropped again.
-NEEDED = 2.0
 
 
 @dataclass(frozen=True)
@@ -171,12 +170,12 @@ def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, 
 
 
 def is_near_off(interval: tuple[float, float, float], off: float) -> bool:
-    """Whether an amplitude lies within NEEDED standard errors of off; interval: it and its 95 % range.
+    """Whether an amplitude lies within needed_errors standard errors of off; interval: it and its 95 % range.
 
     Not on the scale of z, where off is the far end of the prior of an effect that has one sign only.
     """
     middle, low, high = interval
-    return abs(middle - off) <= NEEDED * (high - low) / (2.0 * NORMAL95)
+    return abs(middle - off) <= constants().needed_errors * (high - low) / (2.0 * NORMAL95)
 
 
 def without_effect(base: Baseline, one: Candidate) -> Baseline | None:

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 from vegglue.calibration.fingerprints import LEAST_DEPTH
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.causes_in_words import TO_DISCOVER, instruments_in_words, law_in_words, model_error_in_words
-from vegglue.diagnosis.grounds import CLEARLY_OFF, POOR, Grounds, Statement, is_clear
+from vegglue.diagnosis.grounds import Grounds, Statement, is_clear
 from vegglue.measurements.section_discharge import discharge_mismatches
 from vegglue.results.causes import FaultyInstrument
 from vegglue.results.diagnosis import Step, Suspect
@@ -30,13 +31,13 @@ def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], statement: Stateme
     remarks = [*map(sentence, discharge_mismatches(grounds.carried))]
     remarks += filter(None, [small_misfit_in_words(misfit.chi2, misfit.freedom)])
     remarks += _implausible(found.steps, suspects)
-    remarks += _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= POOR else []
+    remarks += _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= constants().poor_fit_chance else []
     remarks += _besides(grounds, suspects, statement)
     remarks += [one for one in (grounds.on_map, grounds.stretch) if one]
     remarks += [] if grounds.places_searched else [TOO_SHALLOW]
     if (
         statement.kind in ("identified", "one-of", "none-of-these", "instrument")
-        and misfit.p < POOR
+        and misfit.p < constants().poor_fit_chance
         and not statement.tells_laws
     ):
         remarks.append(
@@ -70,7 +71,8 @@ def _besides(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement
 def _told_of(instrument: FaultyInstrument) -> str:
     """What a remark says of an instrument that was set aside."""
     words = instruments_in_words((instrument,))
-    faint = f" It is off by less than {CLEARLY_OFF} standard errors, which chance or the model may make."
+    least = constants().instrument_errors
+    faint = f" It is off by less than {least} standard errors, which chance or the model may make."
     return words if is_clear(instrument) else f"{words}{faint}"
 
 

@@ -12,7 +12,8 @@ from vegglue.calibration.candidates import Instrument, error_columns
 from vegglue.calibration.fit import chi2
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named, prior_shrinkage
-from vegglue.diagnosis.competition import LEAST_ODDS, Contender, chances_of
+from vegglue.decision_constants import constants
+from vegglue.diagnosis.competition import Contender, chances_of
 from vegglue.diagnosis.findings import Undecided
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.tempered_chances import tempered_odds
@@ -20,9 +21,6 @@ from vegglue.measurements.kinds import kind_of
 from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import FaultyInstrument, Location, Step
 
-# Share of the chances that the set holds, and the part of the best one's chance below which a rival is told apart from
-# others whatever its trace: odds of 20 to 1, where strong evidence begins (Kass and Raftery 1995, doi:10.2307/2291091).
-IN_SET, HARDLY = 0.95, 0.05
 # Share of the squared fingerprint of a spot above which an experiment is said to point at it.
 POINTS_AT_IT = 0.1
 
@@ -97,7 +95,7 @@ def undecided_of(contenders: Sequence[Contender], followed: Sequence[str], chanc
 
 def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
     """The step with an accepted rival and other chances, by name; without what has become negligible."""
-    least = HARDLY * max(told.values())
+    least = constants().rival_share * max(told.values())
     possible = sorted({accepted, *(name for name in told if told[name] >= least)}, key=lambda name: -told[name])
     rivals = tuple(name for name in possible if name in step.rivals or name == accepted)
     groups = [group for old in step.groups if (group := tuple(name for name in old if name in rivals))]
@@ -163,7 +161,7 @@ def instrument_found(screening: Screening, best: Contender, one: Instrument) -> 
 
 
 def _factor(screening: Screening, one: Instrument) -> float:
-    """What a probe reads over what is there [-], NaN where an offset explains its readings as well, to LEAST_ODDS."""
+    """What a probe reads over what is there [-], NaN where an offset explains its readings as well, to strong_odds."""
     noise, point = screening.base.noise, screening.base.fitted.point
     columns = error_columns(one, noise.value)
     if columns.shape[1] < 2:
@@ -171,7 +169,7 @@ def _factor(screening: Screening, one: Instrument) -> float:
     residual, both = noise.whiten(noise.residual(point.prediction)), noise.whiten(columns)
     projected = score_test.project(screening.whitened_slopes, residual, point.z, both)
     offset, factor = score_test.scores(projected, np.zeros(2))
-    if 0.5 * (factor**2 - offset**2) < np.log(LEAST_ODDS):
+    if 0.5 * (factor**2 - offset**2) < np.log(constants().strong_odds):
         return float("nan")
     return float(1.0 / (1.0 - factor / projected.length[1]))
 
@@ -179,15 +177,15 @@ def _factor(screening: Screening, one: Instrument) -> float:
 def rivals_among(
     names: Sequence[str], chance: Array, cosine: Array
 ) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
-    """The chance of each effect in the fewest groups that hold IN_SET of what listed effects have together, the
+    """The chance of each effect in the fewest groups that hold set_chance of what listed effects have together, the
     likeliest first, and these groups.
 
     chance (k,); cosine (k, k): between projected fingerprints.
     """
-    near = chance >= HARDLY * chance.max()
+    near = chance >= constants().rival_share * chance.max()
     alike = np.where(near & near[:, None], cosine, 0.0)
     kept = score_test.fewest_groups(
-        score_test.alike_groups(range(len(names)), alike), chance, IN_SET * float(chance.sum())
+        score_test.alike_groups(range(len(names)), alike), chance, constants().set_chance * float(chance.sum())
     )
     likeliest = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
     return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
@@ -198,5 +196,5 @@ def _others(contenders: Sequence[Contender], chance: Array, kind: str) -> dict[s
     return {
         one.name: float(p)
         for one, p in zip(contenders, chance, strict=True)
-        if one.kind != kind and p >= HARDLY * chance.max()
+        if one.kind != kind and p >= constants().rival_share * chance.max()
     }

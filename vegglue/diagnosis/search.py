@@ -13,11 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue.calibration.baseline import Baseline, baseline
-from vegglue.calibration.law_screening import LISTED_ODDS, LawScreening, law_fingerprints, screen_laws
-from vegglue.calibration.score_test import ALIKE
+from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.chances import chances_in_set
 from vegglue.diagnosis.competition import REACH, Contender, contenders_of
-from vegglue.diagnosis.diagnose import FALSE_ALARMS
 from vegglue.diagnosis.discovered import Discovery, LawFound, ProductFound
 from vegglue.diagnosis.product import product_beside
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
@@ -51,7 +50,7 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
     if not traces.laws:
         return Discovery(1.0, 0, (), {})
     screening = screen_laws(base, traces)
-    if screening.p > FALSE_ALARMS:
+    if screening.p > constants().false_alarm_rate:
         return Discovery(screening.p, len(screening.laws), (), {})
     known = _as_vague(screening, contenders_of(screening.listed, watch, screening.kind.total))
     laws = _laws(screening, max((one.log_evidence for one in known), default=-np.inf), watch)
@@ -62,7 +61,7 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
 def _as_vague(screening: LawScreening, found: Sequence[Contender]) -> list[Contender]:
     """What is at a place, of no kind that others have seen in nature, as likely before as laws; all else as it is."""
     places = {one.term for one in screening.listed.fingerprints.places}
-    less = np.log(LISTED_ODDS)
+    less = np.log(constants().listed_over_laws)
     return [replace(one, log_evidence=one.log_evidence - less) if one.kind in places else one for one in found]
 
 
@@ -175,4 +174,4 @@ def _alike(screening: LawScreening, one: Contender, own: Law) -> tuple[str, ...]
             cosine = {law: float(row[screening.of_listed + screening.columns[law]].max()) for law in laws}
             nearest = max(laws, key=lambda law: cosine[law])
             near[screening.laws[nearest].candidate.name] = cosine[nearest]
-    return tuple(name for name in sorted(near, key=lambda name: -near[name]) if near[name] > ALIKE)
+    return tuple(name for name in sorted(near, key=lambda name: -near[name]) if near[name] > constants().alike_cosine)

@@ -6,11 +6,10 @@ from vegglue.calibration import score_test
 from vegglue.calibration.fit import objective
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import prior_shrinkage
+from vegglue.decision_constants import constants
 from vegglue.normal_range import NORMAL95
 from vegglue.results.suspect import AmplitudeEstimate, Detectability, ScoreTest, Suspect
 
-# Rate at which errors alone make some listed effect score higher than what counts as detectable.
-FALSE_ALARMS_OF_EFFECTS = 0.04
 # Lengths of a fingerprint, in standard errors, that may be there undetected: thresholds are near a score of 3.2, so
 # that longer ones stand out and shorter ones change little. Which it is nobody knows.
 UNDETECTED_LENGTHS = (2.0, 3.0, 4.0)
@@ -27,7 +26,7 @@ TESTABLE = 2.0
 
 def suspects_of(screening: Screening) -> dict[str, Suspect]:
     """All effects of a screening by name, none of them refitted."""
-    threshold = screening.effects.threshold(FALSE_ALARMS_OF_EFFECTS)
+    threshold = screening.effects.threshold(constants().effect_alarm_rate)
     candidates = screening.fingerprints.candidates
     return {one.name: _suspect(screening, j, threshold) for j, one in enumerate(candidates)}
 

@@ -9,22 +9,22 @@ not nature's: where much is explained, errors count as w^(1/2) times as large.
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.decision_constants import constants
 
-# Relative error of a fingerprint [-]: on cells of two thirds of the size, those of mixing differ by 10 to 25 %.
-FINGERPRINT_ERROR = 0.15
 # Odds beyond e^this are told as this: larger numbers say no more.
 LARGEST_LOG_ODDS = 100.0
 
 
-def tempered_chances(evidence: Array, trace_error: float = FINGERPRINT_ERROR) -> Array:
+def tempered_chances(evidence: Array, trace_error: float | None = None) -> Array:
     """p_j of E_j (k,) [-]; trace_error: relative error of a fingerprint [-]."""
     weight = np.exp((evidence - evidence.max()) / tempering(evidence, trace_error))
     return np.asarray(weight / weight.sum())
 
 
-def tempering(evidence: Array, trace_error: float = FINGERPRINT_ERROR) -> Array:
+def tempering(evidence: Array, trace_error: float | None = None) -> Array:
     """w = 1 + e^2 2 E, at least 1, e the relative error of a fingerprint."""
-    return np.asarray(1.0 + trace_error**2 * 2.0 * np.maximum(evidence, 0.0))
+    error = constants().fingerprint_error if trace_error is None else trace_error
+    return np.asarray(1.0 + error**2 * 2.0 * np.maximum(evidence, 0.0))
 
 
 def tempered_odds(evidence: float, other: float) -> float:

@@ -13,14 +13,13 @@ import numpy as np
 from vegglue.calibration.baseline import log_evidence
 from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.calibration.residual_screening import Screening
-from vegglue.diagnosis.competition import LEAST_ODDS
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.tempered_chances import tempered_chances
 from vegglue.results.causes import LawsSuspected, LawSuspected
 
-# How often errors alone sound the alarm of laws [-]: it comes on top of that of everything listed, which is sounded at
-# 5 %. Share of the chance of all laws that those told hold together.
-LAW_ALARMS, LAWS_HELD = 0.01, 0.95
+# Share of the chance of all laws that those told hold together.
+LAWS_HELD = 0.95
 
 
 def laws_beside(screening: Screening) -> LawScreening | None:
@@ -42,7 +41,7 @@ def laws_suspected(
     if found.absurd:
         return None
     screening = beside_first() if found.accepted or last is first else laws_beside(last)
-    if screening is None or screening.p >= LAW_ALARMS:
+    if screening is None or screening.p >= constants().law_alarm_rate:
         return None
     of_laws = screening.of_each
     chances = tempered_chances(np.append(of_laws, _against(first, last, found)))[: of_laws.size]
@@ -64,8 +63,8 @@ def is_likelier(laws: LawsSuspected) -> bool:
 
 
 def clearly_a_law(laws: LawsSuspected | None) -> bool:
-    """Whether laws are LEAST_ODDS times as likely as all else together: a place then stands in for one."""
-    return laws is not None and laws.chance > LEAST_ODDS * (1.0 - laws.chance)
+    """Whether laws are strong_odds times as likely as all else together: a place then stands in for one."""
+    return laws is not None and laws.chance > constants().strong_odds * (1.0 - laws.chance)
 
 
 def _against(first: Screening, last: Screening, found: Findings) -> list[float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from vegglue.calibration.candidates import START_OFF_ENDS
 from vegglue.case.parameter_space import FURTHEST
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.causes_in_words import (
     TO_DISCOVER,
     causes_in_words,
@@ -21,7 +22,7 @@ from vegglue.diagnosis.causes_in_words import (
     with_their_chances,
 )
 from vegglue.diagnosis.findings import Findings
-from vegglue.diagnosis.grounds import POOR, Grounds, Statement, is_clear
+from vegglue.diagnosis.grounds import Grounds, Statement, is_clear
 from vegglue.diagnosis.remarks import remarks_of
 from vegglue.diagnosis.unlisted_laws import is_likelier, law_goes_first
 from vegglue.effects.identity import EffectIdentity
@@ -31,20 +32,6 @@ from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Misfit, Suspect, Verdict,
 from vegglue.results.suspect import counted_in_words
 from vegglue.wording.sentences import phrase
 
-# A set of more groups than this says nothing.
-MOST_GROUPS = 3
-# Share of the effects that must be testable before it is said that nothing is missing.
-TESTABLE_SHARE = 0.25
-# Correlation of the errors above which they, and not the model, would explain the misfit: nothing is then said to be
-# missing or not, nor where they are clearly larger than stated. Probes side by side that err alike by more than 0.8 are
-# a model that errs. Chosen, not measured.
-LARGEST_CORRELATION = 0.8
-# Errors at what was not seen, over those expected, above which the model disagrees. Chosen, not measured.
-UNSEEN_RATIO = 1.3
-# chi2 over its degrees of freedom above which no name is believed: the model misses by twice all that is allowed for.
-ABSURD = 4.0
-# Standard deviations of its prior beyond which a parameter stands in for something else. Chosen, not measured.
-FAR_OFF = 4.0
 # Effects of the library, and terms at a place, that let sections read another discharge than stated: water that comes
 # or goes, readings that are off as a whole, a bed or a level that is not there. Larger than this over what is plausible
 # they only make up for it. Chosen, as for a parameter.
@@ -53,7 +40,6 @@ OF_DISCHARGES = (
     "partial_depth", "floor_level_error", "bank_level_error", "bed_slope_error", "flank_scour",
 )  # fmt: skip
 TERMS_OF_DISCHARGES, OF_DEVICES = ("inflow", "bed"), ("device_gain", "zero_offset")
-MOST_OF_DISCHARGES = FAR_OFF
 # Distance from an end of its support, over a plausible size, within which an amplitude lies at a bound: as far as
 # refits start from it at least, see `start_amplitude`.
 AT_BOUND = START_OFF_ENDS
@@ -94,7 +80,7 @@ def _unexplained(grounds: Grounds, suspects: Sequence[Suspect]) -> list[CarriedD
     if any(place.term in TERMS_OF_DISCHARGES for place in found.places):
         return []
     accepted = [one for one in suspects if one.name in found.effects]
-    believed = [one.name for one in accepted if one.amplitude.relative_size <= MOST_OF_DISCHARGES]
+    believed = [one.name for one in accepted if one.amplitude.relative_size <= constants().far_off_prior]
     return [one for one in grounds.carried if not any(_may_be_why(name, one) for name in believed)]
 
 
@@ -148,7 +134,7 @@ def _stated(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
 def _with_effects(found: Findings, named: str, misfit: Misfit) -> Statement:
     """Listed effects, or too many to name; named: all of them in words."""
     first = found.steps[0]
-    if len(first.groups) > MOST_GROUPS:
+    if len(first.groups) > constants().most_groups:
         names = ", ".join(with_their_chances(first, first.rivals))
         which = f"which of {names} it is (chances among those calibrated)"
         return Statement("cannot-tell", f"Something is missing, but these data cannot tell {which}.")
@@ -183,12 +169,12 @@ def _doubt(grounds: Grounds, suspects: Sequence[Suspect]) -> str:
     """Why no name can be believed, '' when it can."""
     misfit, (parameter, far) = grounds.misfit, grounds.strained
     ratio = misfit.chi2 / max(misfit.freedom, 1)
-    if ratio > ABSURD:
+    if ratio > constants().absurd_misfit:
         return (
             f"with all that was found the model still misses by {np.sqrt(ratio):.1f} times the errors that are allowed "
             f"for ({misfit.told}); check units, datum, bed and boundaries first"
         )
-    if far > FAR_OFF:
+    if far > constants().far_off_prior:
         return f"{parameter} would have to lie {far:.1f} standard deviations from the middle of its prior"
     at_bound = [one.name for one in suspects if one.name in grounds.findings.effects and _is_at_bound(one)]
     if at_bound:
@@ -209,15 +195,15 @@ def _is_at_bound(suspect: Suspect) -> bool:
 def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> Statement:
     misfit = grounds.misfit
     testable = [suspect for suspect in suspects if suspect.detectability.testable]
-    if misfit.p < POOR:
+    if misfit.p < constants().poor_fit_chance:
         larger = f"The misfit is larger than the errors allow ({misfit.told})"
         return Statement("cannot-tell", f"{larger}, but no known effect and no place stands out.")
     unearned = _unearned(grounds)
     if unearned:
         return _nothing_further(grounds, unearned, "cannot-tell")
-    if grounds.between > UNSEEN_RATIO:
+    if grounds.between > constants().held_out_ratio:
         return _unsure_between(grounds)
-    if len(testable) < TESTABLE_SHARE * max(len(suspects), 1):
+    if len(testable) < constants().testable_share * max(len(suspects), 1):
         seen = f"only {len(testable)} of {counted_in_words(suspects)} would be seen in these data"
         unsure = f"{seen} if they were there at twice a plausible size"
         return Statement("cannot-tell", f"Nothing stands out ({misfit.told}), but {unsure}.")
@@ -234,7 +220,7 @@ def _without_findings(grounds: Grounds, suspects: Sequence[Suspect]) -> Statemen
 
 
 def _unsure_between(grounds: Grounds) -> Statement:
-    """Silence, or an instrument, where the model may miss by more than UNSEEN_RATIO between the sections."""
+    """Silence, or an instrument, where the model may miss by more than held_out_ratio between the sections."""
     unsure = (
         "where nobody measured, halfway between the sections, the model may miss by as much as "
         f"{grounds.between:.1f} times the errors of the data (by its own errors, those of its site and its parameters, "
@@ -263,7 +249,7 @@ def _unearned(grounds: Grounds) -> str:
     errors, used = grounds.errors, grounds.model_error
     if errors.clearly_larger:
         return f"only with errors {errors.scale:.1f} times as large as stated: they, or the model, are wrong"
-    if errors.correlation > LARGEST_CORRELATION:
+    if errors.correlation > constants().largest_correlation:
         return (
             f"only with errors of neighbours correlated by {errors.correlation:.2f}: the model misses in the same way "
             "over whole sections"
@@ -278,6 +264,6 @@ def _unearned(grounds: Grounds) -> str:
         )
     if grounds.unseen == np.inf:
         return "the model finds no steady flow in experiments that were not calibrated to"
-    if grounds.unseen > max(UNSEEN_RATIO, grounds.by_chance):
+    if grounds.unseen > max(constants().held_out_ratio, grounds.by_chance):
         return f"measurements that were not calibrated to are missed by {grounds.unseen:.1f} times what is expected"
     return ""

@@ -15,8 +15,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from vegglue.arrays import Array
-from vegglue.calibration.score_test import ALIKE, alike_groups
+from vegglue.calibration.score_test import alike_groups
 from vegglue.case.schema import Case
+from vegglue.decision_constants import constants
 from vegglue.measurements.kinds import KINDS, WATER_LEVEL, Kind
 from vegglue.report.cause_words import accepted_causes
 from vegglue.report.diagnosis_words import (
@@ -145,7 +146,7 @@ def paint_alike(axes: Axes, names: Sequence[str], cosine: Array) -> None:
     axes.tick_params(length=0, labelsize=7.5)
     for edge in ("left", "bottom"):
         axes.spines[edge].set_visible(False)
-    text = f"full: alike, hollow: opposed;\nframe: |cosine| above {fixed(ALIKE, 2)}"
+    text = f"full: alike, hollow: opposed;\nframe: |cosine| above {fixed(constants().alike_cosine, 2)}"
     axes.text(0.0, -0.03, text, transform=axes.transAxes, va="top", fontsize=SMALL, color=COLOUR["muted"])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
+from vegglue.decision_constants import constants
 from vegglue.measurements.kinds import stations_in_short
 from vegglue.results.causes import (
     FaultyInstrument,
@@ -61,9 +62,6 @@ class Step:
         return best if best and self.others[best] > max(groups) else ""
 
 
-# Errors over those stated above which they, and not the model, would explain the misfit: stated errors are good to a
-# quarter. Chosen, not measured.
-LARGEST_SCALE = 1.25
 # How a sentence begins that tells of measurements which no flow of the case can show, or of sections that carry another
 # discharge than stated.
 BEFORE_ALL_ELSE = "Before anything can be said of the model: "
@@ -141,7 +139,7 @@ class EstimatedErrors:
     @property
     def clearly_larger(self) -> bool:
         """Whether they are larger than stated by more than can pass for the errors of stating them."""
-        return self.scale > LARGEST_SCALE
+        return self.scale > constants().largest_scale
 
 
 @dataclass(frozen=True)
