@@ -96,6 +96,15 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert anchor in [re.sub(r"[^\w\- ]", "", title).lower().replace(" ", "-") for title in titles]
 
 
+def test_files_that_the_map_names_exist() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    prose = re.sub(r"^\| `.*$", "", text, flags=re.MULTILINE)  # the table of folders is made of their docstrings
+    named = set(re.findall(r"`([\w/]+(?:\.(?:py|md)|/))`", prose))
+    assert len(named) > 15
+    missing = [name for name in named if not (ROOT / name).exists() and not (ROOT / "vegglue" / name).exists()]
+    assert missing == []
+
+
 def lines_of_shell(page: Path) -> list[str]:
     """Every `vegglue ...` that a page shows: in blocks of shell, and in the middle of its sentences."""
     text = page.read_text(encoding="utf-8")
