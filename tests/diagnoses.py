@@ -6,28 +6,28 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from vegglue.results.causes import LawsSuspected, LawSuspected
+from vegglue.results.candidate_effect import AmplitudeEstimate, Detectability, ScoreTest
+from vegglue.results.causes import CandidateLaw, CandidateLaws
 from vegglue.results.diagnosis import (
+    CandidateEffect,
     Diagnosis,
     EstimatedErrors,
     FaultyInstrument,
     FieldFound,
     FirstScreening,
-    Location,
+    LocalAnomaly,
     Misfit,
     ModelErrorUsed,
     ParameterEstimates,
     PlaceMap,
     Predictions,
     Step,
-    Suspect,
     Verdict,
 )
-from vegglue.results.suspect import AmplitudeEstimate, Detectability, ScoreTest
 
 STATIONS = 6
 PARTS = ("verdict", "misfit", "errors", "first_screening", "parameters", "predictions", "place_map")
-PARTS_OF_SUSPECT = ("amplitude", "test", "detectability")
+PARTS_OF_CANDIDATE = ("amplitude", "test", "detectability")
 
 
 def changed(whole: Any, parts: tuple[str, ...], changes: dict[str, dict[str, Any]]) -> Any:
@@ -36,9 +36,9 @@ def changed(whole: Any, parts: tuple[str, ...], changes: dict[str, dict[str, Any
     return replace(whole, **{part: replace(getattr(whole, part), **fields) for part, fields in changes.items()})
 
 
-def a_suspect(name: str, shapes: dict[str, float] | None = None, **parts: dict[str, Any]) -> Suspect:
+def a_candidate_effect(name: str, shapes: dict[str, float] | None = None, **parts: dict[str, Any]) -> CandidateEffect:
     """parts: fields to be changed, e.g. test={"score": 0.3}."""
-    suspect = Suspect(
+    candidate_effect = CandidateEffect(
         name=name, title="Störung – größer als 0", shapes=shapes or {},
         amplitude=AmplitudeEstimate(
             value=0.1 + 0.2, interval95=(-np.inf, 1 / 3), unit="m2/s", off=0.0, scale=0.5, refitted=False,
@@ -47,12 +47,12 @@ def a_suspect(name: str, shapes: dict[str, float] | None = None, **parts: dict[s
         test=ScoreTest(score=7.3, p_family=0.0002),
         detectability=Detectability(visibility=0.9, smallest=0.05, testable=True, confounder="k_s", cosine=-0.4),
     )  # fmt: skip
-    return changed(suspect, PARTS_OF_SUSPECT, parts)
+    return changed(candidate_effect, PARTS_OF_CANDIDATE, parts)
 
 
-def a_location(**fields: Any) -> Location:
+def an_anomaly(**fields: Any) -> LocalAnomaly:
     """Of more drag at x = 33.0, y = -0.6 m; fields: to be changed."""
-    usual = Location(
+    usual = LocalAnomaly(
         x=33.0, y=-0.6, length=1.8, width=0.45, term="drag", effect="unlisted_object", amplitude=0.4,
         interval95=(0.3, 0.5), unit="1/m", score=12.0, experiments=("low", "high"), odds={"eddies": 30.0, "bed": 4.0},
         plausible=1.0,
@@ -76,21 +76,23 @@ def a_field(**fields: Any) -> FieldFound:
     return replace(usual, **fields)
 
 
-def laws_suspected_of(*names: str, **fields: Any) -> LawsSuspected:
+def candidate_laws_of(*names: str, **fields: Any) -> CandidateLaws:
     """Laws of the speed on the banks, of these names and chances that fall by half; fields: to be changed."""
     laws = tuple(
-        LawSuspected(
+        CandidateLaw(
             name=name, term="friction of the banks", quantity="the speed",
             title="Friction of the banks changes at one value of the speed", equation="k -> k exp(a g)",
             reference=0.4, scale=0.5, strength=-0.8, chance=0.5 ** (number + 1),
         )
         for number, name in enumerate(names)
     )  # fmt: skip
-    return replace(LawsSuspected(p=1 / 3001, tried=65, chance=sum(one.chance for one in laws), laws=laws), **fields)
+    return replace(CandidateLaws(p=1 / 3001, tried=65, chance=sum(one.chance for one in laws), laws=laws), **fields)
 
 
 def a_diagnosis(
-    suspects: tuple[Suspect, ...] | None = None, steps: tuple[Step, ...] | None = None, **parts: dict[str, Any]
+    candidate_effects: tuple[CandidateEffect, ...] | None = None,
+    steps: tuple[Step, ...] | None = None,
+    **parts: dict[str, Any],
 ) -> Diagnosis:
     """Two experiments, one section and a gauge each; an effect accepted, a rival, one less likely, one untestable.
 
@@ -110,20 +112,21 @@ def a_diagnosis(
     })  # fmt: skip
     refitted = {"refitted": True}
     usual = (
-        a_suspect("eddies", amplitude=refitted), a_suspect("mixing[D3]", {"width": 0.1}, amplitude=refitted),
-        a_suspect("wind", test={"score": 0.3, "p_family": 1.0}, detectability={"testable": False}),
-        a_suspect("turning", test={"score": -1.0, "p_family": 0.7}),
+        a_candidate_effect("eddies", amplitude=refitted),
+        a_candidate_effect("mixing[D3]", {"width": 0.1}, amplitude=refitted),
+        a_candidate_effect("wind", test={"score": 0.3, "p_family": 1.0}, detectability={"testable": False}),
+        a_candidate_effect("turning", test={"score": -1.0, "p_family": 0.7}),
     )  # fmt: skip
     step = Step(
         "eddies", ("eddies", "mixing[D3]"), (0.7, 0.28), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0, {"bed": 0.02},
-        {"bed": a_location(term="bed", unit="m")},
+        {"bed": an_anomaly(term="bed", unit="m")},
     )  # fmt: skip
     diagnosis = Diagnosis(
-        name="open-x", version="0.1.0", suspects=usual if suspects is None else suspects,
+        name="open-x", version="0.1.0", candidate_effects=usual if candidate_effects is None else candidate_effects,
         steps=(step,) if steps is None else steps,
         verdict=Verdict(
             "one-of", "Missing: eddies of 0.3 m²/s.", ("Fehler zählen – doppelt.",),
-            a_location(), not_excluded=(), clears_the_model=False, tells_laws=False,
+            an_anomaly(), not_excluded=(), clears_the_model=False, tells_laws=False,
         ),
         misfit=Misfit(chi2_first=2300.5, chi2=5.1, freedom=3, p=0.2, zones=zones),
         errors=EstimatedErrors(correlation=0.1, scale=1.0, grid_error=0.001, flagged=(1,)),
@@ -139,24 +142,24 @@ def a_diagnosis(
             cosine=np.array([[1, 0.96, 0.1], [0.96, 1, 0.2], [0.1, 0.2, 1]]),
         ),
         parameters=ParameterEstimates({"n_b": 0.035}, {"n_b": (0.03, 0.02, 0.04)}),
-        places=(a_location(),), instruments=(an_instrument(),), model_error=ModelErrorUsed(0.05, 0.01, 0.5, 1.25),
+        places=(an_anomaly(),), instruments=(an_instrument(),), model_error=ModelErrorUsed(0.05, 0.01, 0.5, 1.25),
     )  # fmt: skip
     return changed(diagnosis, PARTS, parts)
 
 
 NOTHING = a_diagnosis(
-    suspects=(), steps=(), verdict={"kind": "nothing-missing", "location": None, "remarks": ()},
+    candidate_effects=(), steps=(), verdict={"kind": "nothing-missing", "anomaly": None, "remarks": ()},
     misfit={"zones": pd.DataFrame(), "p": np.nan}, errors={"flagged": ()}, parameters={"first": {}, "last": {}},
     first_screening={"scores": {}, "compared": (), "cosine": np.zeros((0, 0))},
     place_map={"x": np.zeros(0), "y": np.zeros(0), "score": np.zeros(0)},
 )  # fmt: skip
 NOTHING = replace(NOTHING, places=(), instruments=(), model_error=None)
-NO_LOCATION = replace(a_diagnosis(verdict={"location": None}), places=(), instruments=(), model_error=None)
+NO_LOCATION = replace(a_diagnosis(verdict={"anomaly": None}), places=(), instruments=(), model_error=None)
 # A field and places of other terms, and instruments that stood at no one place.
 EVERY_KIND = replace(
     a_diagnosis(verdict={"kind": "none-of-these"}, place_map={"term": "inflow"}),
-    places=(a_location(term="inflow", effect="unlisted_inflow", unit="m3/s"), a_location(term="bed", odds={})),
+    places=(an_anomaly(term="inflow", effect="unlisted_inflow", unit="m3/s"), an_anomaly(term="bed", odds={})),
     instruments=(an_instrument(), an_instrument(kind="probe", x=np.nan, stations=(0, 3), interval95=(-np.inf, 0.2))),
     field=a_field(),
-    laws=laws_suspected_of("law_bank_speed_step", "law_bank_speed_ramp"),
+    laws=candidate_laws_of("law_bank_speed_step", "law_bank_speed_ramp"),
 )

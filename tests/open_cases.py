@@ -47,13 +47,13 @@ def assert_found(found: Diagnosis, hidden: str, true: float) -> None:
     assert len(found.steps) == 1, found.verdict.sentence
     assert hidden in found.set, found.verdict.sentence
     assert len(found.set) == 1 or set(found.set) <= EDDIES, found.verdict.sentence
-    low, high = found.suspect(hidden).amplitude.interval95
+    low, high = found.candidate_effect(hidden).amplitude.interval95
     assert low <= true <= high
 
 
 def assert_better(grown: StepwiseExtension, added: int) -> None:
     """So many effects or places were added, and what no calibration has seen is met better by each measure."""
-    before, after = grown.comparison.rungs[0], grown.comparison.rungs[-1]
+    before, after = grown.comparison.model_scores[0], grown.comparison.model_scores[-1]
     assert len(after.effects) == added, grown.reason
     assert held_out_rmse(after) < held_out_rmse(before)
     assert held_out_rmse(after, "experiments") < held_out_rmse(before, "experiments")

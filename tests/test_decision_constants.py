@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue.decision_constants import CHOSEN, constants, described, using
-from vegglue.diagnosis.tempered_chances import tempered_chances
+from vegglue.diagnosis.tempered_probabilities import tempered_probabilities
 
 
 def test_each_constant_has_a_unit_a_provenance_and_a_basis() -> None:
@@ -20,7 +20,7 @@ def test_each_constant_has_a_unit_a_provenance_and_a_basis() -> None:
 
 def test_other_constants_hold_within_a_block_only() -> None:
     evidence = np.array([40.0, 38.0])
-    before = tempered_chances(evidence)
+    before = tempered_probabilities(evidence)
     with using(replace(constants(), fingerprint_error=0.0)):
-        np.testing.assert_allclose(tempered_chances(evidence), np.exp([0.0, -2.0]) / (1.0 + np.exp(-2.0)))
-    np.testing.assert_array_equal(tempered_chances(evidence), before)
+        np.testing.assert_allclose(tempered_probabilities(evidence), np.exp([0.0, -2.0]) / (1.0 + np.exp(-2.0)))
+    np.testing.assert_array_equal(tempered_probabilities(evidence), before)

@@ -18,7 +18,7 @@ from vegglue.calibration.candidates import NOT_SEARCHED
 from vegglue.case.resolved_config import case_hash
 from vegglue.cli.main import app
 from vegglue.effects.library import library
-from vegglue.results.kept_words import ladder_that_fits
+from vegglue.results.json_store import comparison_that_fits
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 OWN_FILES = ROOT / "docs" / "own_files.md"
@@ -207,7 +207,7 @@ def test_what_the_tutorial_hides_is_found_and_added(willows: tuple[Path, dict[st
     case, runs = vegglue.load_case(folder / "willows.yaml"), folder / "runs"
     assert (runs / "willows" / "diagnosis.h5").is_file()
     assert_found(vegglue.diagnose(case, runs=runs), "secondary_current", 0.010)
-    ladder = ladder_that_fits(runs / "willows", case_hash(case))
+    ladder = comparison_that_fits(runs / "willows", case_hash(case))
     assert ladder is not None
     before, after = ladder.steps
     assert after.unseen < min(before.unseen, WANTED)

@@ -1,17 +1,17 @@
-"""Grounds of verdicts made up for tests, and what is said of them."""
+"""VerdictInputs of verdicts made up for tests, and what is said of them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import pandas as pd
-from diagnoses import a_suspect
+from diagnoses import a_candidate_effect
 
 from vegglue.calibration.fit import chance_of_misfit
-from vegglue.diagnosis.findings import Findings
-from vegglue.diagnosis.grounds import Grounds
-from vegglue.diagnosis.verdict import judged
-from vegglue.results.diagnosis import EstimatedErrors, Misfit, Step, Suspect
+from vegglue.diagnosis.search_state import SearchState
+from vegglue.diagnosis.verdict import make_verdict
+from vegglue.diagnosis.verdict_inputs import VerdictInputs
+from vegglue.results.diagnosis import CandidateEffect, EstimatedErrors, Misfit, Step
 
 AS_STATED = EstimatedErrors(correlation=0.0, scale=1.0, grid_error=0.0, flagged=())
 # A misfit as it should be, one that errors do not make, and one that is absurd: 3.8 and 6 times the degrees of freedom.
@@ -19,7 +19,7 @@ FITS, MISSES, ABSURD = (
     Misfit(chi2, chi2, freedom, chance_of_misfit(chi2, freedom), pd.DataFrame())
     for chi2, freedom in ((5.0, 5), (76.0, 20), (120.0, 20))
 )
-NONE = a_suspect("wind", test={"score": 0.4})
+NONE = a_candidate_effect("wind", test={"score": 0.4})
 
 
 def step(*rivals: str, **fields: Any) -> Step:
@@ -27,15 +27,17 @@ def step(*rivals: str, **fields: Any) -> Step:
     return replace(Step(rivals[0], rivals, chances, tuple((name,) for name in rivals), 200.0, 5.0, 1e-4), **fields)
 
 
-def grounds(*steps: Step, **parts: Any) -> Grounds:
-    """Of a diagnosis that found these steps; parts: fields of the grounds, or of what was found, to be changed."""
+def inputs(*steps: Step, **parts: Any) -> VerdictInputs:
+    """Of a diagnosis that found these steps; parts: fields of the inputs, or of what was found, to be changed."""
     of_findings = {name: parts.pop(name) for name in ("places", "instruments", "undecided", "absurd") if name in parts}
-    usual = Grounds(AS_STATED, FITS, Findings(steps, **of_findings), None, None, (), float("nan"), False, ("n_b", 1.0))
+    usual = VerdictInputs(
+        AS_STATED, FITS, SearchState(steps, **of_findings), None, None, (), float("nan"), False, ("n_b", 1.0)
+    )
     return replace(usual, **parts)
 
 
-def said(found: Grounds, suspects: Sequence[Suspect] = (NONE,)) -> tuple[str, str, str]:
-    verdict = judged(found, suspects)
-    places = found.findings.places
-    assert (verdict.location, verdict.not_excluded) == (places[0] if places else None, found.not_excluded)
+def said(found: VerdictInputs, candidate_effects: Sequence[CandidateEffect] = (NONE,)) -> tuple[str, str, str]:
+    verdict = make_verdict(found, candidate_effects)
+    places = found.state.places
+    assert (verdict.anomaly, verdict.not_excluded) == (places[0] if places else None, found.not_excluded)
     return verdict.kind, verdict.sentence, " ".join(verdict.remarks)

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from diagnoses import a_diagnosis
+from model_scores import a_model_score
 from posteriors import a_posterior, changed
-from rungs import a_rung
 
 from vegglue.cli.ensemble_commands import _in_short
 from vegglue.cli.output import command_line
@@ -29,7 +29,7 @@ def test_differences_between_experiments_are_told_with_the_errors_they_are_under
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """`infer` said that one value does as well, of what `compare` told apart: one of them makes errors larger."""
-    alike, apart = a_rung("brook"), replace(a_rung("brook-wind"), homogeneity={"phi": 1e-5, "n_b": 0.3})
+    alike, apart = a_model_score("brook"), replace(a_model_score("brook-wind"), homogeneity={"phi": 1e-5, "n_b": 0.3})
     show_ladder(Comparison((alike,), pd.DataFrame()))
     assert "under the errors as stated" not in capsys.readouterr().out
     show_ladder(Comparison((alike, apart), pd.DataFrame()))

@@ -14,8 +14,8 @@ from vegglue.calibration.fit import at_point
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.config import load_case
 from vegglue.cli.tables import show_ladder
-from vegglue.diagnosis.comparison import held_out_rmse, homogeneity, improvement, rung, rung_in_short
-from vegglue.results.rung import Rung
+from vegglue.diagnosis.comparison import held_out_rmse, homogeneity, improvement, model_score, model_score_in_short
+from vegglue.results.model_score import ModelScore
 from vegglue.workflow.compare import Comparison
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
@@ -79,13 +79,13 @@ def test_what_an_experiment_does_not_tell_is_left_out(slope: Array) -> None:
 def test_held_out_errors_are_those_of_calibrating_without_the_section(slope: Array) -> None:
     values = measured(slope, 0.2 * np.ones(slope.shape))
     base = calibrated(values, slope)
-    found = rung(base)
+    found = model_score(base)
     out = (stations()["section"] == "B").to_numpy()
     station = base.model.station.assign(used=~out)
     white, kept = slope[~out] / 0.01, values[~out] / 0.01
     z = np.linalg.solve(white.T @ white + np.eye(slope.shape[1]), white.T @ kept)
     assert found.held_out.sections[out] == pytest.approx(values[out] - slope[out] @ z)
-    without = rung(replace(base, model=replace(base.model, station=station), noise=noise_of(station)))
+    without = model_score(replace(base, model=replace(base.model, station=station), noise=noise_of(station)))
     assert without.in_sample.stations == (~out).sum()
 
 
@@ -104,7 +104,7 @@ def test_held_out_velocities_lie_within_their_band_as_often_as_told(slope: Array
         white = here.whiten(slope)
         z = np.linalg.solve(white.T @ white + np.eye(slope.shape[1]), white.T @ here.whiten(values))
         fitted = at_point(here, replace(start.fitted.point, z=z, prediction=slope @ z))
-        found = rung(replace(start, noise=here, fitted=fitted)).predictive
+        found = model_score(replace(start, noise=here, fitted=fitted)).predictive
         inside.append((found.inside50, found.inside95))
     half, most = np.mean(inside, axis=0)
     assert half == pytest.approx(0.5, abs=0.02)
@@ -113,12 +113,12 @@ def test_held_out_velocities_lie_within_their_band_as_often_as_told(slope: Array
 
 def test_the_error_of_a_gain_holds_for_sections_of_unequal_size(slope: Array) -> None:
     """Sections of 40, 5, 5, 5, 5 and 5 velocities, each with a gain of its own that all of them share, 0 on average."""
-    found = rung(calibrated(measured(slope, np.zeros(slope.shape)), slope))
+    found = model_score(calibrated(measured(slope, np.zeros(slope.shape)), slope))
     sizes, random = [40, 5, 5, 5, 5, 5], np.random.default_rng(4)
     clusters = tuple(("low", name) for name, size in zip("ABCDEF", sizes, strict=True) for _ in range(size))
     held = replace(found.held_out, velocity=np.ones(len(clusters), bool), clusters=clusters)
 
-    def with_errors(errors: Array) -> Rung:
+    def with_errors(errors: Array) -> ModelScore:
         return replace(found, held_out=replace(held, sections=errors))
 
     after = with_errors(np.ones(len(clusters)))
@@ -135,7 +135,7 @@ def test_the_error_of_a_gain_holds_for_sections_of_unequal_size(slope: Array) ->
 def test_velocities_of_other_directions_judge_where_none_is_along_the_channel(slope: Array, kind: str) -> None:
     """Of speeds alone nothing was held out, and `extend --auto` could keep no effect."""
     station, values = stations(), measured(slope, np.zeros(slope.shape))
-    along, other = (rung(at_best(CASE, one, values, slope)) for one in (station, station.assign(kind=kind)))
+    along, other = (model_score(at_best(CASE, one, values, slope)) for one in (station, station.assign(kind=kind)))
     assert np.isfinite(held_out_rmse(along))
     assert held_out_rmse(other) == held_out_rmse(along)
     assert other.in_sample.velocity == along.in_sample.velocity
@@ -146,8 +146,8 @@ def test_a_ladder_of_levels_alone_tells_no_number_that_is_none(
     slope: Array, capsys: pytest.CaptureFixture[str]
 ) -> None:
     station = stations().assign(kind="level")
-    one = rung(at_best(CASE, station, measured(slope, np.zeros(slope.shape)), slope))
-    assert rung_in_short(one) == "twin, 4 parameters: no velocity"
+    one = model_score(at_best(CASE, station, measured(slope, np.zeros(slope.shape)), slope))
+    assert model_score_in_short(one) == "twin, 4 parameters: no velocity"
     show_ladder(Comparison((one, one), pd.DataFrame()))
     told = capsys.readouterr().out
     assert "nan" not in told

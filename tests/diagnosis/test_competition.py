@@ -7,9 +7,9 @@ import pytest
 
 from vegglue.calibration import score_test
 from vegglue.diagnosis import competition
-from vegglue.diagnosis.competition import contenders_of
+from vegglue.diagnosis.competition import hypotheses_of
 from vegglue.diagnosis.rivals import followed_further, with_chances
-from vegglue.diagnosis.tempered_chances import tempered_chances, tempered_odds
+from vegglue.diagnosis.tempered_probabilities import tempered_odds, tempered_probabilities
 from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
 
@@ -30,20 +30,20 @@ def test_the_likeliest_rival_is_true_as_often_as_told() -> None:
     for _ in range(tries):
         true, length = int(random.integers(PRINTS)), random.uniform(3.0, 9.0)
         residual = length * projected.units[:, true] + random.standard_normal(ROWS + SLOPES)
-        chance = tempered_chances(0.5 * (projected.units.T @ residual) ** 2, trace_error=0.0)
+        chance = tempered_probabilities(0.5 * (projected.units.T @ residual) ** 2, trace_error=0.0)
         told, right = told + chance.max(), right + (int(np.argmax(chance)) == true)
     assert told == pytest.approx(right, abs=0.03 * tries)
 
 
 def test_a_long_trace_may_be_as_wrong_as_its_length_says() -> None:
     """15 % of a fingerprint of 40 standard errors are 6: a misfit 37 larger proves as little as 1 for a short one."""
-    assert tempered_chances(0.5 * np.array([1637.0, 1600.0]))[1] == pytest.approx(0.378, abs=0.001)
-    assert tempered_chances(0.5 * np.array([1.0, 0.0]))[1] == pytest.approx(0.378, abs=0.001)
-    assert tempered_chances(0.5 * np.array([46.0, 9.0]))[1] < 1e-5
+    assert tempered_probabilities(0.5 * np.array([1637.0, 1600.0]))[1] == pytest.approx(0.378, abs=0.001)
+    assert tempered_probabilities(0.5 * np.array([1.0, 0.0]))[1] == pytest.approx(0.378, abs=0.001)
+    assert tempered_probabilities(0.5 * np.array([46.0, 9.0]))[1] < 1e-5
 
 
 def test_odds_are_those_of_the_chances_of_two() -> None:
-    one, other = tempered_chances(np.array([46.0, 39.0]))
+    one, other = tempered_probabilities(np.array([46.0, 39.0]))
     assert tempered_odds(46.0, 39.0) == pytest.approx(one / other)
     assert tempered_odds(39.0, 46.0) == pytest.approx(other / one)
     assert np.isfinite(tempered_odds(1e5, 0.0))
@@ -96,7 +96,7 @@ def test_what_promised_most_and_keeps_less_leaves_room_for_others(
     columns, candidates = [np.array([j]) for j in range(3)], [SimpleNamespace(name=name) for name in "abc"]
     fingerprints = SimpleNamespace(candidates=candidates, columns=columns, places=())
     screening = SimpleNamespace(kinds=(kind,), fingerprints=fingerprints, instruments={}, search=None)
-    found = contenders_of(screening, silent)
+    found = hypotheses_of(screening, silent)
     assert "".join(tried) == refitted
     assert {one.name for one in found} == set(refitted) - ({"a"} if kept is None else set())
 
@@ -110,4 +110,4 @@ def test_without_a_listed_effect_all_else_competes(monkeypatch: pytest.MonkeyPat
     screening = SimpleNamespace(
         kinds=(none, gauge), fingerprints=fingerprints, instruments={"gauge": ("the gauge",)}, search=None
     )
-    assert [one.what for one in contenders_of(screening, silent)] == ["the gauge"]
+    assert [one.what for one in hypotheses_of(screening, silent)] == ["the gauge"]

@@ -6,9 +6,9 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from diagnoses import NOTHING, a_location, a_suspect, laws_suspected_of
+from diagnoses import NOTHING, a_candidate_effect, an_anomaly, candidate_laws_of
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
-from verdicts import grounds, step
+from verdicts import inputs, step
 
 from vegglue.calibration.candidates import with_effect
 from vegglue.calibration.noise import with_correlation, with_grid_error
@@ -17,8 +17,8 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.decision_constants import constants
 from vegglue.diagnosis import conclusion
 from vegglue.diagnosis.child_config import candidate_at
-from vegglue.diagnosis.conclusion import estimated_errors, misfit_of, standing_out
-from vegglue.diagnosis.findings import Findings, Undecided
+from vegglue.diagnosis.conclusion import estimated_errors, misfit_of, significant_effects
+from vegglue.diagnosis.search_state import SearchState, Undecided
 
 
 @pytest.mark.parametrize(("kinds", "told"), [(("velocity", "discharge"), 0.001), (("level", "discharge"), np.nan)])
@@ -29,7 +29,7 @@ def test_the_error_of_the_grid_is_that_of_velocities(kinds: tuple[str, str], tol
     base = at_best(CASE_OF_TWINS, station, np.zeros(len(station)), np.zeros((len(station), 2)))
     difference = np.where(station["kind"] == "velocity", 0.001, 0.02) / constants().grid_error_share
     screening: Any = SimpleNamespace(base=replace(base, noise=with_grid_error(base.noise, difference)))
-    assert estimated_errors(screening, Findings()).grid_error == pytest.approx(told, nan_ok=True)
+    assert estimated_errors(screening, SearchState()).grid_error == pytest.approx(told, nan_ok=True)
 
 
 def test_where_a_law_takes_the_place_of_a_place_effects_are_those_of_the_model_without_it(
@@ -39,26 +39,29 @@ def test_where_a_law_takes_the_place_of_a_place_effects_are_those_of_the_model_w
     station = stations_of(CASE_OF_TWINS, ("A",), 4)
     bases = [at_best(CASE_OF_TWINS, station, np.full(12, value), np.zeros((12, 4))) for value in (0.1, 0.2)]
     first, last = (cast("Screening", SimpleNamespace(base=base)) for base in bases)
-    laws, judged = laws_suspected_of("law_bank_speed_step", chance=0.99), []
+    laws, make_verdict = candidate_laws_of("law_bank_speed_step", chance=0.99), []
     stubs = {
-        "laws_suspected": lambda *_: laws, "suspects_of": lambda one: {"wind": tested[one is first]},
+        "candidate_laws": lambda *_: laws, "candidate_effects_of": lambda one: {"wind": tested[one is first]},
         "misfit_of": lambda *_: NOTHING.misfit, "_field": lambda *_: (None, None), "_first_screening": lambda _: None,
         "_place_map": lambda *_: None, "_parameters": lambda *_: None,
-        "_grounds": lambda used, held, *_: judged.append((used, held)) or grounds(),
-        "judged": lambda *_: NOTHING.verdict,
+        "_inputs": lambda used, held, *_: make_verdict.append((used, held)) or inputs(),
+        "make_verdict": lambda *_: NOTHING.verdict,
     }  # fmt: skip
-    tested = {True: a_suspect("wind", test={"score": 0.3}), False: a_suspect("wind", test={"score": 4.0})}
+    tested = {
+        True: a_candidate_effect("wind", test={"score": 0.3}),
+        False: a_candidate_effect("wind", test={"score": 4.0}),
+    }
     for name, stub in stubs.items():
         monkeypatch.setattr(conclusion, name, stub)
-    held = Findings(places=(a_location(),), undecided=Undecided((), ()))
-    found = conclusion.concluded(first, last, held, {"wind": tested[False]}, None, lambda: None)
-    assert judged == [(first, Findings())]  # what competed beside the place was told beside the law
-    assert (found.places, found.suspects) == ((), (tested[True],))
+    held = SearchState(places=(an_anomaly(),), undecided=Undecided((), ()))
+    found = conclusion.assemble_diagnosis(first, last, held, {"wind": tested[False]}, None, lambda: None)
+    assert make_verdict == [(first, SearchState())]  # what competed beside the place was told beside the law
+    assert (found.places, found.candidate_effects) == ((), (tested[True],))
 
 
 def test_a_place_is_told_with_its_amplitude_in_the_last_model() -> None:
     """The sentence told that of its refit, and the table of parameters that of the last calibration."""
-    place = a_location()
+    place = an_anomaly()
     one = candidate_at(CASE_OF_TWINS, place)
     case = with_effect(CASE_OF_TWINS, one, place.shapes)
     slopes = np.zeros((12, len(case.parameters)))
@@ -77,8 +80,8 @@ def test_what_stands_out_in_the_last_model_is_kept_unless_it_is_in_it() -> None:
         best_score=lambda j: [-4.0, 3.5, 5.0][j],
         effects=SimpleNamespace(p_of=lambda score: {4.0: 0.008, 3.5: 0.02, 5.0: 0.001}.get(score, 0.3)),
     )  # fmt: skip
-    assert standing_out(last, Findings(steps=(step("jet"),))) == {"wind": 0.008}
-    assert standing_out(last, Findings(steps=(step("jet"),)), slack=1.0) == {}
+    assert significant_effects(last, SearchState(steps=(step("jet"),))) == {"wind": 0.008}
+    assert significant_effects(last, SearchState(steps=(step("jet"),)), slack=1.0) == {}
 
 
 def test_a_misfit_is_told_in_the_errors_of_the_last_model() -> None:

@@ -30,7 +30,7 @@ def model() -> Model:
 
 
 @pytest.fixture(scope="module")
-def grounds(model: Model) -> list[TwinBase]:
+def inputs(model: Model) -> list[TwinBase]:
     return [twin_base(model, true_place(len(model.names), seed)) for seed in (2, 6)]
 
 
@@ -39,13 +39,13 @@ def diagnosed(ground: TwinBase, station: pd.DataFrame) -> Diagnosis:
     return diagnose_model(replace(ground.model, station=station))
 
 
-def drawn_sets(grounds: list[TwinBase], snr: float, seed: int) -> Iterator[tuple[str, Diagnosis]]:
+def drawn_sets(inputs: list[TwinBase], snr: float, seed: int) -> Iterator[tuple[str, Diagnosis]]:
     """Effects in an order drawn by a seed, those left out that cannot be made as visible, and what is said of each."""
-    model = grounds[0].model
+    model = inputs[0].model
     names = [one.name for one in candidates_of(model.case, model.station)]
     number = 0
     for name in np.random.default_rng(seed).permutation(names):
-        ground = grounds[number % 2]
+        ground = inputs[number % 2]
         try:
             station, _ = measured_twin(ground, (str(name),), snr, "white", number)
         except VisibilityError:
@@ -55,31 +55,31 @@ def drawn_sets(grounds: list[TwinBase], snr: float, seed: int) -> Iterator[tuple
 
 
 @pytest.mark.parametrize("noise", ["white", "ar1:0.5"])
-def test_false_alarms_are_rare(grounds: list[TwinBase], noise: str) -> None:
+def test_false_alarms_are_rare(inputs: list[TwinBase], noise: str) -> None:
     """Of 8 at most 2: at 5 % that fails once in 170 times, at 38 % (correlation ignored) twice in three."""
     alarms = 0
     for seed in range(8):
-        station, _ = measured_twin(grounds[seed % 2], (), 0.0, noise, seed)
-        found = diagnosed(grounds[seed % 2], station)
+        station, _ = measured_twin(inputs[seed % 2], (), 0.0, noise, seed)
+        found = diagnosed(inputs[seed % 2], station)
         alarms += bool(found.steps or found.places or found.instruments or found.field)
     assert alarms <= 2
 
 
-def test_plain_effects_are_found(grounds: list[TwinBase]) -> None:
+def test_plain_effects_are_found(inputs: list[TwinBase]) -> None:
     """At a ratio of 8, where chance hides next to nothing, 5 of 6 sets hold the truth and are small."""
-    said = list(islice(drawn_sets(grounds, 8.0, seed=1), 6))
+    said = list(islice(drawn_sets(inputs, 8.0, seed=1), 6))
     good = [name for name, found in said if found.steps and name in found.set and len(found.steps[0].groups) <= 3]
     assert len(good) >= 5, {name: found.set for name, found in said}
 
 
-def test_what_hides_is_listed(grounds: list[TwinBase]) -> None:
+def test_what_hides_is_listed(inputs: list[TwinBase]) -> None:
     """At a ratio of 3, 4 of 6 are named or not excluded: nine of ten should be, which fails once in 60 times."""
-    said = list(islice(drawn_sets(grounds, 3.0, seed=2), 6))
+    said = list(islice(drawn_sets(inputs, 3.0, seed=2), 6))
     listed = [name for name, found in said if name in {*found.set, *sum(found.verdict.not_excluded, ())}]
     assert len(listed) >= 4, {name: found.verdict.sentence for name, found in said}
 
 
-def test_what_is_in_no_list_is_not_given_a_name(grounds: list[TwinBase]) -> None:
-    station, _ = measured_twin(grounds[0], ("unlisted:pier",), 15.0, "white", 3)
-    found = diagnosed(grounds[0], station)
+def test_what_is_in_no_list_is_not_given_a_name(inputs: list[TwinBase]) -> None:
+    station, _ = measured_twin(inputs[0], ("unlisted:pier",), 15.0, "white", 3)
+    found = diagnosed(inputs[0], station)
     assert found.verdict.kind in ("none-of-these", "cannot-tell"), found.verdict.sentence

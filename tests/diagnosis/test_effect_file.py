@@ -206,17 +206,17 @@ def test_nothing_is_written_where_no_law_is_new(
 
 def test_what_a_diagnosis_set_aside_has_no_say(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """As in every other verb that compares models."""
-    case, judged = load_case(CONFIG), list[pd.DataFrame]()
+    case, make_verdict = load_case(CONFIG), list[pd.DataFrame]()
     first = read_observations(case).table.iloc[[0]]
     monkeypatch.setattr(verb, "set_aside_of", lambda *_: first[MEASUREMENT])
 
     def discover_laws(model: Model, *_: object) -> Discovery:
-        judged.append(model.station)
+        make_verdict.append(model.station)
         return Discovery(0.4, 44, (), {})
 
     monkeypatch.setattr(verb, "discover_laws", discover_laws)
     found = discover(case, runs=tmp_path)
-    assert (~judged[0]["used"]).to_numpy().nonzero()[0].tolist() == [0]
+    assert (~make_verdict[0]["used"]).to_numpy().nonzero()[0].tolist() == [0]
     assert found.aside.startswith("1 station is left out of every model")
 
 

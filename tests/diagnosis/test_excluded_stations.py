@@ -85,7 +85,7 @@ def test_compare_leaves_out_what_a_diagnosis_has_flagged(
         assert ("left out of every model" in capsys.readouterr().out) == bool(flagged)
         compare_command([CONFIG, child.source], runs=runs, as_object=True)
         told = json.loads(capsys.readouterr().out)
-        assert [rung["stations"] for rung in told["rungs"]] == [stations - said] * 2
+        assert [score["stations"] for score in told["rungs"]] == [stations - said] * 2
         assert len(told["left_out"]) == said
 
 

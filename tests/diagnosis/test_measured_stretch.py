@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 from linear_baseline import CASE_OF_TWINS
-from verdicts import grounds, said, step
+from verdicts import inputs, said, step
 
 from vegglue.case.schema import Case, EffectEntry
 from vegglue.diagnosis.measured_stretch import stretch_in_words
@@ -54,5 +54,5 @@ def test_readings_that_are_not_used_do_not_count() -> None:
 
 def test_the_verdict_remarks_on_it() -> None:
     words = "Velocities were measured from x = 36 to 50 m only."
-    assert words in said(grounds(step("wind"), stretch=words))[2]
-    assert "Velocities" not in said(grounds(step("wind")))[2]
+    assert words in said(inputs(step("wind"), stretch=words))[2]
+    assert "Velocities" not in said(inputs(step("wind")))[2]

@@ -6,9 +6,9 @@ from typing import Any, cast
 import pytest
 
 from vegglue.diagnosis import diagnose
-from vegglue.diagnosis.competition import Contender
+from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.conclusion import field_goes_first
-from vegglue.diagnosis.findings import Charge, Findings
+from vegglue.diagnosis.search_state import PriorWeight, SearchState
 from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
 
@@ -34,19 +34,19 @@ def test_the_error_of_its_shape_takes_nothing_from_what_a_place_explained(
     monkeypatch.setattr(diagnose, "log_evidence", lambda base: base.log_evidence)
     monkeypatch.setattr(diagnose, "_without_error_of_shape", lambda *_: 21.0)
     monkeypatch.setattr(diagnose, "chi2", lambda *_: 287.0)
-    monkeypatch.setattr(diagnose, "location_found", lambda *_: SimpleNamespace())
+    monkeypatch.setattr(diagnose, "anomaly_found", lambda *_: SimpleNamespace())
     monkeypatch.setattr(diagnose, "step_found", lambda *_: SimpleNamespace(accepted="a", groups=()))
     what: Any = SimpleNamespace(log_factor=21.0)
     screening: Any = SimpleNamespace(base=before)
-    following = diagnose._branch(screening, [Contender(kind, "a", 10.0, 0, what)], 0, Findings(), silent)
+    following = diagnose._branch(screening, [Hypothesis(kind, "a", 10.0, 0, what)], 0, SearchState(), silent)
     assert following is not None
     assert following.found.gained(0.0, 5.0) == pytest.approx(gained)
 
 
 def test_an_instrument_that_explains_less_than_nothing_is_not_set_aside() -> None:
-    one = Contender("reading", "reading", -0.1, 0, SimpleNamespace())
+    one = Hypothesis("reading", "reading", -0.1, 0, SimpleNamespace())
     screening: Any = SimpleNamespace(base=None)
-    assert diagnose._without_instrument(screening, one, cast("Any", one.what), Findings(), silent) is None
+    assert diagnose._without_instrument(screening, one, cast("Any", one.what), SearchState(), silent) is None
 
 
 def step_of(name: str) -> Step:
@@ -54,8 +54,12 @@ def step_of(name: str) -> Step:
 
 
 def test_an_effect_explains_what_those_did_that_it_makes_unneeded() -> None:
-    charges = (Charge("wind", 40.0, -6.0), Charge("reading", 0.0, -3.0), Charge("elder", 9.0, -5.0))
-    found = Findings(steps=(step_of("wind"), step_of("elder")), charges=charges)
+    prior_weights = (
+        PriorWeight("wind", 40.0, -6.0),
+        PriorWeight("reading", 0.0, -3.0),
+        PriorWeight("elder", 9.0, -5.0),
+    )
+    found = SearchState(steps=(step_of("wind"), step_of("elder")), prior_weights=prior_weights)
     assert (found.explained, found.log_prior) == (49.0, -14.0)
     more = diagnose._with_step(found, step_of("undergrowth"), ["wind"], 11.0, -7.0)
     assert [one.accepted for one in more.steps] == ["elder", "undergrowth"]
@@ -63,7 +67,9 @@ def test_an_effect_explains_what_those_did_that_it_makes_unneeded() -> None:
 
 
 def test_a_rival_keeps_the_charge_of_the_effect_that_it_replaces() -> None:
-    found = Findings(steps=(step_of("wind"),), charges=(Charge("wind", 40.0, -6.0), Charge("gauge", 0.0, -1.0)))
+    found = SearchState(
+        steps=(step_of("wind"),), prior_weights=(PriorWeight("wind", 40.0, -6.0), PriorWeight("gauge", 0.0, -1.0))
+    )
     again = diagnose._with_steps(found, (step_of("elder"),))
-    assert [one.name for one in again.charges] == ["elder", "gauge"]
+    assert [one.name for one in again.prior_weights] == ["elder", "gauge"]
     assert diagnose._with_step(again, step_of("undergrowth"), ["elder"], 1.0, -7.0).log_prior == -8.0

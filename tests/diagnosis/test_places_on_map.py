@@ -1,16 +1,16 @@
 """Places that were found are told where they lie on the map, if the case knows one."""
 
 import pytest
-from diagnoses import a_location
+from diagnoses import an_anomaly
 from linear_baseline import CASE_OF_TWINS
-from verdicts import grounds, said
+from verdicts import inputs, said
 
 from vegglue.case.frame import Frame
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import CentrelineShape
 from vegglue.diagnosis.causes_in_words import places_told
-from vegglue.diagnosis.findings import Findings
 from vegglue.diagnosis.places_on_map import places_on_map_in_words
+from vegglue.diagnosis.search_state import SearchState
 
 
 def on_a_map(frame: Frame | None, centreline: CentrelineShape | None = None) -> Case:
@@ -34,7 +34,7 @@ def test_a_place_is_told_on_the_map(frame: Frame | None, centreline: CentrelineS
 
 
 def test_it_stands_beside_what_was_found() -> None:
-    place = a_location()
-    assert places_told(Findings(places=(place,))) == [(place.x, place.y)]
+    place = an_anomaly()
+    assert places_told(SearchState(places=(place,))) == [(place.x, place.y)]
     words = "On the map lies x = 10.0, y = 2.0 m at 154998.0, 463010.0."
-    assert words in said(grounds(on_map=words))[2]
+    assert words in said(inputs(on_map=words))[2]

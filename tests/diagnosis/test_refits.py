@@ -16,10 +16,10 @@ from vegglue.calibration.candidates import Candidate, with_effect
 from vegglue.calibration.fit import covariance
 from vegglue.case.parameter_space import theta_at, z_of
 from vegglue.diagnosis import refits
-from vegglue.diagnosis.competition import Contender, chances_of
+from vegglue.diagnosis.competition import Hypothesis, chances_of
 from vegglue.diagnosis.refits import RefitTrial
 from vegglue.diagnosis.rivals import rivals_among
-from vegglue.diagnosis.tempered_chances import tempering
+from vegglue.diagnosis.tempered_probabilities import tempering
 from vegglue.effects.library import library
 
 Kept = tuple[dict[str, float], tuple[tuple[str, ...], ...]]
@@ -30,7 +30,7 @@ def kept(fall: list[float], alike: dict[tuple[int, int], float]) -> Kept:
     cosine = np.eye(len(fall))
     for (i, j), value in alike.items():
         cosine[i, j] = cosine[j, i] = value
-    chance = chances_of([Contender("effect", "abcdef"[j], 0.5 * one, j, None) for j, one in enumerate(fall)])
+    chance = chances_of([Hypothesis("effect", "abcdef"[j], 0.5 * one, j, None) for j, one in enumerate(fall)])
     return rivals_among("abcdef"[: len(fall)], chance, cosine)
 
 
@@ -89,7 +89,7 @@ def test_what_the_data_no_longer_need_is_dropped(
 
 def test_chances_are_those_of_the_evidence_where_little_is_explained() -> None:
     """Odds e^1, but for fingerprints that may be wrong."""
-    chance = chances_of([Contender("effect", name, size, 0, None) for name, size in (("a", 1.0), ("b", 0.0))])
+    chance = chances_of([Hypothesis("effect", name, size, 0, None) for name, size in (("a", 1.0), ("b", 0.0))])
     assert chance.sum() == pytest.approx(1.0)
     assert chance[0] / chance[1] == pytest.approx(np.e, rel=0.01)
     assert tempering(np.array([-5.0, 0.0])) == pytest.approx(1.0)
@@ -97,14 +97,14 @@ def test_chances_are_those_of_the_evidence_where_little_is_explained() -> None:
 
 def test_long_traces_may_be_wrong_and_prove_less() -> None:
     """With 15 % of error, evidence of 800 counts w = 37 times less: 37 more are odds of e^1."""
-    chance = chances_of([Contender("effect", name, size, 0, None) for name, size in (("a", 800.0), ("b", 763.0))])
+    chance = chances_of([Hypothesis("effect", name, size, 0, None) for name, size in (("a", 800.0), ("b", 763.0))])
     assert chance[0] / chance[1] == pytest.approx(np.e, rel=0.1)
     ratios = [a / b for b, a in pairwise(tempering(np.array([0.0, 10.0, 100.0, 1000.0])))]
     assert all(ratio > 1.0 for ratio in ratios)
 
 
 def test_chances_do_not_hang_on_the_order() -> None:
-    made = [Contender("effect", name, size, 0, None) for name, size in (("a", 3.0), ("b", 9.0), ("c", -4.0))]
+    made = [Hypothesis("effect", name, size, 0, None) for name, size in (("a", 3.0), ("b", 9.0), ("c", -4.0))]
     assert chances_of(made[::-1])[::-1] == pytest.approx(chances_of(made))
 
 

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from coarse_twin import coarse_twin
-from diagnoses import a_suspect
+from diagnoses import a_candidate_effect
 
 from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.calibration.residual_screening import screen
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.diagnosis import rivals_again
+from vegglue.diagnosis.candidate_effects import candidate_effects_of
 from vegglue.diagnosis.child_config import candidate_named, with_additions
-from vegglue.diagnosis.competition import Contender
+from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.rivals_again import Again, with_rivals_again
-from vegglue.diagnosis.suspects import suspects_of
 from vegglue.engine.interface import Model, linearise
 from vegglue.progress import silent
 from vegglue.results.diagnosis import Step
@@ -65,7 +65,7 @@ def measured() -> Model:
 def again(measured: Model) -> Again:
     """What was taken for the first, with the second in the model, compared again."""
     base = baseline(with_effects(measured, TAKEN, LATER))
-    return with_rivals_again(base, (a_step(TAKEN),), (), suspects_of(screen(baseline(measured))), silent)
+    return with_rivals_again(base, (a_step(TAKEN),), (), candidate_effects_of(screen(baseline(measured))), silent)
 
 
 @pytest.mark.slow
@@ -85,21 +85,21 @@ def test_what_was_accepted_later_is_no_rival(again: Again) -> None:
 
 @pytest.mark.slow
 def test_rivals_have_the_amplitudes_of_their_refits(again: Again) -> None:
-    _, (step,), suspects = again
-    assert all(suspects[name].amplitude.refitted for name in step.rivals)
-    assert suspects[TRUE].amplitude.value == pytest.approx(HIDDEN[TRUE], rel=0.3)
+    _, (step,), candidate_effects = again
+    assert all(candidate_effects[name].amplitude.refitted for name in step.rivals)
+    assert candidate_effects[TRUE].amplitude.value == pytest.approx(HIDDEN[TRUE], rel=0.3)
 
 
 @pytest.mark.slow
 def test_an_effect_is_in_the_model_with_the_shapes_that_are_told() -> None:
     """It stayed 1.2 m wide there, and was told, and added to the child config, with a width of 0.3 m."""
     model = measured_with({TAKEN: 0.3}, 0.3)
-    known = suspects_of(screen(baseline(model)))
-    base, (step,), suspects = with_rivals_again(
+    known = candidate_effects_of(screen(baseline(model)))
+    base, (step,), candidate_effects = with_rivals_again(
         baseline(of_width(model, TAKEN, 1.2)), (a_step(TAKEN),), (), known, silent
     )
     assert step.accepted == TAKEN
-    assert suspects[TAKEN].shapes == {"width": 0.3}
+    assert candidate_effects[TAKEN].shapes == {"width": 0.3}
     assert base.model.case.effects[TAKEN].values["width"] == 0.3
 
 
@@ -109,9 +109,9 @@ def test_a_step_stays_where_no_flow_is_found(lost: str, monkeypatch: pytest.Monk
     monkeypatch.setattr(rivals_again, "candidate_in_case", lambda *_: None)
     monkeypatch.setattr(rivals_again, "without_effect", lambda *_: less)
     monkeypatch.setattr(rivals_again, "screen", lambda *_: "screening")
-    monkeypatch.setattr(rivals_again, "contenders_of", lambda *_: [Contender("probe", "probe", 1.0, 0, None)])
+    monkeypatch.setattr(rivals_again, "hypotheses_of", lambda *_: [Hypothesis("probe", "probe", 1.0, 0, None)])
     base = Baseline(*coarse_twin()[:1], None, None, None, None)
-    known = {TAKEN: a_suspect(TAKEN)}
+    known = {TAKEN: a_candidate_effect(TAKEN)}
     assert with_rivals_again(base, (a_step(TAKEN),), (), known, silent) == (base, (a_step(TAKEN),), known)
 
 

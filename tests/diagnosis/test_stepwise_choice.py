@@ -8,7 +8,7 @@ import pytest
 
 from vegglue.diagnosis.comparison import By
 from vegglue.diagnosis.stepwise_choice import WAYS, Choice, Names, Nominee, chosen, why_not_kept
-from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
+from vegglue.results.model_score import HeldOut, InSample, ModelScore, PredictiveScores
 
 STATIONS = 12
 EXPERIMENTS = ("low", "high")
@@ -18,10 +18,10 @@ A, B, C = ("a",), ("b",), ("c",)
 Errors = tuple[float, float]
 
 
-def a_rung(errors: Errors, amplitudes: Mapping[str, float], seen: float, spread: float = 0.0) -> Rung:
+def a_model_score(errors: Errors, amplitudes: Mapping[str, float], seen: float, spread: float = 0.0) -> ModelScore:
     """Amplitudes have a standard error of 1; spread: from station to station, of the errors."""
     uneven = spread * np.resize([1.0, -1.0], STATIONS)
-    return Rung(
+    return ModelScore(
         name="+".join(amplitudes), title="", effects=tuple(amplitudes),
         values={name: (value, value - 1.96, value + 1.96) for name, value in amplitudes.items()},
         in_sample=InSample({}, seen, STATIONS, 0.01),
@@ -42,14 +42,14 @@ def choice(
 ) -> Choice:
     """Of models by the names in them, None where there is no flow; small: which amplitude is none in which model."""
 
-    def rung_with(names: Names) -> Rung | None:
+    def score_with(names: Names) -> ModelScore | None:
         errors = models[names]
         if errors is None:
             return None
         amplitudes = {name: 0.5 if (small or {}).get(names) == name else 9.0 for name in names}
-        return a_rung(errors, amplitudes, seen=sum(errors), spread=spread if names else 0.0)
+        return a_model_score(errors, amplitudes, seen=sum(errors), spread=spread if names else 0.0)
 
-    return chosen([Nominee(name, name, 0.0) for name in named], rung_with, clearly)
+    return chosen([Nominee(name, name, 0.0) for name in named], score_with, clearly)
 
 
 def test_what_helps_by_itself_is_added_one_after_the_other() -> None:
@@ -91,10 +91,10 @@ def test_a_fall_that_cannot_be_told_from_none_is_told_as_such() -> None:
     assert choice(models, A, spread=0.1).unclear == {}
     errors = {PARENT: (4.0, 4.0), A: (1.0, 1.0), B: (4.0, 4.0), A + B: (0.9, 0.9)}
 
-    def rung_with(names: Names) -> Rung:
-        return a_rung(errors[names], dict.fromkeys(names, 9.0), sum(errors[names]), 0.3 if "b" in names else 0.0)
+    def score_with(names: Names) -> ModelScore:
+        return a_model_score(errors[names], dict.fromkeys(names, 9.0), sum(errors[names]), 0.3 if "b" in names else 0.0)
 
-    both = chosen([Nominee(name, name, 0.0) for name in A + B], rung_with)
+    both = chosen([Nominee(name, name, 0.0) for name in A + B], score_with)
     assert (both.stages[-1], list(both.unclear)) == (A + B, ["b"]), "what did the work is not in doubt"
     joint = choice({PARENT: (4, 4), A: (5, 5), B: (5, 5), A + B: (1, 1)})
     assert (joint.stages[-1], joint.unclear) == (A + B, {}), "together they clearly help"
@@ -130,7 +130,7 @@ def test_what_cannot_be_judged_is_not_added() -> None:
 
 
 def test_levels_alone_are_not_called_one_section() -> None:
-    gauges = a_rung((np.nan, np.nan), {"a": 9.0}, seen=1.0)
+    gauges = a_model_score((np.nan, np.nan), {"a": 9.0}, seen=1.0)
     gauges = replace(gauges, held_out=replace(gauges.held_out, velocity=np.zeros(STATIONS, bool)))
     assert why_not_kept(gauges, gauges, False, {}) == "there is nothing to hold out: no velocity"
 
@@ -147,10 +147,12 @@ def test_what_is_vaguer_has_to_be_clearly_better(with_b: Errors, spread: float, 
     """b is vague, and may be it instead of a: with b, a is needed no more."""
     models = {PARENT: (4.0, 4.0), A: (3.0, 3.0), B: with_b, A + B: with_b}
 
-    def rung_with(names: Names) -> Rung:
-        return a_rung(models[names], dict.fromkeys(names, 9.0), sum(models[names]), spread if "b" in names else 0.0)
+    def score_with(names: Names) -> ModelScore:
+        return a_model_score(
+            models[names], dict.fromkeys(names, 9.0), sum(models[names]), spread if "b" in names else 0.0
+        )
 
-    made = chosen([Nominee("a", "a", 0.0), Nominee("b", "b", 0.0, instead_of="a")], rung_with)
+    made = chosen([Nominee("a", "a", 0.0), Nominee("b", "b", 0.0, instead_of="a")], score_with)
     assert made.stages == (PARENT, kept)
     (refused,) = made.refused
     assert refused == ("b" if kept == A else "a")
@@ -159,7 +161,7 @@ def test_what_is_vaguer_has_to_be_clearly_better(with_b: Errors, spread: float, 
 @pytest.mark.parametrize(("by", "group"), [("experiments", "high"), ("sections", "D0")])
 def test_what_acts_in_one_group_is_not_judged_there(by: By, group: str) -> None:
     """There it is not known, and errors rise; where it is, they fall."""
-    parent, child = (a_rung((3.0, 3.0), {}, 6.0), a_rung((3.0, 3.0), {"a": 9.0}, 1.0))
+    parent, child = (a_model_score((3.0, 3.0), {}, 6.0), a_model_score((3.0, 3.0), {"a": 9.0}, 1.0))
     there = np.array([group in pair for pair in child.held_out.clusters])
     errors = {name: np.where(there, 9.0, 2.0) if name == by else getattr(child.held_out, name) for name in WAYS}
     child = replace(child, held_out=replace(child.held_out, **errors))
@@ -187,7 +189,7 @@ def test_a_larger_fall_one_way_outweighs_a_rise_that_is_not_clear(
     sections: float, uneven: float, kept: tuple[Names, ...]
 ) -> None:
     spread = np.resize([1.0, -1.0], STATIONS)
-    child = a_rung((sections, 3.0), {"a": 9.0}, 1.0)
+    child = a_model_score((sections, 3.0), {"a": 9.0}, 1.0)
     errors = {"sections": sections + 0.1 * spread, "experiments": np.hypot(3.1 + uneven * spread, 0.0)}
-    models = {PARENT: a_rung((3.0, 3.0), {}, 6.0), A: replace(child, held_out=replace(child.held_out, **errors))}
+    models = {PARENT: a_model_score((3.0, 3.0), {}, 6.0), A: replace(child, held_out=replace(child.held_out, **errors))}
     assert chosen([Nominee("a", "a", 0.0)], lambda names: models[names]).stages == kept

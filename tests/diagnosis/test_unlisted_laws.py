@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from diagnoses import a_location, laws_suspected_of
+from diagnoses import an_anomaly, candidate_laws_of
 
 from vegglue.case.config import load_case
 from vegglue.decision_constants import constants
 from vegglue.diagnosis import unlisted_laws
 from vegglue.diagnosis.diagnose import diagnose_model
-from vegglue.diagnosis.findings import Charge, Findings
-from vegglue.diagnosis.unlisted_laws import clearly_a_law, laws_beside, laws_suspected
+from vegglue.diagnosis.search_state import PriorWeight, SearchState
+from vegglue.diagnosis.unlisted_laws import candidate_laws, clearly_a_law, laws_beside
 from vegglue.effects.grammar import LAWS
-from vegglue.results.causes import LawsSuspected
+from vegglue.results.causes import CandidateLaws
 from vegglue.results.diagnosis import Step
 from vegglue.workflow.run_folder import model_in
 from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
@@ -27,8 +27,8 @@ NAMES = ("law_bank_speed_step", "law_bank_speed_ramp", "law_floor_along_trend")
 
 
 def suspected(
-    patched: pytest.MonkeyPatch, found: Findings, p: float = 1e-3, rivals: tuple[float, ...] = (0.0,)
-) -> LawsSuspected | None:
+    patched: pytest.MonkeyPatch, found: SearchState, p: float = 1e-3, rivals: tuple[float, ...] = (0.0,)
+) -> CandidateLaws | None:
     """What is said of three laws of ln evidence 9, 7 and 1, with this alarm, beside kinds of these ln evidences."""
     laws = [SimpleNamespace(law=LAWS[name], candidate=SimpleNamespace(amplitude=LAWS[name].effect.amplitude))
             for name in NAMES]  # fmt: skip
@@ -41,11 +41,11 @@ def suspected(
     kinds = tuple(SimpleNamespace(total=one) for one in rivals)
     base = SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None)))
     last: Any = SimpleNamespace(base=base, flagged=(), fingerprints=None, kinds=kinds)
-    return laws_suspected(last, last, found, partial(laws_beside, last))
+    return candidate_laws(last, last, found, partial(laws_beside, last))
 
 
 def test_laws_are_told_that_hold_their_chance_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    laws = suspected(monkeypatch, Findings())
+    laws = suspected(monkeypatch, SearchState())
     assert laws is not None
     assert [one.name for one in laws.laws] == list(NAMES[:2])
     assert laws.chance > 0.95
@@ -58,26 +58,26 @@ def test_where_no_law_has_anything_to_act_on_none_is_told(monkeypatch: pytest.Mo
     last: Any = SimpleNamespace(base=SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None))),
                                 fingerprints=None)  # fmt: skip
     monkeypatch.setattr(unlisted_laws, "law_fingerprints", lambda *_: SimpleNamespace(laws=[]))
-    assert laws_suspected(last, last, Findings(), partial(laws_beside, last)) is None
+    assert candidate_laws(last, last, SearchState(), partial(laws_beside, last)) is None
 
 
 def test_laws_compete_with_what_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    laws = suspected(monkeypatch, Findings(), rivals=(0.0, 20.0))
+    laws = suspected(monkeypatch, SearchState(), rivals=(0.0, 20.0))
     assert laws is not None
     assert laws.chance < 0.1
     assert not clearly_a_law(laws)
 
 
 def test_their_alarm_keeps_its_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert suspected(monkeypatch, Findings(), p=constants().law_alarm_rate) is None
-    assert suspected(monkeypatch, Findings(absurd=("levels lie below the bed.",))) is None
+    assert suspected(monkeypatch, SearchState(), p=constants().law_alarm_rate) is None
+    assert suspected(monkeypatch, SearchState(absurd=("levels lie below the bed.",))) is None
 
 
 def test_beside_a_listed_effect_a_law_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(unlisted_laws, "log_evidence", lambda _: 0.0)
     step = Step("wind", ("wind",), (1.0,), (("wind",),), 200.0, 5.0, 1e-4)
-    assert suspected(monkeypatch, Findings(steps=(step,), charges=(Charge("any", 0.0, 8.0),))) is None
-    assert suspected(monkeypatch, Findings(steps=(step,), charges=(Charge("any", 0.0, 1.0),))) is not None
+    assert suspected(monkeypatch, SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, 8.0),))) is None
+    assert suspected(monkeypatch, SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, 1.0),))) is not None
 
 
 def test_a_place_is_compared_with_laws_by_what_it_explained(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,12 +85,14 @@ def test_a_place_is_compared_with_laws_by_what_it_explained(monkeypatch: pytest.
     monkeypatch.setattr(unlisted_laws, "log_evidence", lambda _: 0.0)
     chances = []
     for gained in (1.0, 30.0):
-        laws = suspected(monkeypatch, Findings(places=(a_location(),), charges=(Charge("any", 0.0, gained),)))
+        laws = suspected(
+            monkeypatch, SearchState(places=(an_anomaly(),), prior_weights=(PriorWeight("any", 0.0, gained),))
+        )
         assert laws is not None
         chances.append(laws.chance)
     assert chances[0] > 0.9 > 0.1 > chances[1]
-    assert clearly_a_law(laws_suspected_of("a", chance=0.92))
-    assert not clearly_a_law(laws_suspected_of("a", chance=0.9))
+    assert clearly_a_law(candidate_laws_of("a", chance=0.92))
+    assert not clearly_a_law(candidate_laws_of("a", chance=0.9))
 
 
 @pytest.mark.slow

@@ -64,7 +64,7 @@ def test_the_loop_finds_what_is_hidden(
     (tmp_path / "data").symlink_to(ROOT / "data")
     monkeypatch.chdir(tmp_path)
     names = run_code((EXAMPLES / "round_the_loop.py").read_text(encoding="utf-8"), "round_the_loop.py")
-    before, after = (rung.held_out for rung in names["comparison"].rungs)
+    before, after = (score.held_out for score in names["comparison"].model_scores)
     assert (after.sections**2).mean() < (before.sections**2).mean()
     assert "secondary_current" in names["diagnosis"].set
     assert "Comparison of 2 models" in capsys.readouterr().out

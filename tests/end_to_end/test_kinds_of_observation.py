@@ -16,7 +16,7 @@ from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.diagnosis.case_check import check_case
-from vegglue.diagnosis.comparison import held_out_rmse, rung
+from vegglue.diagnosis.comparison import held_out_rmse, model_score
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.next_measurement import worth_of_measurements
 from vegglue.engine.interface import linearise, responses
@@ -158,7 +158,7 @@ def test_both_commands_count_the_same_degrees_of_freedom(line: Line) -> None:
 
 def test_models_are_compared_and_measurements_planned(line: Line) -> None:
     base = baseline(model_of(line.case, line.observations))
-    found = rung(base)
+    found = model_score(base)
     assert found.held_out.velocity.sum() == 12, "errors in m/s are those of velocities along x"
     assert np.isfinite([held_out_rmse(found), *found.in_sample.rmse.values()]).all()
     save_ladder_figure([found], line.folder / "ladder.png")
@@ -205,7 +205,7 @@ def other(tmp_path_factory: pytest.TempPathFactory) -> Line:
 def test_speeds_and_discharges_alone_will_do(other: Line) -> None:
     """What speaks of velocities along x has nothing to say, and says so; what is held out are the speeds."""
     assert other.posterior.marginals.sd["q"] < 0.04
-    found = rung(baseline(model_of(other.case, other.observations)))
+    found = model_score(baseline(model_of(other.case, other.observations)))
     assert np.isnan([found.in_sample.rmse["velocity"], found.in_sample.rmse["level"]]).all()
     assert found.in_sample.rmse["speed"] < 0.02
     assert held_out_rmse(found) < 0.02

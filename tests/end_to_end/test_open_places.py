@@ -10,7 +10,7 @@ pytestmark = pytest.mark.slow
 
 def test_something_unlisted_is_none_of_these_and_has_a_place(campaigns: Path) -> None:
     found = looked_into("open-f", campaigns)
-    location = found.verdict.location
+    location = found.verdict.anomaly
     assert found.verdict.kind == "none-of-these", found.verdict.sentence
     assert location is not None
     assert ((location.x - 33.0) ** 2 + (location.y + 0.6) ** 2) ** 0.5 < 1.5

@@ -197,9 +197,9 @@ def test_on_the_published_set_the_surveyed_bed_halves_the_error(tmp_path: Path) 
     assert surveyed.verdict.kind in ("none-of-these", "cannot-tell"), surveyed.verdict.sentence
     assert not plane.steps
     assert plane.verdict.kind == "none-of-these", plane.verdict.sentence
-    assert plane.verdict.location is not None
-    assert abs(plane.verdict.location.x) < 0.6
-    assert plane.verdict.location.y < 0.3
+    assert plane.verdict.anomaly is not None
+    assert abs(plane.verdict.anomaly.x) < 0.6
+    assert plane.verdict.anomaly.y < 0.3
     hole = next(place for place in plane.places if place.term == "bed")
     assert (hole.x, hole.y) == (pytest.approx(0.3, abs=0.2), pytest.approx(0.2, abs=0.15))
     assert hole.interval95[0] < -0.15 < hole.interval95[1]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, a_location, an_instrument, laws_suspected_of
+from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, an_anomaly, an_instrument, candidate_laws_of
 from posteriors import a_refinement, changed
 from report_runs import a_toy, told_of, written
 
@@ -22,13 +22,13 @@ from vegglue.report.run import LoopResults, Run
 from vegglue.report.sections import safe_json
 from vegglue.report.tables import station_rows
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Diagnosis, Step
-from vegglue.results.ladder import Ladder, LadderStep
+from vegglue.results.model_comparison import ComparedModel, ModelComparison
 from vegglue.results.open_questions import ProposedMeasurement, Question
 
-FIRST = LadderStep("toy", "toy.yaml", "a", (), 4, 0.04, 0.041, 0.063, 0.039, 0.012)
-LAST = LadderStep("toy-eddies", "toy+eddies.yaml", "b", ("eddies",), 5, 0.012, 0.013, 0.014, 0.0033, 0.012)
-LADDER = Ladder((FIRST, LAST), 0, "Added: eddies.")
-STEP = Step("eddies", ("eddies",), (0.3,), (("eddies",),), 9.0, 5.0, 1e-3, {"p": 0.6}, {"p": a_location()})
+FIRST = ComparedModel("toy", "toy.yaml", "a", (), 4, 0.04, 0.041, 0.063, 0.039, 0.012)
+LAST = ComparedModel("toy-eddies", "toy+eddies.yaml", "b", ("eddies",), 5, 0.012, 0.013, 0.014, 0.0033, 0.012)
+LADDER = ModelComparison((FIRST, LAST), 0, "Added: eddies.")
+STEP = Step("eddies", ("eddies",), (0.3,), (("eddies",),), 9.0, 5.0, 1e-3, {"p": 0.6}, {"p": an_anomaly()})
 INSTRUMENTS = replace(STEP, chances=(0.55,), others={"reading": 0.3, "probe": 0.15}, places={})
 NO_EFFECT = a_diagnosis(steps=(INSTRUMENTS,), verdict={"kind": "one-of"})
 LIKELIER = a_diagnosis(steps=(STEP,), verdict={"kind": "one-of"})
@@ -60,7 +60,7 @@ def off(cleared: bool) -> Diagnosis:
         (NO_EFFECT, "Something is missing from this model: most likely (55 %) störung"),
         (NO_EFFECT, ", or no listed effect (45 %)"),
         (a_diagnosis(steps=(), verdict={"kind": "none-of-these"}), "Something is missing from this model that is in"),
-        (replace(a_diagnosis(steps=()), places=(a_location(amplitude=-0.56, x_error=6.7),),
+        (replace(a_diagnosis(steps=()), places=(an_anomaly(amplitude=-0.56, x_error=6.7),),
                  verdict=replace(NOTHING.verdict, kind="none-of-these")),
          "less drag by 0.56 1/m at x = 33.0 ± 6.7 m, y = −0.6 m"),
         (off(cleared=True),
@@ -103,7 +103,7 @@ def test_the_page_of_a_child_tells_what_was_missing(toy: Run) -> None:
 def test_a_law_suspected_of_a_child_hides_nothing_of_what_was_found(toy: Run) -> None:
     """The law is not calibrated: both models of what was found are drawn, and told first."""
     first = a_diagnosis(steps=(), verdict={"kind": "none-of-these"})
-    suspected = replace(NOTHING, name="child", laws=laws_suspected_of("law_bank_speed_step"))
+    suspected = replace(NOTHING, name="child", laws=candidate_laws_of("law_bank_speed_step"))
     suspected = replace(suspected, verdict=replace(NOTHING.verdict, kind="none-of-these"))
     child = replace(toy, diagnosis=suspected, loop=LoopResults(behind=first, ladder=_ending_with(toy)))
     said = plain(headline(child))
@@ -116,7 +116,7 @@ def test_a_law_suspected_of_a_child_hides_nothing_of_what_was_found(toy: Run) ->
     assert not any("Compare with" in step for step in next_steps(child)), "there is no page of the first model"
 
 
-def _ending_with(run: Run) -> Ladder:
+def _ending_with(run: Run) -> ModelComparison:
     return replace(LADDER, steps=(replace(FIRST, name="brook"), replace(LAST, name=run.case.name)))
 
 
@@ -152,14 +152,14 @@ def test_the_ladder_is_told_by_what_no_calibration_has_seen() -> None:
     assert unclear.endswith(" By the errors at what was held out, this fall cannot be told from chance.")
     both = replace(LADDER, steps=(FIRST, replace(LAST, added=("eddies", "wind"))), unclear=("wind",))
     assert plain(ladder_in_words(both)).endswith("held out, what wind adds to it cannot be told from chance.")
-    alone = plain(ladder_in_words(Ladder((FIRST,), 0, "Nothing is added: nothing is missing.")))
+    alone = plain(ladder_in_words(ModelComparison((FIRST,), 0, "Nothing is added: nothing is missing.")))
     assert alone.startswith("The model misses measurements no")
     assert alone.endswith(" Nothing is added: nothing is missing.")
 
 
 def test_the_ladder_is_of_what_was_added_and_not_of_what_is_left(toy: Run) -> None:
     """The page of a child that lacks something else: the fall of its errors is told of what its parent lacked."""
-    place, steps = (a_location(),), (replace(FIRST, name="parent"), LAST)
+    place, steps = (an_anomaly(),), (replace(FIRST, name="parent"), LAST)
     parent, child = replace(a_diagnosis(), name="parent", places=()), replace(NOTHING, name="child", places=place)
     loop = LoopResults(behind=parent, ladder=replace(LADDER, steps=steps))
     assert causes_of(replace(toy, diagnosis=child, loop=loop)) == "eddies"
@@ -203,14 +203,14 @@ def test_what_is_found_with_doubtful_measurements_is_folded_and_says_so(toy: Run
     assert sound.condition == ""
     assert "found with the measurements as they stand" in section.condition
     assert section.suspects == []
-    assert sorted(one.name for one in section.other_suspects) == sorted(one.name for one in sound.suspects)
+    assert sorted(one.name for one in section.other_suspects) == sorted(one.name for one in sound.candidate_effects)
 
 
 def test_a_law_is_not_the_likeliest_where_another_cause_is_told_before_it(toy: Run) -> None:
     """The page began with a law of 6 %, and left out the place of 79 % that its diagnosis told."""
     sentence = "These data cannot tell: it may be something in no list (79%) or eddies (8%), but none of them surely."
     undecided = replace(NOTHING.verdict, kind="cannot-tell", sentence=sentence)
-    found = replace(NOTHING, laws=laws_suspected_of("law_bank_speed_step"), verdict=undecided)
+    found = replace(NOTHING, laws=candidate_laws_of("law_bank_speed_step"), verdict=undecided)
     page = replace(toy, diagnosis=found)
     assert plain(headline(page)).startswith(sentence[:-1])
     assert "discover" not in "".join(next_steps(page))
@@ -226,7 +226,7 @@ def test_a_last_model_that_lacks_more_says_how_to_go_on(toy: Run) -> None:
 
 
 def test_where_a_law_stands_out_discover_is_named(toy: Run) -> None:
-    found = replace(NOTHING, laws=laws_suspected_of("law_bank_speed_step"))
+    found = replace(NOTHING, laws=candidate_laws_of("law_bank_speed_step"))
     assert "vegglue discover toy.yaml" in next_steps(replace(toy, diagnosis=found))[0]
     assert "discover" not in "".join(next_steps(replace(toy, diagnosis=NOTHING)))
 

@@ -9,7 +9,7 @@ from diagnoses import a_diagnosis
 from report_runs import a_toy, told_of, written
 
 from vegglue.report.run import LoopResults
-from vegglue.results.ladder import Ladder, LadderStep
+from vegglue.results.model_comparison import ComparedModel, ModelComparison
 
 pytestmark = pytest.mark.slow  # a browser is started
 
@@ -60,9 +60,9 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("page")
     table = a_diagnosis().predictions.station
     found = a_diagnosis(predictions={"station": table.assign(section=table["section"].replace("D3", "</script><b>D3"))})
-    steps = [LadderStep(name, f"{name}.yaml", name, (), 4, *[0.02] * 4, 0.01) for name in ("toy", CHILD)]
+    steps = [ComparedModel(name, f"{name}.yaml", name, (), 4, *[0.02] * 4, 0.01) for name in ("toy", CHILD)]
     loop = LoopResults(
-        ladder=Ladder((steps[0], replace(steps[1], added=("eddies",), unseen=0.005)), 0, "Added: eddies.")
+        ladder=ModelComparison((steps[0], replace(steps[1], added=("eddies",), unseen=0.005)), 0, "Added: eddies.")
     )
     toy = a_toy(folder)
     toy = replace(toy, case=toy.case.model_copy(update={"title": "A brook, with unlisted_inflow[x27.22,y2.04]"}))

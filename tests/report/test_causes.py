@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import EVERY_KIND, NO_LOCATION, NOTHING, a_diagnosis, a_field, a_location, an_instrument
+from diagnoses import EVERY_KIND, NO_LOCATION, NOTHING, a_diagnosis, a_field, an_anomaly, an_instrument
 
 from vegglue.case.config import load_case
 from vegglue.report.cause_words import (
@@ -30,16 +30,16 @@ def run_in(folder: Path) -> Run:
 
 
 def test_odds_are_told_against_the_nearest_rivals() -> None:
-    assert against_rivals(a_location(odds={"wind": 1e9, "bed": 210.4, "inflow": 4.0})) == (
+    assert against_rivals(an_anomaly(odds={"wind": 1e9, "bed": 210.4, "inflow": 4.0})) == (
         "4.0 to 1 against inflow, 210 to 1 against bed"
     )
-    assert against_rivals(a_location(odds={"wind": 1e9})) == "over 1,000 to 1 against all else"
+    assert against_rivals(an_anomaly(odds={"wind": 1e9})) == "over 1,000 to 1 against all else"
     assert (
-        against_rivals(a_location(odds={"position": 20.0, "wind": 1e9}))
+        against_rivals(an_anomaly(odds={"position": 20.0, "wind": 1e9}))
         == "20 to 1 against a probe that is off in all experiments"
     )
-    assert against_rivals(a_location(odds={})) == ""
-    assert against_rivals(a_location(odds={"bed": 0.25, "wind": 1e-6})) == (
+    assert against_rivals(an_anomaly(odds={})) == ""
+    assert against_rivals(an_anomaly(odds={"bed": 0.25, "wind": 1e-6})) == (
         "1 to over 1,000 against wind, 1 to 4.0 against bed"
     ), "as in the verdict, and not 0.25 to 1"
 
@@ -50,7 +50,7 @@ def test_odds_are_told_against_the_nearest_rivals() -> None:
      ("viscosity", -0.01, "less mixing")],
 )  # fmt: skip
 def test_a_place_is_told_by_its_term_and_sign(tmp_path: Path, term: str, amplitude: float, said: str) -> None:
-    place = a_location(term=term, amplitude=amplitude)
+    place = an_anomaly(term=term, amplitude=amplitude)
     found = replace(a_diagnosis(place_map={"term": term}, steps=()), places=(place,))
     (row,) = place_rows(found)
     assert (row.what, row.x, row.y, row.spot) == (said, "33.0", "−0.6", "3.6 × 0.90")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_suspect
+from diagnoses import EVERY_KIND, NOTHING, a_candidate_effect, a_diagnosis
 from drawings import off_the_sheet, points, texts
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
@@ -34,7 +34,7 @@ from vegglue.report.flow_maps import Outline
 from vegglue.report.ladder_figure import draw_ladder, save_ladder_figure
 from vegglue.report.style import COLOUR
 from vegglue.results.diagnosis import Diagnosis, Predictions, Step
-from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
+from vegglue.results.model_score import HeldOut, InSample, ModelScore, PredictiveScores
 
 pytestmark = pytest.mark.slow
 
@@ -51,17 +51,17 @@ def stations(**columns: object) -> pd.DataFrame:
 
 def test_standings_follow_the_verdict() -> None:
     found = a_diagnosis()
-    said = {one.name: suspect_status(found, one) for one in found.suspects}
+    said = {one.name: suspect_status(found, one) for one in found.candidate_effects}
     assert said == {"eddies": "accepted", "mixing[D3]": "rival", "wind": "untestable", "turning": "no sign"}
     assert [one.name for one in ranked_suspects(found)] == ["eddies", "mixing[D3]", "turning", "wind"]
     louder = a_diagnosis(first_screening={"scores": found.first_screening.scores | {"turning": -9.0}})
-    assert suspect_status(louder, found.suspects[3]) == "less likely"
+    assert suspect_status(louder, found.candidate_effects[3]) == "less likely"
 
 
 def test_what_stands_out_is_not_called_untestable() -> None:
     """A row said both "untestable" and p = 0.008: at a size that is not plausible these data showed it all the same."""
-    beside = a_diagnosis(verdict={"standing_out": {"wind": 0.008}})
-    wind = beside.suspect("wind")
+    beside = a_diagnosis(verdict={"significant_effects": {"wind": 0.008}})
+    wind = beside.candidate_effect("wind")
     assert not wind.detectability.testable
     assert suspect_status(beside, wind) == "stands out"
     tried = {one.name: one.remark for one in diagnosis_section(beside).numbers}["effects tried"]
@@ -90,7 +90,7 @@ def test_words_tell_scores_before_and_after() -> None:
 
 def test_what_leaves_no_trace_is_never_detected() -> None:
     """The page said: from 4.9·10³⁰⁰ m."""
-    found = a_diagnosis((a_suspect("bank_trend", detectability={"smallest": 4.9e300, "testable": False}),))
+    found = a_diagnosis((a_candidate_effect("bank_trend", detectability={"smallest": 4.9e300, "testable": False}),))
     (row,) = diagnosis_section(found).suspects
     assert row.detectable == "never"
 
@@ -182,7 +182,7 @@ def crowded() -> Diagnosis:
     """As much as a screen has to hold: 70 effects with long names, three steps and a long sentence, many zones."""
     names = [f"outlet_level_error[campaign {number}]" for number in range(70)]
     steps = tuple(Step(name, (name,), (1.0,), ((name,),), 2300.5, 248.1, 0.0) for name in names[:3])
-    suspects = tuple(a_suspect(name, test={"score": 40.0 / (1 + number)}) for number, name in enumerate(names))
+    suspects = tuple(a_candidate_effect(name, test={"score": 40.0 / (1 + number)}) for number, name in enumerate(names))
     cosine = np.full((12, 12), 0.3) + 0.7 * np.eye(12)
     rows = [(experiment, f"D{number}", zone) for experiment in ("low", "mid", "high") for number in range(6)
             for zone in ("floor", "bank", "plants", "edge")]  # fmt: skip
@@ -197,7 +197,7 @@ def crowded() -> Diagnosis:
 
 SCREENS = {
     "usual": a_diagnosis(), "nothing": NOTHING, "alone": alone(a_diagnosis()),
-    "no location": replace(a_diagnosis(steps=(), verdict={"location": None}), places=()), "every kind": EVERY_KIND,
+    "no location": replace(a_diagnosis(steps=(), verdict={"anomaly": None}), places=()), "every kind": EVERY_KIND,
 }  # fmt: skip
 
 
@@ -209,10 +209,10 @@ def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
     assert figure.get_suptitle() == f"{diagnosis.name}: {verdict.kind}. {verdict.sentence}"
     scores, visible, alike, *rest = figure.axes
     assert {label.get_text().split()[0] for label in scores.get_yticklabels()} == {
-        one.name for one in diagnosis.suspects
+        one.name for one in diagnosis.candidate_effects
     }
     shown = sorted(bar.get_width() for bar in visible.patches)
-    assert shown == sorted(one.detectability.visibility for one in diagnosis.suspects)
+    assert shown == sorted(one.detectability.visibility for one in diagnosis.candidate_effects)
     assert {label.get_text() for label in alike.get_yticklabels()} == set(diagnosis.first_screening.compared)
     assert len(rest) == bool(len(zones)) + bool(drag.x.size)
     if len(zones):
@@ -256,25 +256,25 @@ def test_screen_of_a_diagnosis_is_a_file(tmp_path: Path) -> None:
     assert [patch.get_xy()[:4].tolist() for patch in patches] == [corners.tolist() for corners in outlines]
 
 
-def a_rung(name: str, error: float, **changes: object) -> Rung:
+def a_model_score(name: str, error: float, **changes: object) -> ModelScore:
     pattern = np.array([1.0, -1.0, 1.0, -1.0]) * error
     clusters = (("low", "D0"), ("low", "D3"), ("high", "D0"), ("high", "D3"))
-    rung = Rung(
+    score = ModelScore(
         name=name, title=name, effects=(), values={"n_b": (0.03, 0.02, 0.04), "k_s": (0.5, 0.01, 3.0)},
         in_sample=InSample({"velocity": 0.8 * error, "level": 0.001}, chi2=4.0, stations=4, noise_floor=0.01),
         held_out=HeldOut(pattern, np.full(4, np.nan), np.ones(4, bool), clusters),
         predictive=PredictiveScores(log_score=1.0, inside50=0.5, inside95=0.95),
         homogeneity={"n_b": 0.001 if error > 0.02 else 0.4}, validation=float("nan"),
     )  # fmt: skip
-    return replace(rung, **changes)
+    return replace(score, **changes)
 
 
-def with_sections(rung: Rung, errors: np.ndarray) -> Rung:
-    return replace(rung, held_out=replace(rung.held_out, sections=errors))
+def with_sections(score: ModelScore, errors: np.ndarray) -> ModelScore:
+    return replace(score, held_out=replace(score.held_out, sections=errors))
 
 
 def test_ladder_draws_held_out_errors_with_their_paired_error() -> None:
-    before, after = a_rung("a", 0.05), a_rung("b", 0.012, effects=("eddies",))
+    before, after = a_model_score("a", 0.05), a_model_score("b", 0.012, effects=("eddies",))
     before = with_sections(before, before.held_out.sections * np.array([1.0, 1.1, 0.9, 1.2]))
     figure = draw_ladder([before, after])
     axes = figure.axes[0]
@@ -288,27 +288,30 @@ def test_ladder_draws_held_out_errors_with_their_paired_error() -> None:
 
 
 def test_ladder_tells_parameters_that_move_from_those_that_stand_still() -> None:
-    figure = draw_ladder([a_rung("a", 0.05), a_rung("b", 0.012)])
+    figure = draw_ladder([a_model_score("a", 0.05), a_model_score("b", 0.012)])
     n_b = next(axes for axes in figure.axes if axes.get_title(loc="left").startswith("n_b"))
     faces = [line.get_markerfacecolor() for line in n_b.lines]
     assert faces == [COLOUR["paper"], COLOUR["model"]]
 
 
 @pytest.mark.parametrize(
-    "rungs",
-    [[a_rung("a", 0.05)], [with_sections(a_rung("a", 0.05, values={}, homogeneity={}), np.full(4, np.nan))]],
+    "scores",
+    [
+        [a_model_score("a", 0.05)],
+        [with_sections(a_model_score("a", 0.05, values={}, homogeneity={}), np.full(4, np.nan))],
+    ],
 )
-def test_ladder_of_one_rung_is_a_file(tmp_path: Path, rungs: list[Rung]) -> None:
-    save_ladder_figure(rungs, tmp_path / "runs" / "ladder.svg")
+def test_ladder_of_one_rung_is_a_file(tmp_path: Path, scores: list[ModelScore]) -> None:
+    save_ladder_figure(scores, tmp_path / "runs" / "ladder.svg")
     assert "<svg" in (tmp_path / "runs" / "ladder.svg").read_text(encoding="utf-8")
-    figure = draw_ladder(rungs)
+    figure = draw_ladder(scores)
     errors, *parameters = [axes for axes in figure.axes if axes.get_visible()]
-    (rung,) = rungs
-    expected = [held_out_rmse(rung), rung.in_sample.rmse["velocity"]]  # in sample is drawn beside what was held out
+    (score,) = scores
+    expected = [held_out_rmse(score), score.in_sample.rmse["velocity"]]  # in sample is drawn beside what was held out
     assert points(errors) == [(1.0, value) for value in expected if np.isfinite(value)]
     assert errors.get_ylim() == pytest.approx((0.0, 1.12 * np.nanmax(expected)))
-    assert [axes.get_title(loc="left").split("\n")[0] for axes in parameters] == list(rung.values)
-    for axes, (middle, low, high) in zip(parameters, rung.values.values(), strict=True):
+    assert [axes.get_title(loc="left").split("\n")[0] for axes in parameters] == list(score.values)
+    for axes, (middle, low, high) in zip(parameters, score.values.values(), strict=True):
         assert points(axes) == [(1.0, middle)]
         assert axes.collections[0].get_segments()[0][:, 1].tolist() == [low, high]
     assert off_the_sheet(figure) == []

@@ -11,10 +11,10 @@ from report_runs import a_toy, kict, told_of
 
 from vegglue.report.overview import DrawnInterval, draw_interval_rows, render_overview, write_overview
 from vegglue.report.run import LoopResults, Run
-from vegglue.results.ladder import Ladder, LadderStep
+from vegglue.results.model_comparison import ComparedModel, ModelComparison
 
-STEPS = tuple(LadderStep(name, f"{name}.yaml", name, (), 4, *[0.02] * 4, 0.01) for name in ("toy", "toy-eddies"))
-LADDER = Ladder((STEPS[0], replace(STEPS[1], added=("eddies",), unseen=0.005)), 0, "Added: eddies.")
+STEPS = tuple(ComparedModel(name, f"{name}.yaml", name, (), 4, *[0.02] * 4, 0.01) for name in ("toy", "toy-eddies"))
+LADDER = ModelComparison((STEPS[0], replace(STEPS[1], added=("eddies",), unseen=0.005)), 0, "Added: eddies.")
 
 
 @pytest.fixture(scope="module")

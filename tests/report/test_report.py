@@ -221,7 +221,7 @@ def test_the_report_says_what_is_missing(tmp_path: Path) -> None:
     assert len(page.ids) == len(set(page.ids))
     assert "Missing: eddies &lt;b&gt;or so&lt;/b&gt;." in text
     assert found.verdict.remarks[0] in text
-    assert all(f"<b>{one.name}</b>" in text for one in found.suspects)
+    assert all(f"<b>{one.name}</b>" in text for one in found.candidate_effects)
     assert "Stations set aside" in text
     drawn = {path.stem for path in (tmp_path / "figures").glob("missing-*.svg")}
     assert drawn == {

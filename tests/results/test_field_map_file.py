@@ -45,7 +45,7 @@ def test_without_a_field_there_is_no_map(tmp_path: Path) -> None:
 
 def test_bounds_of_an_amplitude_come_back(tmp_path: Path) -> None:
     path, found = tmp_path / "diagnosis.h5", a_diagnosis()
-    first = found.suspects[0]
+    first = found.candidate_effects[0]
     bounded = replace(first, amplitude=replace(first.amplitude, support=(-0.5, np.inf)))
-    write_diagnosis(path, replace(found, suspects=(bounded, *found.suspects[1:])), "", "d" * 64)
-    assert read_diagnosis(path).suspects[0].amplitude.support == (-0.5, np.inf)
+    write_diagnosis(path, replace(found, candidate_effects=(bounded, *found.candidate_effects[1:])), "", "d" * 64)
+    assert read_diagnosis(path).candidate_effects[0].amplitude.support == (-0.5, np.inf)

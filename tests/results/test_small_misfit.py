@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from posteriors import a_posterior, a_refinement
-from verdicts import FITS, grounds, said
+from verdicts import FITS, inputs, said
 
 from vegglue.cli.brief_posterior import brief_posterior
 from vegglue.report.key_numbers import against_measurement_error
@@ -45,8 +45,8 @@ def test_infer_says_so_with_the_number_and_what_to_do() -> None:
 
 def test_diagnose_says_so() -> None:
     small = Misfit(61.5, 61.5, 150, 1.0, pd.DataFrame())
-    assert "chi2 is only 0.41 times its degrees of freedom" in said(grounds(misfit=small))[2]
-    assert "chi2 is only" not in said(grounds(misfit=FITS))[2]
+    assert "chi2 is only 0.41 times its degrees of freedom" in said(inputs(misfit=small))[2]
+    assert "chi2 is only" not in said(inputs(misfit=FITS))[2]
 
 
 def test_the_page_says_far_less_than_the_errors_explain() -> None:

@@ -159,7 +159,7 @@ def _said(data: DataSet, found: Diagnosis) -> dict[str, Any]:
         "steps": [asdict(step) for step in found.steps], "places": [asdict(place) for place in found.places],
         "instruments": [asdict(one) for one in found.instruments], "flagged": len(errors.flagged),
         "field": None if found.field is None else asdict(found.field),
-        "sizes": {name: found.suspect(name).amplitude.value - found.suspect(name).amplitude.off for name in found.set},
+        "sizes": {name: (size := found.candidate_effect(name).amplitude).value - size.off for name in found.set},
         "amplitudes": [row for one in data.hidden for row in _amplitude(one, found)],
         "p_misfit": found.misfit.p, "scale": errors.scale, "correlation": errors.correlation,
     }  # fmt: skip
@@ -169,7 +169,7 @@ def _amplitude(hidden: dict[str, Any], found: Diagnosis) -> list[dict[str, Any]]
     """The interval of a hidden effect in the set, where its shapes are those of the truth."""
     if hidden["kind"] != "listed" or hidden["name"] not in found.set:
         return []
-    suspect = found.suspect(hidden["name"])
+    suspect = found.candidate_effect(hidden["name"])
     if any(not np.isclose(suspect.shapes.get(name, true), true, rtol=0.05) for name, true in hidden["shapes"].items()):
         return []
     low, high = suspect.amplitude.interval95

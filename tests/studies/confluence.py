@@ -13,7 +13,7 @@ from vegglue.calibration.candidates import candidates_in_case
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
-from vegglue.diagnosis.comparison import held_out_rmse, rung
+from vegglue.diagnosis.comparison import held_out_rmse, model_score
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.engine.interface import Model, linearise
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
@@ -52,7 +52,7 @@ def row_of(title: str, case: Case, runs: Path) -> Row:
     unseen = validation_of(case)
     assert unseen is not None
     there = linearise(unseen, base.fitted.point.z)
-    found = rung(base)
+    found = model_score(base)
     seen, along, across = base.fitted.point.prediction, "velocity", "velocity_across"
     return Row(
         title,

@@ -32,8 +32,8 @@ from vegglue.calibration.residual_screening import kind_of_listed, kinds_of_inst
 from vegglue.calibration.score_test import HypothesisKind
 from vegglue.case.channel_geometry import half_width
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.contender_choice import What, chosen_contender
-from vegglue.diagnosis.tempered_chances import tempered_chances
+from vegglue.diagnosis.hypothesis_choice import What, chosen_hypothesis
+from vegglue.diagnosis.tempered_probabilities import tempered_probabilities
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most
 from vegglue.workflow.hidden_effect import candidate_of
@@ -159,14 +159,14 @@ def _of_terms(fingerprints: Fingerprints, places: Array) -> Array:
 
 
 def _is_told(effects: Array, terms: Array, instruments: Array) -> bool:
-    """Whether none of what is known is told, as a diagnosis decides it, see `contender_choice`."""
+    """Whether none of what is known is told, as a diagnosis decides it, see `hypothesis_choice`."""
     what: Sequence[What] = ["effect"] * effects.size + ["place"] * terms.size + ["instrument"] * instruments.size
     evidence = np.concatenate([effects, terms, instruments])
-    chances = tempered_chances(evidence)
+    chances = tempered_probabilities(evidence)
     best = int(np.argmax(evidence))
     alone = np.sum(chances * constants().strong_odds >= chances[best]) == 1
     at_a_place = float(chances[effects.size : effects.size + terms.size].sum())
-    taken = best if alone else chosen_contender(what, evidence, at_a_place)
+    taken = best if alone else chosen_hypothesis(what, evidence, at_a_place)
     return taken is not None and what[taken] == "place"
 
 

@@ -84,7 +84,7 @@ def test_it_names_what_is_hidden_in_its_own_measurements(tmp_path: Path, monkeyp
         found = vegglue.diagnose(by_server(config, port), runs=tmp_path / "runs", jobs=1)
     assert found.verdict.kind == "identified"
     assert found.set == ["secondary_current"]
-    strength = found.suspect("secondary_current").amplitude.value
+    strength = found.candidate_effect("secondary_current").amplitude.value
     assert strength == pytest.approx(HIDDEN["secondary_current"]["strength"], rel=0.2)
     assert found.verdict.remarks[0].startswith("Predictions and slopes are those of the command of `engine`")
     assert found.parameters.last["n_b"][0] == pytest.approx(TRUE["n_b"], rel=0.2)

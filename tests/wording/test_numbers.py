@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from diagnoses import NOTHING, a_diagnosis
+from model_scores import a_model_score
 from reach import write_reach
-from rungs import a_rung
 from stored import ALL, a_header, write_chunks
 
 from vegglue.case.config import load_case
@@ -86,7 +86,7 @@ def test_sizes_that_people_read_are_written_in_full(value: float, digits: int, t
 
 
 def test_large_numbers_have_one_form_in_tables_and_sentences(capsys: pytest.CaptureFixture[str]) -> None:
-    before, after = a_rung("brook"), a_rung("brook-wind")
+    before, after = a_model_score("brook"), a_model_score("brook-wind")
     worse = replace(before, held_out=replace(before.held_out, sections=np.array([0.045, 0.065])))
     show_ladder(Comparison((worse, after), pd.DataFrame(columns=MEASUREMENT)))
     assert "1900 ± 800" in capsys.readouterr().out, "it was 1.9e+03 ± 8e+02"
@@ -104,15 +104,15 @@ def test_a_diagnosis_says_its_sentence(found) -> None:
 
 def test_a_comparison_is_a_line_for_each_model() -> None:
     nothing = pd.DataFrame(columns=MEASUREMENT)
-    found = Comparison((a_rung("brook"), a_rung("brook-wind", 0.025)), nothing)
+    found = Comparison((a_model_score("brook"), a_model_score("brook-wind", 0.025)), nothing)
     assert repr(found).splitlines() == [
         "Comparison of 2 models, root mean square errors of velocity [m/s]",
         "  brook, 3 parameters: seen 0.021, section held out 0.035, noise floor 0.01",
         "  brook-wind, 3 parameters: seen 0.021, section held out 0.035, never seen 0.025, noise floor 0.01",
     ]
     aside = pd.DataFrame([["June", "velocity", "A", 1.0, 2.0, 0.5]], columns=MEASUREMENT)
-    assert "1 station is left out of every model" in repr(Comparison(found.rungs, aside))
-    cases = tuple(SimpleNamespace(name=one.name) for one in found.rungs)
+    assert "1 station is left out of every model" in repr(Comparison(found.model_scores, aside))
+    cases = tuple(SimpleNamespace(name=one.name) for one in found.model_scores)
     extension = repr(StepwiseExtension(cases, found, "Missing: wind.", "Added: wind."))
     assert extension.startswith("Extension: brook -> brook-wind\n  Missing: wind.\n  Added: wind.\n")
 

@@ -84,10 +84,10 @@ def test_a_ladder_is_of_the_data_that_were_read(
     case: Case, meanwhile: Meanwhile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before, kept = case_hash(case), list[Any]()
-    meanwhile(compare, "rung_of", lambda *given: None)
+    meanwhile(compare, "model_score_of", lambda *given: None)
     monkeypatch.setattr(compare, "draw_ladder_of", lambda *given: None)
-    monkeypatch.setattr(compare, "ladder_of", lambda *given: None)
-    monkeypatch.setattr(compare, "write_ladder", lambda *given: kept.append(given))
+    monkeypatch.setattr(compare, "comparison_of", lambda *given: None)
+    monkeypatch.setattr(compare, "write_comparison", lambda *given: kept.append(given))
     compare.compare([case], jobs=1)
     assert kept[0][2] == before != case_hash(case)
 

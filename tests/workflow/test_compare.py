@@ -15,8 +15,8 @@ from vegglue.case.schema import Case, Validation
 from vegglue.diagnosis.excluded_stations import MEASUREMENT, excluded_by
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
-from vegglue.results.kept_words import ladder_that_fits, write_ladder
-from vegglue.results.ladder import Ladder, LadderStep
+from vegglue.results.json_store import comparison_that_fits, write_comparison
+from vegglue.results.model_comparison import ComparedModel, ModelComparison
 from vegglue.workflow import compare, set_aside
 from vegglue.workflow.run_folder import folder_of
 from vegglue.workflow.set_aside import judged_by
@@ -84,7 +84,7 @@ def test_models_of_one_name_are_refused(case: Case, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_model_may_be_there_twice(case: Case, tmp_path: Path) -> None:
     """Who extends by hand what `extend --auto` has extended has two files of one model."""
-    first, second = vegglue.compare([case, case], runs=tmp_path / "runs").rungs
+    first, second = vegglue.compare([case, case], runs=tmp_path / "runs").model_scores
     assert first.in_sample.chi2 == second.in_sample.chi2
 
 
@@ -97,7 +97,7 @@ def test_a_ladder_keeps_the_model_that_it_begins_with(case: Case, tmp_path: Path
     )
     vegglue.compare([case, first], runs=runs)
     vegglue.compare([first, second], runs=runs)
-    kept = [ladder_that_fits(runs / one.name, case_hash(one)) for one in (case, first, second)]
+    kept = [comparison_that_fits(runs / one.name, case_hash(one)) for one in (case, first, second)]
     assert [[step.name for step in one.steps] for one in kept if one] == [["brook", "a"], ["brook", "a"], ["a", "b"]]
     assert judged_by(first, runs) == {"brook": case_hash(case), "a": case_hash(first)}
 
@@ -109,8 +109,8 @@ def test_a_model_is_judged_by_its_diagnosis_of_now_beside_a_ladder_of_before(
     asked = list[tuple[str, str]]()
     monkeypatch.setattr(set_aside, "diagnosis_that_fits", lambda path, wanted: asked.append((path.parent.name, wanted)))
     second = case.model_copy(update={"name": "second"})
-    before = LadderStep("brook", "brook.yaml", "as it was", (), 3, *[0.1] * 5)
-    write_ladder(folder_of(tmp_path, second), Ladder((before,), 0, ""), case_hash(second))
+    before = ComparedModel("brook", "brook.yaml", "as it was", (), 3, *[0.1] * 5)
+    write_comparison(folder_of(tmp_path, second), ModelComparison((before,), 0, ""), case_hash(second))
     for cases in ([case, second], [second, case]):
         asked.clear()
         assert set_aside.left_out(cases, tmp_path).empty
@@ -121,20 +121,20 @@ def test_a_model_is_judged_by_its_diagnosis_of_now_beside_a_ladder_of_before(
 def test_what_a_model_misses_is_computed_once(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also under another title; and again as soon as a measurement is set aside."""
     runs = tmp_path / "runs"
-    first = vegglue.compare([case], runs=runs).rungs[0]
+    first = vegglue.compare([case], runs=runs).model_scores[0]
     monkeypatch.setattr(compare, "calibrated", pytest.fail)
     titled = case.model_copy(update={"title": "Brook in June"})
-    again = vegglue.compare([titled], runs=runs).rungs[0]
+    again = vegglue.compare([titled], runs=runs).model_scores[0]
     assert again.title == "Brook in June"
     np.testing.assert_equal(asdict(replace(again, title=first.title)), asdict(first))
     aside = read_observations(case).table[MEASUREMENT].iloc[[0]]
-    assert compare.kept_rung(case, runs, excluded_by()) is not None
-    assert compare.kept_rung(case, runs, aside) is None
+    assert compare.kept_model_score(case, runs, excluded_by()) is not None
+    assert compare.kept_model_score(case, runs, aside) is None
 
 
 def test_a_ladder_that_says_why_it_ends_is_kept() -> None:
-    steps = tuple(LadderStep(name, "", name, (), 4, 0.1, 0.2, 0.3, 0.4, 0.1) for name in ("brook", "a"))
-    extended, compared = Ladder(steps, 1, "Added: wind."), Ladder(steps, 1, "")
+    steps = tuple(ComparedModel(name, "", name, (), 4, 0.1, 0.2, 0.3, 0.4, 0.1) for name in ("brook", "a"))
+    extended, compared = ModelComparison(steps, 1, "Added: wind."), ModelComparison(steps, 1, "")
     assert compare.tells_more(extended, compared)
     assert not compare.tells_more(compared, extended)
     assert not compare.tells_more(None, compared)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import a_diagnosis, a_suspect, laws_suspected_of
+from diagnoses import a_candidate_effect, a_diagnosis, candidate_laws_of
 from linear_baseline import stations_of
 from reach import said_to
 
@@ -27,7 +27,7 @@ from vegglue.diagnosis.nominations import (
 from vegglue.diagnosis.stepwise_choice import Choice
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.observations import read_observations
-from vegglue.results.diagnosis import Diagnosis, Location, Step
+from vegglue.results.diagnosis import Diagnosis, LocalAnomaly, Step
 from vegglue.results.result_files import write_diagnosis
 from vegglue.workflow.extend import extend, in_words, write_child
 
@@ -72,11 +72,11 @@ def test_a_candidate_is_found_by_its_name_whatever_else_has_that_name() -> None:
         assert candidate_named(case, station, one.name) == one
 
 
-def a_place(term: Term, x: float = 47.29, y: float = -0.29) -> Location:
-    return Location(x, y, 1.8, 0.45, term, EFFECT_AT_PLACE[term], 0.19, (0.14, 0.24), "m", 5.0, ("low",), {}, 0.23)
+def a_place(term: Term, x: float = 47.29, y: float = -0.29) -> LocalAnomaly:
+    return LocalAnomaly(x, y, 1.8, 0.45, term, EFFECT_AT_PLACE[term], 0.19, (0.14, 0.24), "m", 5.0, ("low",), {}, 0.23)
 
 
-def at_places(case: Case, *places: Location) -> list[Addition]:
+def at_places(case: Case, *places: LocalAnomaly) -> list[Addition]:
     return [(candidate_at(case, place), place.shapes) for place in places]
 
 
@@ -115,7 +115,7 @@ def found_in(case: Case, kind: str, *, order: tuple[str, ...] = (), place: bool 
     """A diagnosis of that verdict; order: parameters of its last model."""
     step = Step("streamlining", ("streamlining",), (1.0,), (("streamlining",),), 900.0, 250.0, 0.0)
     found = a_diagnosis(
-        suspects=(a_suspect("streamlining"),), steps=(step,) if order else (), verdict={"kind": kind},
+        candidate_effects=(a_candidate_effect("streamlining"),), steps=(step,) if order else (), verdict={"kind": kind},
         parameters={"last": dict.fromkeys((*case.parameters, *order), (1.0, 0.9, 1.1))},
         predictions={"station": read_observations(case).table},
     )  # fmt: skip
@@ -214,7 +214,7 @@ def test_what_acts_in_one_experiment_or_section_says_so() -> None:
     for name, only_in in (("discharge_error[high]", {"experiments": "high"}), ("probe_gain[B]", {"sections": "B"})):
         found = found_in(case, "identified", order=("",))
         step = replace(found.steps[0], accepted=name, rivals=(name,), chances=(1.0,), groups=((name,),))
-        found = replace(found, steps=(step,), suspects=(a_suspect(name),))
+        found = replace(found, steps=(step,), candidate_effects=(a_candidate_effect(name),))
         (one,) = nominees(case, found)
         assert one.only_in == only_in
     (one,) = nominees(case, found_in(case, "identified", order=("streamlining_vogel_exponent",)))
@@ -223,7 +223,7 @@ def test_what_acts_in_one_experiment_or_section_says_so() -> None:
 
 def test_a_law_that_stands_out_is_left_to_discover() -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
-    found = replace(found_in(case, "none-of-these"), laws=laws_suspected_of("law_bank_speed_step"))
+    found = replace(found_in(case, "none-of-these"), laws=candidate_laws_of("law_bank_speed_step"))
     assert "`vegglue discover` adds one" in in_words(case, found, Choice(((),), {}))
     unlikely = replace(found, verdict=replace(found.verdict, kind="cannot-tell", tells_laws=False))
     assert in_words(case, unlikely, Choice(((),), {})).endswith("the diagnosis cannot tell what is missing.")

@@ -5,12 +5,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from diagnoses import NOTHING, laws_suspected_of
+from diagnoses import NOTHING, candidate_laws_of
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
-from vegglue.results.causes import LawsSuspected
+from vegglue.results.causes import CandidateLaws
 from vegglue.workflow import next_measurement as verb
 from vegglue.workflow.next_measurement import laws_to_tell_apart, next_measurement, rivals_of
 
@@ -23,26 +23,26 @@ def case() -> Case:
 
 
 @pytest.fixture
-def laws() -> LawsSuspected:
+def laws() -> CandidateLaws:
     """Two forms of the speed, and one of the depth."""
-    three = laws_suspected_of(SPEED, "law_bank_speed_ramp", DEPTH)
+    three = candidate_laws_of(SPEED, "law_bank_speed_ramp", DEPTH)
     *speed, depth = three.laws
     return replace(three, laws=(*speed, replace(depth, quantity="the depth")))
 
 
-def test_the_likeliest_law_of_each_quantity_is_told_apart(laws: LawsSuspected) -> None:
+def test_the_likeliest_law_of_each_quantity_is_told_apart(laws: CandidateLaws) -> None:
     assert laws_to_tell_apart(laws) == [SPEED, DEPTH]
     assert laws_to_tell_apart(None) == []
 
 
-def test_laws_are_rivals_at_their_size(case: Case, laws: LawsSuspected) -> None:
+def test_laws_are_rivals_at_their_size(case: Case, laws: CandidateLaws) -> None:
     rivals = rivals_of(case, replace(NOTHING, laws=laws), [SPEED, DEPTH])
     assert [one.name for one, _, _ in rivals] == [SPEED, DEPTH]
     assert [(shapes, gain) for _, shapes, gain in rivals] == [({"reference": 0.4}, -0.8)] * 2
 
 
 def test_next_asks_about_laws_where_one_stands_out(
-    case: Case, laws: LawsSuspected, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    case: Case, laws: CandidateLaws, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     asked: list[list[str]] = []
     base = SimpleNamespace(model=None, noise=None, fitted=SimpleNamespace(point=SimpleNamespace(z=None)))

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import NOTHING, a_diagnosis, a_location, a_suspect
+from diagnoses import NOTHING, a_candidate_effect, a_diagnosis, an_anomaly
 from verdicts import step
 
 from vegglue.calibration.candidates import place_candidate, with_effect
@@ -21,13 +21,13 @@ from vegglue.engine.interface import Model
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
 from vegglue.results.diagnosis import ParameterEstimates, Step
-from vegglue.results.kept_words import write_questions
+from vegglue.results.json_store import write_questions
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.workflow import next_measurement as verb
 from vegglue.workflow.next_measurement import next_measurement
 from vegglue.workflow.run_folder import folder_of
 
-PLACE = a_location()
+PLACE = an_anomaly()
 AT = f"{PLACE.effect}[x{PLACE.x:g},y{PLACE.y:g}]"
 
 
@@ -48,7 +48,7 @@ def with_place(one: Step, chance: float) -> Step:
 def test_next_asks_what_tells_a_place_from_an_effect(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, one: Step, asked: str
 ) -> None:
-    suspects = (a_suspect("inflow_skew"), a_suspect("wind"))
+    suspects = (a_candidate_effect("inflow_skew"), a_candidate_effect("wind"))
     given: list[list[str]] = []
 
     def worth(*rest: object) -> list[list[object]]:
@@ -58,7 +58,7 @@ def test_next_asks_what_tells_a_place_from_an_effect(
         return [[] for _ in questions]
 
     base = SimpleNamespace(model=None, noise=None, fitted=SimpleNamespace(point=SimpleNamespace(z=None)))
-    monkeypatch.setattr(verb, "diagnose", lambda *_, **__: replace(NOTHING, steps=(one,), suspects=suspects))
+    monkeypatch.setattr(verb, "diagnose", lambda *_, **__: replace(NOTHING, steps=(one,), candidate_effects=suspects))
     monkeypatch.setattr(verb, "worth_of_measurements", worth)
     monkeypatch.setattr(verb, "excluded_by", lambda *_: None)
     monkeypatch.setattr(verb, "calibrated", lambda *_: base)

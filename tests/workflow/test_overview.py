@@ -8,8 +8,8 @@ from small_case import SMALL
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.errors import InputError
-from vegglue.results.kept_words import write_ladder
-from vegglue.results.ladder import Ladder, LadderStep
+from vegglue.results.json_store import write_comparison
+from vegglue.results.model_comparison import ComparedModel, ModelComparison
 from vegglue.workflow.overview import overview
 
 
@@ -22,9 +22,9 @@ def with_a_law_as_child(folder: Path) -> None:
     (folder / "child.yaml").write_text("extends: small.yaml\nname: child\neffect_file: own.py\n", encoding="utf-8")
     wanted = case_hash(load_case(folder / "small.yaml"))
     errors = (0.1, 0.1, 0.1, 0.1, 0.01)
-    steps = tuple(LadderStep(name, f"{name}.yaml", wanted, (), 2, *errors) for name in ("small", "child"))
+    steps = tuple(ComparedModel(name, f"{name}.yaml", wanted, (), 2, *errors) for name in ("small", "child"))
     (folder / "runs" / "small").mkdir(parents=True)
-    write_ladder(folder / "runs" / "small", Ladder(steps, 0, ""), wanted)
+    write_comparison(folder / "runs" / "small", ModelComparison(steps, 0, ""), wanted)
 
 
 def test_the_file_of_a_law_is_run_only_where_it_is_trusted(tmp_path: Path) -> None:

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from diagnoses import a_diagnosis, laws_suspected_of
+from diagnoses import a_diagnosis, candidate_laws_of
 from reach import here
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
-from vegglue.results.causes import LawsSuspected
+from vegglue.results.causes import CandidateLaws
 from vegglue.workflow import run as whole_way
 
 ROOT = Path(__file__).parents[2]
@@ -43,9 +43,9 @@ def test_a_hidden_effect_is_named_added_and_the_error_falls(went: tuple[Path, st
     accused = next(one for one in said["effects"] if one["name"] == "discharge_error[high]")
     assert accused["p_family"] < 0.01
     here(folder, "extend", "hidden/small.yaml", "--auto")
-    rungs = json.loads(here(folder, "compare", "hidden/small.yaml", child, "--json").stdout)["rungs"]
-    assert rungs[1]["held_out_sections"] < rungs[0]["held_out_sections"]
-    assert rungs[1]["chi2"] < 0.8 * rungs[0]["chi2"]
+    scores = json.loads(here(folder, "compare", "hidden/small.yaml", child, "--json").stdout)["rungs"]
+    assert scores[1]["held_out_sections"] < scores[0]["held_out_sections"]
+    assert scores[1]["chi2"] < 0.8 * scores[0]["chi2"]
     by_hand = f"extends: small.yaml\nname: {child.stem.replace('+', '-')}-mine\n"
     child.write_text(by_hand, encoding="utf-8")
     again = here(folder, "extend", "hidden/small.yaml", "--auto", succeed=False)
@@ -74,13 +74,13 @@ def test_one_command_goes_the_whole_way_and_is_not_repeated(went: tuple[Path, st
 
 
 def gone(
-    kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPatch, laws: LawsSuspected | None = None
+    kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPatch, laws: CandidateLaws | None = None
 ) -> tuple[list[str], list[str]]:
     """Cases whose ensembles `run` makes, and the kinds of results it shows, where nothing is solved."""
     found = a_diagnosis(verdict={"kind": kind, "tells_laws": laws is not None})
     found = replace(found, places=found.places[:1] * places, laws=laws)
-    rungs = {TWIN.name: 0.02, WITH_LAW.name: error_with_law}
-    alone = SimpleNamespace(rungs=(TWIN.name,), left_out=None)
+    scores = {TWIN.name: 0.02, WITH_LAW.name: error_with_law}
+    alone = SimpleNamespace(model_scores=(TWIN.name,), left_out=None)
     made, shown, kept = list[str](), list[str](), list[str]()
 
     def make_posterior(case: Case, *_: Any) -> bool:
@@ -92,10 +92,10 @@ def gone(
         "diagnose": lambda case, **_: found,
         "extend_stepwise": lambda case, **_: SimpleNamespace(cases=(TWIN,), comparison=alone),
         "discover": lambda case, **_: SimpleNamespace(child=WITH_LAW, law=True),
-        "rung_of": lambda case, *_: case.name,
-        "ladder_of": lambda *_: None,
-        "keep_ladder": lambda ladder, cases, *_: kept.append(cases[-1].name),
-        "held_out_rmse": lambda rung: rungs[rung],
+        "model_score_of": lambda case, *_: case.name,
+        "comparison_of": lambda *_: None,
+        "keep_comparison": lambda ladder, cases, *_: kept.append(cases[-1].name),
+        "held_out_rmse": lambda score: scores[score],
         "next_measurement": lambda case, **_: [],
         "draw_ladder_of": lambda *_: Path("ladder.png"),
         "_make_posterior": make_posterior,
@@ -115,7 +115,7 @@ def test_a_law_is_searched_where_no_known_effect_explains_what_acts_all_over(mon
 
 @pytest.mark.parametrize(("kind", "places"), [("none-of-these", 1), ("cannot-tell", 0)])
 def test_a_law_that_stands_out_is_searched(kind: str, places: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    laws = laws_suspected_of("law_bank_speed_step")
+    laws = candidate_laws_of("law_bank_speed_step")
     assert gone(kind, places, 0.01, monkeypatch, laws) == (["twin-law"], ["law"])
 
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from diagnoses import a_diagnosis
 from kills import WITH_ERRORS
+from model_scores import a_model_score
 from reach import write_reach
-from rungs import a_rung
 
 import vegglue
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.results.kept_words import write_rung
+from vegglue.results.json_store import write_model_score
 from vegglue.workflow import extend
-from vegglue.workflow.compare import Comparison, keep_ladder, ladder_of, rows_set_aside
+from vegglue.workflow.compare import Comparison, comparison_of, keep_comparison, rows_set_aside
 from vegglue.workflow.stepwise_extension import kept_extension
 
 FOUND = a_diagnosis()
@@ -28,12 +28,15 @@ def family(tmp_path: Path) -> tuple[Case, Case]:
     """A case and its child, and how it was extended to it, kept in `runs`."""
     parent = vegglue.load_case(write_reach(tmp_path, WITH_ERRORS))
     cases = parent, vegglue.extend(parent, "streamlining")
-    hashes, comparison = [case_hash(one) for one in cases], Comparison(tuple(a_rung(c.name) for c in cases), ASIDE)
-    ladder = ladder_of(comparison, cases, hashes, "Added: streamlining.", FOUND.verdict.sentence)
-    for one, rung, config_hash in zip(cases, comparison.rungs, hashes, strict=True):
+    hashes, comparison = (
+        [case_hash(one) for one in cases],
+        Comparison(tuple(a_model_score(c.name) for c in cases), ASIDE),
+    )
+    ladder = comparison_of(comparison, cases, hashes, "Added: streamlining.", FOUND.verdict.sentence)
+    for one, score, config_hash in zip(cases, comparison.model_scores, hashes, strict=True):
         (tmp_path / "runs" / one.name).mkdir(parents=True)
-        write_rung(tmp_path / "runs" / one.name, rung, rows_set_aside(ASIDE), config_hash)
-    keep_ladder(ladder, cases, hashes, tmp_path / "runs")
+        write_model_score(tmp_path / "runs" / one.name, score, rows_set_aside(ASIDE), config_hash)
+    keep_comparison(ladder, cases, hashes, tmp_path / "runs")
     return cases
 
 
@@ -44,8 +47,8 @@ def test_it_is_read_back(family: tuple[Case, Case], tmp_path: Path, monkeypatch:
     found = vegglue.extend_stepwise(parent, runs=tmp_path / "runs")
     assert [one.name for one in found.cases] == [parent.name, child.name]
     assert (found.sentence, found.reason) == (FOUND.verdict.sentence, "Added: streamlining.")
-    assert [one.name for one in found.comparison.rungs] == [parent.name, child.name]
-    np.testing.assert_equal(found.comparison.rungs[1].held_out.sections, a_rung("").held_out.sections)
+    assert [one.name for one in found.comparison.model_scores] == [parent.name, child.name]
+    np.testing.assert_equal(found.comparison.model_scores[1].held_out.sections, a_model_score("").held_out.sections)
 
 
 def test_another_diagnosis_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:

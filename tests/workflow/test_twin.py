@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import a_diagnosis, a_location, a_suspect, laws_suspected_of
+from diagnoses import a_candidate_effect, a_diagnosis, an_anomaly, candidate_laws_of
 from reach import said_to
 
 from vegglue.calibration.candidates import cause_of, with_effect
@@ -185,8 +185,8 @@ def test_marks_of_every_kind() -> None:
     assert marks(an_answer(effect), alone)[0].named
     beside = replace(effect, amplitude=2.0)
     assert marks(an_answer(beside), alone)[0].amplitude is False
-    location = a_location(x=30.0, y=0.4)
-    nowhere = a_diagnosis(verdict={"kind": "none-of-these", "location": location})
+    location = an_anomaly(x=30.0, y=0.4)
+    nowhere = a_diagnosis(verdict={"kind": "none-of-these", "anomaly": location})
     assert marks(an_answer(thing), nowhere)[0].found
 
 
@@ -197,7 +197,7 @@ def test_what_reveal_says() -> None:
     assert "correlated by 0.5" in said
     assert "the interval holds the true size" in said
     assert "Nothing was hidden" in "\n".join(guess_in_words(an_answer(), None))
-    silent = a_diagnosis(verdict={"kind": "nothing-missing"}, suspects=(a_suspect("wind"),), steps=())
+    silent = a_diagnosis(verdict={"kind": "nothing-missing"}, candidate_effects=(a_candidate_effect("wind"),), steps=())
     assert "right" in guess_in_words(an_answer(), silent)[-1]
     assert "missed" in guess_in_words(an_answer(effect), silent)[-1]
     wide = Hidden("mixing[D3]", 0.3, {"width": 0.6}, 6.0)
@@ -208,7 +208,7 @@ def test_what_reveal_says() -> None:
 
 def test_a_hidden_law_is_told_by_its_term_and_quantity() -> None:
     """Its form is not asked for: those of one quantity leave traces that hardly differ."""
-    told = replace(a_diagnosis(steps=()), laws=laws_suspected_of("law_bank_speed_step"))
+    told = replace(a_diagnosis(steps=()), laws=candidate_laws_of("law_bank_speed_step"))
     ramp, other = (Hidden(name, 0.3, {}, 6.0) for name in ("law_bank_speed_ramp", "law_floor_speed_ramp"))
     assert [one.found for one in marks(an_answer(ramp, other), told)] == [True, False]
     assert guess_in_words(an_answer(ramp), told)[-1].endswith("tells of a law of that quantity in that term.")
@@ -254,9 +254,9 @@ def test_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     monkeypatch.setattr("sys.argv", ["vegglue", "reveal", "play"])
     case = load_case(tmp_path / "play" / "play.yaml")
     steps = (Step("gauge_datum", ("gauge_datum",), (1.0,), (("gauge_datum",),), 900.0, 90.0, 0.0),)
-    suspect = a_suspect("gauge_datum", amplitude={"value": 0.1, "interval95": (0.09, 0.11)})
+    suspect = a_candidate_effect("gauge_datum", amplitude={"value": 0.1, "interval95": (0.09, 0.11)})
     (tmp_path / "runs" / "play").mkdir(parents=True)
-    found = a_diagnosis(verdict={"kind": "identified"}, steps=steps, suspects=(suspect,))
+    found = a_diagnosis(verdict={"kind": "identified"}, steps=steps, candidate_effects=(suspect,))
     write_diagnosis(tmp_path / "runs" / "play" / "diagnosis.h5", found, resolved_yaml(case), case_hash(case))
 
     with pytest.raises(SystemExit) as ended:

@@ -16,7 +16,7 @@ from vegglue.measurements.observations import SET_ASIDE, read_observations
 from vegglue.progress import Progress
 from vegglue.report.posterior_words import posterior_in_words
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.kept_words import ladder_that_fits, questions_that_fit
+from vegglue.results.json_store import comparison_that_fits, questions_that_fit
 from vegglue.results.result_files import stored_hash, write_diagnosis
 from vegglue.workflow.infer import is_inferred
 from vegglue.workflow.report import results_of
@@ -87,9 +87,9 @@ def test_the_brook_goes_through_all_verbs(tmp_path: Path) -> None:
     child = vegglue.extend(case, ["streamlining"])
     assert child.source == tmp_path / "brook+streamlining.yaml"
     comparison = vegglue.compare([case, child], runs=runs)
-    assert [rung.name for rung in comparison.rungs] == ["brook", "brook-streamlining"]
+    assert [score.name for score in comparison.model_scores] == ["brook", "brook-streamlining"]
     assert (runs / "brook-streamlining" / "ladder.png").exists()
-    kept = [ladder_that_fits(runs / one.name, case_hash(one)) for one in (case, child)]
+    kept = [comparison_that_fits(runs / one.name, case_hash(one)) for one in (case, child)]
     assert kept[0] == kept[1], "both pages show the same ladder"
     assert kept[0] is not None
     assert [step.added for step in kept[0].steps] == [(), ("streamlining",)]

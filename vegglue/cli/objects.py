@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vegglue.case.schema import Case
-from vegglue.diagnosis.comparison import rung_json
+from vegglue.diagnosis.comparison import model_score_json
 from vegglue.diagnosis.discovered import LawFound
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.measurements.section_discharge import CarriedDischarge
@@ -164,7 +164,10 @@ def _parameter(found: Posterior, name: str) -> Told:
 
 
 def _comparison(found: Comparison) -> Told:
-    return {"rungs": [rung_json(one) for one in found.rungs], "left_out": found.left_out.to_dict("records")}
+    return {
+        "rungs": [model_score_json(one) for one in found.model_scores],
+        "left_out": found.left_out.to_dict("records"),
+    }
 
 
 def _question(question: Question) -> Told:

@@ -10,9 +10,9 @@ from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.report.homogeneity_words import REJECTED_BELOW
-from vegglue.results.diagnosis import Diagnosis, Suspect
+from vegglue.results.diagnosis import CandidateEffect, Diagnosis
+from vegglue.results.model_score import ModelScore
 from vegglue.results.open_questions import Question
-from vegglue.results.rung import Rung
 from vegglue.wording.numbers import in_digits, range_in_digits, so_many
 from vegglue.workflow.compare import Comparison
 
@@ -56,12 +56,12 @@ def show_diagnosis(found: Diagnosis) -> None:
 
 
 def _show_suspects(found: Diagnosis) -> None:
-    rows = [_suspect_cells(found, one) for one in found.suspects[:SUSPECTS_SHOWN]]
+    rows = [_suspect_cells(found, one) for one in found.candidate_effects[:SUSPECTS_SHOWN]]
     headings = "effect", "chance", "amplitude", "95 % interval", "score", "p (family)", "visible", "detectable from"
     print_table(headings, rows, headings[1:5])
 
 
-def _suspect_cells(found: Diagnosis, one: Suspect) -> tuple[str, ...]:
+def _suspect_cells(found: Diagnosis, one: CandidateEffect) -> tuple[str, ...]:
     """An effect's row of the table. Its score before anything was accepted, and after; of what was refitted, only the
     former, as its amplitude says the rest.
     """
@@ -110,7 +110,7 @@ def _error(value: float, digits: str = ".4f") -> str:
     return "-" if np.isnan(value) else f"{value:{digits}}"
 
 
-def _gain(before: Rung | None, one: Rung) -> str:
+def _gain(before: ModelScore | None, one: ModelScore) -> str:
     """By how much held-out squares fell [(mm/s)^2]; the error of that is - where one section alone was held out."""
     gain, error = (1e6 * part for part in improvement(before, one)) if before else (float("nan"),) * 2
     return "" if np.isnan(gain) else f"{in_digits(gain, 2)} ± {'-' if np.isnan(error) else in_digits(error, 1)}"
@@ -118,46 +118,46 @@ def _gain(before: Rung | None, one: Rung) -> str:
 
 def show_ladder(found: Comparison) -> None:
     """The error ladder as a table, what it leaves out, and which parameters differ between experiments."""
-    rungs, note = found.rungs, exclusion_in_words(found.left_out)
-    others, validated = _other_kinds(rungs), any(np.isfinite(one.validation) for one in rungs)
+    scores, note = found.model_scores, exclusion_in_words(found.left_out)
+    others, validated = _other_kinds(scores), any(np.isfinite(one.validation) for one in scores)
     headings = ("model", "parameters", "RMSE", "levels", *(f"{kind.words} [{kind.unit}]" for kind in others),
                 "chi2 / n", "held out (section)", "fell by", "held out (exp.)", "log score", "in 50 %", "in 95 %",
                 *(["validation"] if validated else []))  # fmt: skip
     rows = []
-    for before, one in zip([None, *rungs[:-1]], rungs, strict=True):
-        seen, scores = one.in_sample, one.predictive
+    for before, one in zip([None, *scores[:-1]], scores, strict=True):
+        seen, held_out = one.in_sample, one.predictive
         rows.append((
             one.name, str(len(one.values)), _error(seen.rmse[STREAMWISE]), _error(seen.rmse[WATER_LEVEL]),
             *(_error(seen.rmse[kind.name]) for kind in others), f"{seen.chi2:.0f} / {seen.stations}",
             _error(held_out_rmse(one)), _gain(before, one), _error(held_out_rmse(one, "experiments")),
-            _error(scores.log_score, ".2f"), _error(scores.inside50, ".0%"), _error(scores.inside95, ".0%"),
+            _error(held_out.log_score, ".2f"), _error(held_out.inside50, ".0%"), _error(held_out.inside95, ".0%"),
             *([_error(one.validation)] if validated else []),
         ))  # fmt: skip
     print_table(headings, rows, [one for one in FIRST_OF_LADDER if one in headings])
-    if rungs:
+    if scores:
         console().print(
             f"Errors in m/s (levels in m), `fell by` in (mm/s)^2 of held-out squares; noise floor "
-            f"{_error(rungs[-1].in_sample.noise_floor)} m/s; compare chi2 here only."
+            f"{_error(scores[-1].in_sample.noise_floor)} m/s; compare chi2 here only."
         )
     if note:
         console().print(note)
-    differing = {one.name: moving for one in rungs if (moving := _moving(one))}
+    differing = {one.name: moving for one in scores if (moving := _moving(one))}
     for name, moving in differing.items():
         console().print(f"- {name}: differs between experiments: {moving}")
     if differing:
         console().print(UNDER_STATED_ERRORS)
 
 
-def _moving(one: Rung) -> str:
+def _moving(one: ModelScore) -> str:
     """`n_b (p = 1e-08), k_s (p = 0.002)`: parameters that differ between experiments, '' for none."""
     compared = len(one.homogeneity)
     return ", ".join(f"{name} (p = {p:.1g})" for name, p in one.homogeneity.items() if p * compared < REJECTED_BELOW)
 
 
-def _other_kinds(rungs: Sequence[Rung]) -> list[Kind]:
+def _other_kinds(scores: Sequence[ModelScore]) -> list[Kind]:
     """What was measured besides velocities along x and levels."""
     others = (kind for kind in KINDS.values() if kind.name not in (STREAMWISE, WATER_LEVEL))
-    return [kind for kind in others if any(np.isfinite(one.in_sample.rmse[kind.name]) for one in rungs)]
+    return [kind for kind in others if any(np.isfinite(one.in_sample.rmse[kind.name]) for one in scores)]
 
 
 def show_questions(name: str, found: Sequence[Question]) -> None:

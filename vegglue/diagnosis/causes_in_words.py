@@ -7,17 +7,17 @@ import numpy as np
 from vegglue.calibration.candidates import Instrument
 from vegglue.calibration.fingerprints import EFFECT_AT_PLACE
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import Contender
-from vegglue.diagnosis.findings import Findings, Undecided
-from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD, LawsSuspected
+from vegglue.diagnosis.competition import Hypothesis
+from vegglue.diagnosis.search_state import SearchState, Undecided
+from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD, CandidateLaws
 from vegglue.results.diagnosis import (
+    CandidateEffect,
     EstimatedErrors,
     FaultyInstrument,
     FieldFound,
-    Location,
+    LocalAnomaly,
     ModelErrorUsed,
     Step,
-    Suspect,
 )
 from vegglue.wording.numbers import in_digits, listed, range_in_digits
 
@@ -27,19 +27,19 @@ STATED_BELOW = 0.995
 TOLD_ERROR = 0.3
 # Terms whose size is part of what acts, in words.
 TOLD_BY_SIZE = ("bed", "inflow")
-# Contenders that are told where none is surely it, and effects that stand out beside what was accepted.
+# Hypotheses that are told where none is surely it, and effects that stand out beside what was accepted.
 UNDECIDED_TOLD, STANDING_OUT_TOLD = 3, 3
 # p below which it is one over the number of draws: none of them was as large.
 LEAST_P_TOLD = 5e-4
 
 
-def causes_in_words(found: Findings, suspects: Sequence[Suspect]) -> str:
+def causes_in_words(found: SearchState, candidate_effects: Sequence[CandidateEffect]) -> str:
     """Places, then effects."""
     places = [_place_words(one) for one in found.places]
-    return "; and ".join([*places, *(_step_words(step, suspects) for step in found.steps)])
+    return "; and ".join([*places, *(_step_words(step, candidate_effects) for step in found.steps)])
 
 
-def _place_words(place: Location) -> str:
+def _place_words(place: LocalAnomaly) -> str:
     low, high = place.interval95
     at = f"x = {place.x:.1f}{_give_or_take(place.x_error)}, y = {place.y:.1f}{_give_or_take(place.y_error)} m"
     range95 = range_in_digits((low, high))
@@ -49,7 +49,7 @@ def _place_words(place: Location) -> str:
     return f"at {at} it acts as if {what} ({'; '.join([told, *_against(place)])})"
 
 
-def _against(place: Location) -> list[str]:
+def _against(place: LocalAnomaly) -> list[str]:
     """Odds against the nearest other term, and against what is known where that is near."""
     nearest = sorted(place.odds.items(), key=lambda one: one[1])
     terms = [one for one in nearest if one[0] in EFFECT_AT_PLACE][:1]
@@ -100,7 +100,7 @@ def _percent(chance: float) -> str:
 TO_DISCOVER = "`vegglue discover` calibrates such laws beside what is listed, and writes the best one down."
 
 
-def law_in_words(laws: LawsSuspected) -> str:
+def law_in_words(laws: CandidateLaws) -> str:
     """Which quantity in which term, and how likely."""
     best, chance = laws.laws[0], sum(one.chance for one in laws.alike)
     return (
@@ -133,10 +133,10 @@ def _where(x: float, y: float) -> str:
     return ", ".join(f"{name} = {in_digits(value, 4)}" for name, value in (("x", x), ("y", y)) if np.isfinite(value))
 
 
-def _step_words(step: Step, suspects: Sequence[Suspect]) -> str:
+def _step_words(step: Step, candidate_effects: Sequence[CandidateEffect]) -> str:
     """A place that is likelier than every effect comes first, then the accepted effect, then what it may be instead."""
     first = step.likelier_place
-    by_name = {suspect.name: suspect for suspect in suspects}
+    by_name = {candidate_effect.name: candidate_effect for candidate_effect in candidate_effects}
     best = by_name[step.accepted]
     low, high = best.amplitude.interval95
     unit = "" if best.amplitude.unit == "-" else f" {best.amplitude.unit}"
@@ -180,18 +180,18 @@ def _briefly(term: str, amplitude: float, x: float, y: float) -> str:
     return f"something in no list, as if {_what_acts(term, amplitude)} at x = {x:.1f}, y = {y:.1f} m"
 
 
-def left_over_in_words(errors: EstimatedErrors, standing_out: Mapping[str, float], remainder: bool) -> str:
+def left_over_in_words(errors: EstimatedErrors, significant_effects: Mapping[str, float], remainder: bool) -> str:
     """What the model with all that was accepted still asks for: larger errors than stated, and which effects stand out
     in it; '' for neither. remainder: whether these may be what is left of what was accepted.
     """
     asked = f"Even so the model asks for errors {errors.scale:.1f} times as large as stated"
     larger = f"{asked}; chi2 and intervals are under these."
-    return " ".join([*([larger] if errors.clearly_larger else []), *_standing_out_words(standing_out, remainder)])
+    return " ".join([*([larger] if errors.clearly_larger else []), *_significant_words(significant_effects, remainder)])
 
 
-def _standing_out_words(standing_out: Mapping[str, float], remainder: bool) -> list[str]:
+def _significant_words(significant_effects: Mapping[str, float], remainder: bool) -> list[str]:
     """A sentence on the effects that stand out, the clearest first."""
-    ranked = sorted(standing_out.items(), key=lambda one: one[1])
+    ranked = sorted(significant_effects.items(), key=lambda one: one[1])
     told = [f"{name} ({p_in_words(p)})" for name, p in ranked[:STANDING_OUT_TOLD]]
     left = len(ranked) - len(told)
     names = listed([*told, *([f"{left} more"] if left else [])])
@@ -206,23 +206,23 @@ def p_in_words(p: float) -> str:
 
 
 def undecided_in_words(undecided: Undecided) -> str:
-    """The likeliest contenders with their chances among all of them."""
-    return " or ".join(f"{_contender_words(one)} ({_percent(chance)})" for one, chance in _told_of(undecided))
+    """The likeliest hypotheses with their chances among all of them."""
+    return " or ".join(f"{_hypothesis_words(one)} ({_percent(chance)})" for one, chance in _told_of(undecided))
 
 
-def places_told(found: Findings) -> list[tuple[float, float]]:
+def places_told(found: SearchState) -> list[tuple[float, float]]:
     """x and y [m] of what the sentence on causes tells at places outside the list."""
     rivals = [one.what for one, _ in _told_of(found.undecided) if one.kind != "effect"] if found.undecided else []
     of_rivals = [(one.shapes["x"], one.shapes["y"]) for one in rivals if not isinstance(one, Instrument)]
     return [(one.x, one.y) for one in found.places] or of_rivals
 
 
-def _told_of(undecided: Undecided) -> list[tuple[Contender, float]]:
-    pairs = zip(undecided.contenders, undecided.chances, strict=True)
+def _told_of(undecided: Undecided) -> list[tuple[Hypothesis, float]]:
+    pairs = zip(undecided.hypotheses, undecided.chances, strict=True)
     return sorted(pairs, key=lambda one: -one[1])[:UNDECIDED_TOLD]
 
 
-def _contender_words(one: Contender) -> str:
+def _hypothesis_words(one: Hypothesis) -> str:
     """The name of an effect, what something unlisted does and where, or which instrument is off."""
     if isinstance(one.what, Instrument):
         return f"{FAULT_WORDS[one.what.kind]} at {_where(one.what.x, one.what.y)} m"

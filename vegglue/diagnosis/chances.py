@@ -2,9 +2,9 @@
 
 from vegglue.arrays import Array
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.tempered_chances import tempered_chances
+from vegglue.diagnosis.tempered_probabilities import tempered_probabilities
 
 
 def chances_in_set(evidence: Array) -> Array:
     """p_j of the ln evidence of each (k,) [-], as in `competition`, with law_fingerprint_error."""
-    return tempered_chances(evidence, constants().law_fingerprint_error)
+    return tempered_probabilities(evidence, constants().law_fingerprint_error)

@@ -29,7 +29,7 @@ from vegglue.effects.definition import Effect
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.errors import InputError
-from vegglue.results.diagnosis import Location
+from vegglue.results.diagnosis import LocalAnomaly
 
 
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
@@ -86,7 +86,7 @@ def _acting_in(case: Case, effect: Effect, kind: str | None, where: tuple[str, .
     return acting_in(effect, kind, where) if kind else Candidate(effect)
 
 
-def spread_over_its_error(location: Location) -> Location:
+def spread_over_its_error(anomaly: LocalAnomaly) -> LocalAnomaly:
     """Something at a place, spread over where it may lie: to first order it does the mean of what it may do.
 
         l' = (l^2 + 2 e_x^2)^(1/2),   w' = (w^2 + 2 e_y^2)^(1/2),   a' = a l w / (l' w')
@@ -95,23 +95,23 @@ def spread_over_its_error(location: Location) -> Location:
     """
     length, width = (
         round(float(np.hypot(half, 2.0**0.5 * error)), 2)
-        for half, error in ((location.length, location.x_spread), (location.width, location.y_spread))
+        for half, error in ((anomaly.length, anomaly.x_spread), (anomaly.width, anomaly.y_spread))
     )
-    share = 1.0 if location.term == "inflow" else location.length * location.width / (length * width)
-    low, high = location.interval95
+    share = 1.0 if anomaly.term == "inflow" else anomaly.length * anomaly.width / (length * width)
+    low, high = anomaly.interval95
     return replace(
-        location,
+        anomaly,
         length=length,
         width=width,
-        amplitude=share * location.amplitude,
+        amplitude=share * anomaly.amplitude,
         interval95=(share * low, share * high),
-        plausible=share * location.plausible,
+        plausible=share * anomaly.plausible,
     )
 
 
-def candidate_at(case: Case, location: Location) -> Candidate:
+def candidate_at(case: Case, anomaly: LocalAnomaly) -> Candidate:
     """Something unlisted where a diagnosis found it, with the size that the diagnosis held to be plausible there."""
-    return place_candidate(library(case.effect_file)[location.effect], location.shapes, location.plausible)
+    return place_candidate(library(case.effect_file)[anomaly.effect], anomaly.shapes, anomaly.plausible)
 
 
 def with_additions(parent: Case, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Case:

@@ -23,14 +23,14 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
-from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
+from vegglue.results.model_score import HeldOut, InSample, ModelScore, PredictiveScores
 from vegglue.wording.numbers import in_digits, so_many
 
 # What is left out in turn.
 By = Literal["sections", "experiments"]
 
 
-def rung(base: Baseline, validation: Model | None = None) -> Rung:
+def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
     """What there is to say of one calibrated model; validation: the same at stations it has not seen."""
     model, noise, point = base.model, base.noise, base.fitted.point
     used = model.station.iloc[noise.rows]
@@ -38,7 +38,7 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
     section, spread = _held_out(base, used["section"].astype(str).to_numpy())
     experiment, _ = _held_out(base, used["experiment"].astype(str).to_numpy())
     clusters = tuple((str(e), str(s)) for e, s in zip(used["experiment"], used["section"], strict=True))
-    return Rung(
+    return ModelScore(
         name=model.case.name,
         title=model.case.title,
         effects=tuple(model.case.effects),
@@ -51,43 +51,45 @@ def rung(base: Baseline, validation: Model | None = None) -> Rung:
     )
 
 
-def held_out_rmse(rung: Rung, by: By = "sections", untold: Collection[str] = ()) -> float:
+def held_out_rmse(score: ModelScore, by: By = "sections", untold: Collection[str] = ()) -> float:
     """Root mean square held-out error of velocities [m/s]; untold: sections or experiments that do not count."""
-    error = _of_velocities(rung, by, untold)
+    error = _of_velocities(score, by, untold)
     return root_mean_square(error[np.isfinite(error)])
 
 
-def rung_in_short(rung: Rung) -> str:
+def model_score_in_short(score: ModelScore) -> str:
     """One line: errors of velocity [m/s] at what the model has seen, and at what was held out or never seen."""
     told = {
-        "seen": rung.in_sample.velocity,
-        "section held out": held_out_rmse(rung),
-        "experiment held out": held_out_rmse(rung, "experiments"),
-        "never seen": rung.validation,
-        "noise floor": rung.in_sample.noise_floor,
+        "seen": score.in_sample.velocity,
+        "section held out": held_out_rmse(score),
+        "experiment held out": held_out_rmse(score, "experiments"),
+        "never seen": score.validation,
+        "noise floor": score.in_sample.noise_floor,
     }
     known = [f"{words} {in_digits(value, 2)}" for words, value in told.items() if np.isfinite(value)]
-    return f"{rung.name}, {so_many(len(rung.values), 'parameter')}: {', '.join(known) or 'no velocity'}"
+    return f"{score.name}, {so_many(len(score.values), 'parameter')}: {', '.join(known) or 'no velocity'}"
 
 
-def rung_json(rung: Rung) -> dict[str, Any]:
+def model_score_json(score: ModelScore) -> dict[str, Any]:
     """One object with every number of a model that is printed."""
     return {
-        "name": rung.name,
-        "title": rung.title,
-        "effects": rung.effects,
-        "parameters": len(rung.values),
-        **asdict(rung.in_sample),
-        **asdict(rung.predictive),
-        "values": rung.values,
-        "homogeneity": rung.homogeneity,
-        "validation": rung.validation,
-        "held_out_sections": held_out_rmse(rung),
-        "held_out_experiments": held_out_rmse(rung, "experiments"),
+        "name": score.name,
+        "title": score.title,
+        "effects": score.effects,
+        "parameters": len(score.values),
+        **asdict(score.in_sample),
+        **asdict(score.predictive),
+        "values": score.values,
+        "homogeneity": score.homogeneity,
+        "validation": score.validation,
+        "held_out_sections": held_out_rmse(score),
+        "held_out_experiments": held_out_rmse(score, "experiments"),
     }
 
 
-def improvement(before: Rung, after: Rung, by: By = "sections", untold: Collection[str] = ()) -> tuple[float, float]:
+def improvement(
+    before: ModelScore, after: ModelScore, by: By = "sections", untold: Collection[str] = ()
+) -> tuple[float, float]:
     """Mean of e_before^2 - e_after^2 over held-out velocities, and its standard error, both in (m/s)^2.
 
         se^2 = (K - 1) / K sum_k (m_(k) - m)^2
@@ -131,9 +133,9 @@ def homogeneity(base: Baseline) -> dict[str, float]:
     return {name: p for name, p in chances.items() if np.isfinite(p)}
 
 
-def _of_velocities(rung: Rung, by: By, untold: Collection[str]) -> Array:
+def _of_velocities(score: ModelScore, by: By, untold: Collection[str]) -> Array:
     """Held-out errors of velocities (v,), NaN where they do not count."""
-    held_out = rung.held_out
+    held_out = score.held_out
     error = held_out.sections if by == "sections" else held_out.experiments
     group = [section if by == "sections" else experiment for experiment, section in held_out.clusters]
     return np.where([one in untold for one in group], np.nan, error)[held_out.velocity]

@@ -5,7 +5,7 @@
 Of each kind the most promising hypotheses are calibrated in earnest, and their evidence E is Laplace's (`refits`); of
 those of its kind that were not, it is the one to first order, corrected as that of the best of them. Instruments change
 no flow: to first order is exact for them but for the parameters. What is how likely before says `evidence`, and
-their chances are tempered, see `tempered_chances`.
+their chances are tempered, see `tempered_probabilities`.
 
 Smooth fields of a term (`field_scan`) are so free that they explain much of whatever is missing. They do not compete
 with a single cause, but with all that was accepted in the end.
@@ -24,7 +24,7 @@ from vegglue.calibration.residual_screening import Screening, SecondLook, refit_
 from vegglue.calibration.score_test import HypothesisKind, kind_named
 from vegglue.diagnosis.place_search import found_place
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
-from vegglue.diagnosis.tempered_chances import tempered_chances, tempering
+from vegglue.diagnosis.tempered_probabilities import tempered_probabilities, tempering
 from vegglue.effects.library import library
 from vegglue.progress import Progress, Watch
 
@@ -37,7 +37,7 @@ START_SHARES = (1.0, 0.3)
 
 
 @dataclass(frozen=True)
-class Contender:
+class Hypothesis:
     """A hypothesis with its evidence E [-]. kind: effect, a term at a place, or an instrument's kind; column: of its
     fingerprint among those of its kind; what: its refit, or the instrument; errors, spread: of x and y of a
     place [m], see `FoundPlace`.
@@ -52,7 +52,7 @@ class Contender:
     spread: tuple[float, float] = (0.0, 0.0)
 
 
-def contenders_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf) -> list[Contender]:
+def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf) -> list[Hypothesis]:
     """Everything that was tried, most evidence first; elsewhere: ln evidence of what competes besides.
 
     To first order an effect may promise more than it keeps, or have no flow at all. Then what is within reach of the
@@ -61,7 +61,7 @@ def contenders_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
     kind, looks = screening.kinds[0], second_looks(screening)
     linear = _linear_evidence(kind, looks)
     best = max(*(kind.total for kind in screening.kinds), float(linear.max(initial=-np.inf)), elsewhere)
-    found, tried = _instrument_contenders(screening), set[str]()
+    found, tried = _instrument_hypotheses(screening), set[str]()
     while True:
         of_round = _round(screening, linear, best, tried)
         if not of_round.effects and not of_round.places:
@@ -108,8 +108,8 @@ def _promises(screening: Screening, linear: Array, tried: set[str]) -> list[floa
 
 def _refitted(
     screening: Screening, of_round: _Round, promised: tuple[Array, Sequence[SecondLook]], watch: Watch
-) -> list[Contender]:
-    """Contenders of one round, those that found a flow; promised: evidence to first order, and the second looks."""
+) -> list[Hypothesis]:
+    """Hypotheses of one round, those that found a flow; promised: evidence to first order, and the second looks."""
     linear = promised[0]
     effects, spots = of_round.effects, [(one, spot) for one, some in of_round.places for spot in some]
     trials = [_effect_trial(screening, j, *promised) for j in effects]
@@ -120,29 +120,29 @@ def _refitted(
         if refit is not None:
             column = _column_of(screening, j, linear)
             evidence = refit.log_factor + _settings_charge(screening, j, column)
-            found.append(Contender("effect", refit.candidate.name, evidence, column, refit))
+            found.append(Hypothesis("effect", refit.candidate.name, evidence, column, refit))
     for one, _ in of_round.places:
         of_term = zip(spots, refits[len(effects) :], strict=True)
         ended = [(spot, refit) for (where, spot), refit in of_term if where is one and refit is not None]
-        found += _place_contender(screening.search, one, kind_named(screening.kinds, one.term), ended)
+        found += _place_hypothesis(screening.search, one, kind_named(screening.kinds, one.term), ended)
     return found
 
 
-def _place_contender(
+def _place_hypothesis(
     search: SearchModel, places: Places, kind: HypothesisKind, refits: Sequence[tuple[int, Refit]]
-) -> list[Contender]:
+) -> list[Hypothesis]:
     """Something at the place where it explains most, see `place_search`; none if no flow was found at any spot."""
     if not refits:
         return []
     spot, best = max(refits, key=lambda one: one[1].log_factor)
     there = found_place(search, places, kind, spot, best)
     found = there.refit
-    return [Contender(kind.name, found.candidate.name, there.log_evidence, spot, found, there.errors, there.spread)]
+    return [Hypothesis(kind.name, found.candidate.name, there.log_evidence, spot, found, there.errors, there.spread)]
 
 
-def chances_of(contenders: Sequence[Contender]) -> Array:
+def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
     """Chance of each to be what is missing, were it one of them (k,) [-], see the head of this file."""
-    return tempered_chances(np.array([one.log_evidence for one in contenders]))
+    return tempered_probabilities(np.array([one.log_evidence for one in hypotheses]))
 
 
 def _within_reach(evidence: float, best: float) -> bool:
@@ -222,10 +222,10 @@ def _settings_charge(screening: Screening, candidate: int, column: int) -> float
     return float(kind.log_prior[column]) + others
 
 
-def _instrument_contenders(screening: Screening) -> list[Contender]:
+def _instrument_hypotheses(screening: Screening) -> list[Hypothesis]:
     """The best instrument of each kind, with the evidence of its kind."""
     return [
-        Contender(kind.name, kind.name, kind.total, kind.best, screening.instruments[kind.name][kind.best])
+        Hypothesis(kind.name, kind.name, kind.total, kind.best, screening.instruments[kind.name][kind.best])
         for kind in screening.kinds
         if kind.name in screening.instruments
     ]

@@ -16,36 +16,36 @@ from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.channel_geometry import half_width
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.between_sections import largest_error_between
+from vegglue.diagnosis.candidate_effects import candidate_effects_of, not_excluded
 from vegglue.diagnosis.causes_in_words import places_told
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
-from vegglue.diagnosis.findings import Findings
-from vegglue.diagnosis.grounds import Grounds
 from vegglue.diagnosis.measured_stretch import stretch_in_words
 from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.places_on_map import places_on_map_in_words
-from vegglue.diagnosis.suspects import not_excluded, suspects_of
-from vegglue.diagnosis.tempered_chances import tempering
-from vegglue.diagnosis.unlisted_laws import clearly_a_law, law_goes_first, laws_suspected
+from vegglue.diagnosis.search_state import SearchState
+from vegglue.diagnosis.tempered_probabilities import tempering
+from vegglue.diagnosis.unlisted_laws import candidate_laws, clearly_a_law, law_goes_first
 from vegglue.diagnosis.unseen import UnseenErrors, unseen_errors
-from vegglue.diagnosis.verdict import judged
+from vegglue.diagnosis.verdict import make_verdict
+from vegglue.diagnosis.verdict_inputs import VerdictInputs
 from vegglue.engine.interface import Model
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.section_discharge import mismatched_discharges
 from vegglue.results.diagnosis import (
+    CandidateEffect,
     Diagnosis,
     EstimatedErrors,
     FieldFound,
     FieldMapKept,
     FirstScreening,
-    Location,
+    LocalAnomaly,
     Misfit,
     ModelErrorUsed,
     ParameterEstimates,
     PlaceMap,
     Predictions,
-    Suspect,
 )
 from vegglue.version import VERSION
 
@@ -60,34 +60,36 @@ NEIGHBOURS_WITHIN = 1.5
 ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
 
-def concluded(
+def assemble_diagnosis(
     first: Screening,
     last: Screening,
-    found: Findings,
-    suspects: Mapping[str, Suspect],
+    found: SearchState,
+    candidate_effects: Mapping[str, CandidateEffect],
     unseen: Model | None,
     laws_beside_first: Callable[[], LawScreening | None],
 ) -> Diagnosis:
-    """The diagnosis; suspects: of every effect by its name; unseen: the model where nothing was calibrated."""
-    laws = laws_suspected(first, last, found, laws_beside_first)
+    """The diagnosis; candidate_effects: of every effect by its name; unseen: the model where nothing was calibrated."""
+    laws = candidate_laws(first, last, found, laws_beside_first)
     if found.places and not found.steps and not found.instruments and clearly_a_law(laws):
         # What competed after the place did so in the flow with it.
-        found = replace(found, places=(), charges=(), of_shape=0.0, undecided=None)
-        last, suspects = first, suspects_of(first)
+        found = replace(found, places=(), prior_weights=(), of_shape=0.0, undecided=None)
+        last, candidate_effects = first, candidate_effects_of(first)
     found = replace(found, places=tuple(as_calibrated(one, last.base) for one in found.places))
-    ranked = tuple(sorted(suspects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
+    ranked = tuple(
+        sorted(candidate_effects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2)))
+    )
     misfit = misfit_of(first, last, found.flagged)
     field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
-    grounds = replace(_grounds(last, found, misfit, unseen), field=field, laws=laws)
+    inputs = replace(_inputs(last, found, misfit, unseen), field=field, laws=laws)
     base, before = last.base, first.base
     return Diagnosis(
         name=before.model.case.name,
         version=VERSION,
-        verdict=judged(grounds, ranked),
-        suspects=ranked,
+        verdict=make_verdict(inputs, ranked),
+        candidate_effects=ranked,
         steps=found.steps,
         misfit=misfit,
-        errors=grounds.errors,
+        errors=inputs.errors,
         first_screening=_first_screening(first),
         parameters=_parameters(before, base),
         predictions=Predictions(
@@ -100,29 +102,29 @@ def concluded(
         places=found.places,
         instruments=found.instruments,
         field=field,
-        model_error=grounds.model_error,
+        model_error=inputs.model_error,
         field_map=field_map,
         laws=laws,
     )
 
 
-def as_calibrated(place: Location, base: Baseline) -> Location:
+def as_calibrated(place: LocalAnomaly, base: Baseline) -> LocalAnomaly:
     """The place with its amplitude in the last model, in which what was accepted after it is calibrated, too."""
     parameter = candidate_at(base.model.case, place).parameter
     value, low, high = interval95(base.model, base.fitted, parameter)
     return replace(place, amplitude=value, interval95=(low, high))
 
 
-def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | None) -> Grounds:
+def _inputs(last: Screening, found: SearchState, misfit: Misfit, unseen: Model | None) -> VerdictInputs:
     """What the verdict rests on, but for fields and laws."""
     silent = not (found.steps or found.places or found.undecided)
-    beside = standing_out(last, found)
+    beside = significant_effects(last, found)
     there = unseen_errors(last.base, unseen) if silent and unseen is not None else UnseenErrors(float("nan"), 1.0)
     model = last.base.model
-    return Grounds(
+    return VerdictInputs(
         errors=estimated_errors(last, found),
         misfit=misfit,
-        findings=found,
+        state=found,
         field=None,
         model_error=_model_error(last),
         not_excluded=() if found.absurd else not_excluded(last),
@@ -135,12 +137,12 @@ def _grounds(last: Screening, found: Findings, misfit: Misfit, unseen: Model | N
         on_map=places_on_map_in_words(model.case, places_told(found)),
         places_searched=any(one.x.size for one in last.fingerprints.places),
         carried=tuple(mismatched_discharges(model.case, model.site, model.station)),
-        standing_out=beside,
-        remainder=bool(beside) and not standing_out(last, found, found.slack),
+        significant_effects=beside,
+        remainder=bool(beside) and not significant_effects(last, found, found.slack),
     )
 
 
-def standing_out(last: Screening, found: Findings, slack: float = 0.0) -> dict[str, float]:
+def significant_effects(last: Screening, found: SearchState, slack: float = 0.0) -> dict[str, float]:
     """Effects that stand out in the last model and are not in it, with the family-wise p of each [-].
 
     slack: by how much their scores are made smaller first [standard errors].
@@ -176,7 +178,7 @@ def _parameters(before: Baseline, after: Baseline) -> ParameterEstimates:
     )
 
 
-def estimated_errors(screening: Screening, found: Findings) -> EstimatedErrors:
+def estimated_errors(screening: Screening, found: SearchState) -> EstimatedErrors:
     """What the errors are taken to be after the last screening; that of the grid is told of velocities alone [m/s]."""
     noise = screening.base.noise
     flagged = tuple(int(noise.rows[row]) for row in found.flagged)
@@ -200,7 +202,7 @@ def _model_error(screening: Screening) -> ModelErrorUsed | None:
 
 
 def _field(
-    first: Screening, last: Screening, found: Findings, misfit: Misfit
+    first: Screening, last: Screening, found: SearchState, misfit: Misfit
 ) -> tuple[FieldFound, FieldMapKept] | tuple[None, None]:
     """A smooth field of one term and its map, where it explains the misfit of the first model better than all that was
     accepted, or closes a misfit in which nothing was; None where there is nothing to explain, or where a place of the
@@ -211,7 +213,7 @@ def _field(
     screening = first if found.accepted else last
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
     gained = found.gained(log_evidence(first.base), log_evidence(last.base)) if found.accepted else 0.0
-    undecided = found.undecided.contenders if found.undecided else ()
+    undecided = found.undecided.hypotheses if found.undecided else ()
     gained = max([gained, *(one.log_evidence for one in undecided)])
     told_as_place = {"friction" if place.term == "drag" else place.term for place in found.places}
     if not field_goes_first(best.log_factor, gained) or best.term in told_as_place:
@@ -238,7 +240,7 @@ def field_goes_first(log_factor: float, gained: float) -> bool:
     return bool(ahead > np.log(constants().field_odds))
 
 
-def _neighbours_aside(screening: Screening, found: Findings) -> bool:
+def _neighbours_aside(screening: Screening, found: SearchState) -> bool:
     """Whether two single readings were set aside that stand side by side in one section."""
     single = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
     noise = screening.base.noise
@@ -268,7 +270,7 @@ def _first_screening(screening: Screening) -> FirstScreening:
     )
 
 
-def _place_map(screening: Screening, found: Findings) -> PlaceMap:
+def _place_map(screening: Screening, found: SearchState) -> PlaceMap:
     """Scores of the term of the first place that was found, else of drag, before anything was accepted."""
     term = found.places[0].term if found.places else "drag"
     places = next(one for one in screening.fingerprints.places if one.term == term)

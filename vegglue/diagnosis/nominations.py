@@ -8,10 +8,10 @@ from vegglue.calibration.candidates import Candidate
 from vegglue.case.schema import Case
 from vegglue.diagnosis.between_sections import acts_elsewhere
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error
-from vegglue.diagnosis.comparison import By, rung
+from vegglue.diagnosis.comparison import By, model_score
 from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
-from vegglue.results.diagnosis import Diagnosis, Location
-from vegglue.results.rung import Rung
+from vegglue.results.diagnosis import Diagnosis, LocalAnomaly
+from vegglue.results.model_score import ModelScore
 
 Addition = tuple[Candidate, Mapping[str, float]]  # an effect, and values of its shapes
 
@@ -22,7 +22,8 @@ def found_additions(case: Case, found: Diagnosis) -> list[Addition]:
     """
     station = found.predictions.station
     added: list[Addition] = [
-        (candidate_named(case, station, step.accepted), found.suspect(step.accepted).shapes) for step in found.steps
+        (candidate_named(case, station, step.accepted), found.candidate_effect(step.accepted).shapes)
+        for step in found.steps
     ]
     spread = [spread_over_its_error(place) for place in found.places]
     added += [(candidate_at(case, place), place.shapes) for place in spread]
@@ -49,17 +50,17 @@ def choice_among(case: Case, found: Diagnosis, base_with: Callable[[Names], Base
 
     base_with: the calibrated model with some of what is tried, by name; None where it finds no flow.
     """
-    rungs: dict[Names, Rung | None] = {}
+    scores: dict[Names, ModelScore | None] = {}
 
-    def rung_with(names: Names) -> Rung | None:
-        if names not in rungs:
+    def score_with(names: Names) -> ModelScore | None:
+        if names not in scores:
             base = base_with(names)
-            rungs[names] = None if base is None else rung(base)
-        return rungs[names]
+            scores[names] = None if base is None else model_score(base)
+        return scores[names]
 
     tried = nominees(case, found)
     elsewhere = _acting_elsewhere(case, found, [one.name for one in tried], base_with)
-    choice = chosen([one for one in tried if one.name not in elsewhere], rung_with, in_doubt(found))
+    choice = chosen([one for one in tried if one.name not in elsewhere], score_with, in_doubt(found))
     return replace(choice, refused=elsewhere | choice.refused)
 
 
@@ -90,12 +91,12 @@ def _only_in(one: Candidate) -> dict[By, str]:
     return {by: names[0] for by, names in groups.items() if len(names) == 1}
 
 
-def places_tried(found: Diagnosis) -> list[Location]:
+def places_tried(found: Diagnosis) -> list[LocalAnomaly]:
     """Places that were found and those that are likelier than an effect, spread over where they may lie."""
     return [*(spread_over_its_error(place) for place in found.places), *_likelier_places(found).values()]
 
 
-def _likelier_places(found: Diagnosis) -> dict[str, Location]:
+def _likelier_places(found: Diagnosis) -> dict[str, LocalAnomaly]:
     """Places that are likelier than an accepted effect, by its name, spread over where they may lie."""
     return {
         step.accepted: spread_over_its_error(step.places[step.likelier_place])

@@ -19,7 +19,7 @@ from vegglue.calibration.candidates import place_candidate, with_effect
 from vegglue.calibration.fingerprints import Places, places_around
 from vegglue.calibration.score_test import HypothesisKind, expected_gain, log_factors
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
-from vegglue.diagnosis.tempered_chances import tempered_chances
+from vegglue.diagnosis.tempered_probabilities import tempered_probabilities
 
 # Distance of the places that are looked at around a refitted one, over that of the spots of the screening [-]. Chosen,
 # not measured.
@@ -67,7 +67,9 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
         np.concatenate([places.y[~near], window.y]) - moved.shapes["y"],
     ])  # fmt: skip
     total = float(logsumexp(weight))
-    errors, spread = (_root_mean_square(away, chance) for chance in (tempered_chances(weight), np.exp(weight - total)))
+    errors, spread = (
+        _root_mean_square(away, chance) for chance in (tempered_probabilities(weight), np.exp(weight - total))
+    )
     return FoundPlace(moved, total, errors, spread)
 
 

@@ -34,7 +34,7 @@ from vegglue.engine.interface import Model, Point, linearise, linearise_as_coars
 from vegglue.normal_range import NORMAL95
 from vegglue.parallel import side_by_side
 from vegglue.progress import Progress, Watch, counted, silent
-from vegglue.results.diagnosis import Suspect
+from vegglue.results.diagnosis import CandidateEffect
 
 # Steps that a refit may take. Chosen, not measured: most need four.
 REFIT_STEPS = 10
@@ -67,11 +67,11 @@ class Refit:
     amplitude: float
     interval95: tuple[float, float]
 
-    def of(self, suspect: Suspect) -> Suspect:
-        """The suspect with the amplitude of its refit."""
-        own = replace(suspect.amplitude, value=self.amplitude, interval95=self.interval95)
+    def of(self, candidate_effect: CandidateEffect) -> CandidateEffect:
+        """The candidate_effect with the amplitude of its refit."""
+        own = replace(candidate_effect.amplitude, value=self.amplitude, interval95=self.interval95)
         amplitude = replace(own, refitted=True, objective=self.fitted.objective)
-        return replace(suspect, shapes=dict(self.shapes), amplitude=amplitude)
+        return replace(candidate_effect, shapes=dict(self.shapes), amplitude=amplitude)
 
 
 def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = silent) -> list[Refit | None]:

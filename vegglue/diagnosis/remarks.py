@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from vegglue.calibration.fingerprints import LEAST_DEPTH
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.causes_in_words import TO_DISCOVER, instruments_in_words, law_in_words, model_error_in_words
-from vegglue.diagnosis.grounds import Grounds, Statement, is_clear
+from vegglue.diagnosis.verdict_inputs import Statement, VerdictInputs, is_clear
 from vegglue.measurements.section_discharge import discharge_mismatches
+from vegglue.results.candidate_effect import counted_in_words
 from vegglue.results.causes import FaultyInstrument
-from vegglue.results.diagnosis import Step, Suspect
+from vegglue.results.diagnosis import CandidateEffect, Step
 from vegglue.results.small_misfit import small_misfit_in_words
-from vegglue.results.suspect import counted_in_words
 from vegglue.wording.sentences import sentence
 
 # Amplitude over a plausible one, above which it is said to be too large to be believed.
@@ -25,16 +25,16 @@ TOO_SHALLOW = (
 )
 
 
-def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement) -> list[str]:
+def remarks_of(inputs: VerdictInputs, candidate_effects: Sequence[CandidateEffect], statement: Statement) -> list[str]:
     """All of them, those on what is carried and on what is named first; statement: beside which they stand."""
-    found, misfit = grounds.findings, grounds.misfit
-    remarks = [*map(sentence, discharge_mismatches(grounds.carried))]
+    found, misfit = inputs.state, inputs.misfit
+    remarks = [*map(sentence, discharge_mismatches(inputs.carried))]
     remarks += filter(None, [small_misfit_in_words(misfit.chi2, misfit.freedom)])
-    remarks += _implausible(found.steps, suspects)
-    remarks += _open(grounds.not_excluded, bool(found.accepted)) if misfit.p >= constants().poor_fit_chance else []
-    remarks += _besides(grounds, suspects, statement)
-    remarks += [one for one in (grounds.on_map, grounds.stretch) if one]
-    remarks += [] if grounds.places_searched else [TOO_SHALLOW]
+    remarks += _implausible(found.steps, candidate_effects)
+    remarks += _open(inputs.not_excluded, bool(found.accepted)) if misfit.p >= constants().poor_fit_chance else []
+    remarks += _besides(inputs, candidate_effects, statement)
+    remarks += [one for one in (inputs.on_map, inputs.stretch) if one]
+    remarks += [] if inputs.places_searched else [TOO_SHALLOW]
     if (
         statement.kind in ("identified", "one-of", "none-of-these", "instrument")
         and misfit.p < constants().poor_fit_chance
@@ -46,24 +46,24 @@ def remarks_of(grounds: Grounds, suspects: Sequence[Suspect], statement: Stateme
     return remarks
 
 
-def _besides(grounds: Grounds, suspects: Sequence[Suspect], statement: Statement) -> list[str]:
+def _besides(inputs: VerdictInputs, candidate_effects: Sequence[CandidateEffect], statement: Statement) -> list[str]:
     """What else was taken into account, set aside, or cannot be tested, as far as the statement does not say it."""
-    errors, effects, remarks = grounds.errors, grounds.findings.effects, []
-    if grounds.model_error is not None:
-        remarks.append(model_error_in_words(grounds.model_error))
-    if grounds.laws is not None and not statement.tells_laws:
+    errors, effects, remarks = inputs.errors, inputs.state.effects, []
+    if inputs.model_error is not None:
+        remarks.append(model_error_in_words(inputs.model_error))
+    if inputs.laws is not None and not statement.tells_laws:
         rather = f", rather than {' and '.join(effects)}" if effects else ""
-        remarks.append(f"To first order {law_in_words(grounds.laws)}{rather}. {TO_DISCOVER}")
+        remarks.append(f"To first order {law_in_words(inputs.laws)}{rather}. {TO_DISCOVER}")
     if errors.correlation > 0:
         remarks.append(f"Errors of neighbours are correlated by {errors.correlation:.2f}; this is allowed for.")
     if errors.scale > 1 and not statement.tells_errors:
         remarks.append(f"The stated errors look too small by a factor of {errors.scale:.2f}; this is allowed for.")
-    remarks += [_told_of(one) for one in grounds.findings.instruments if one not in statement.instruments]
-    told = {name for group in grounds.not_excluded for name in group} | {*effects}
-    seen = {*told, *grounds.standing_out}
-    hidden = [one for one in suspects if not one.detectability.testable and one.name not in seen]
+    remarks += [_told_of(one) for one in inputs.state.instruments if one not in statement.instruments]
+    told = {name for group in inputs.not_excluded for name in group} | {*effects}
+    seen = {*told, *inputs.significant_effects}
+    hidden = [one for one in candidate_effects if not one.detectability.testable and one.name not in seen]
     if hidden:
-        also = ", too" if any(not one.detectability.testable and one.name in told for one in suspects) else ""
+        also = ", too" if any(not one.detectability.testable and one.name in told for one in candidate_effects) else ""
         remarks.append(f"Untestable with these data{also}, neither present nor absent: {_untestable(hidden)}.")
     return remarks
 
@@ -87,8 +87,8 @@ def _open(groups: Sequence[Sequence[str]], something_named: bool) -> list[str]:
     return [said] if names else []
 
 
-def _implausible(steps: Sequence[Step], suspects: Sequence[Suspect]) -> list[str]:
-    by_name = {suspect.name: suspect for suspect in suspects}
+def _implausible(steps: Sequence[Step], candidate_effects: Sequence[CandidateEffect]) -> list[str]:
+    by_name = {candidate_effect.name: candidate_effect for candidate_effect in candidate_effects}
     far = [one for step in steps if (one := by_name[step.accepted]).amplitude.relative_size > IMPLAUSIBLE]
     return [
         f"{one.name} is {one.amplitude.relative_size:.1f} times what is plausible for it: it may stand in for "
@@ -97,7 +97,7 @@ def _implausible(steps: Sequence[Step], suspects: Sequence[Suspect]) -> list[str
     ]
 
 
-def _untestable(hidden: Sequence[Suspect]) -> str:
+def _untestable(hidden: Sequence[CandidateEffect]) -> str:
     """The effects by what they look like; of many their number, and a few names of the largest groups."""
     alike: dict[str, list[str]] = {}
     for one in hidden:

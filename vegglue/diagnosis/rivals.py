@@ -13,37 +13,37 @@ from vegglue.calibration.fit import chi2
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named, prior_shrinkage
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import Contender, chances_of
-from vegglue.diagnosis.findings import Undecided
+from vegglue.diagnosis.competition import Hypothesis, chances_of
 from vegglue.diagnosis.refits import Refit
-from vegglue.diagnosis.tempered_chances import tempered_odds
+from vegglue.diagnosis.search_state import Undecided
+from vegglue.diagnosis.tempered_probabilities import tempered_odds
 from vegglue.measurements.kinds import kind_of
 from vegglue.normal_range import NORMAL95
-from vegglue.results.diagnosis import FaultyInstrument, Location, Step
+from vegglue.results.diagnosis import FaultyInstrument, LocalAnomaly, Step
 
 # Share of the squared fingerprint of a spot above which an experiment is said to point at it.
 POINTS_AT_IT = 0.1
 
 
 def step_found(
-    screening: Screening, contenders: Sequence[Contender], accepted: int, further: Baseline, p: float
+    screening: Screening, hypotheses: Sequence[Hypothesis], accepted: int, further: Baseline, p: float
 ) -> Step:
-    """One contender, a listed effect, as a step; further: the model with it; p: of the alarm."""
-    chance = chances_of(contenders)
-    listed = [j for j, one in enumerate(contenders) if one.kind == "effect"]
-    names = [contenders[j].name for j in listed]
-    columns = [contenders[j].column for j in listed]
+    """One hypothesis, a listed effect, as a step; further: the model with it; p: of the alarm."""
+    chance = chances_of(hypotheses)
+    listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
+    names = [hypotheses[j].name for j in listed]
+    columns = [hypotheses[j].column for j in listed]
     cosine = score_test.cosines(screening.projected)[np.ix_(columns, columns)]
     found, groups = rivals_among(names, chance[listed], cosine)
-    base, others = screening.base, _others(contenders, chance, "effect")
+    base, others = screening.base, _others(hypotheses, chance, "effect")
     terms = {one.term for one in screening.fingerprints.places}
     places = {
-        one.name: location_found(screening, contenders, j, one.what)
-        for j, one in enumerate(contenders)
+        one.name: anomaly_found(screening, hypotheses, j, one.what)
+        for j, one in enumerate(hypotheses)
         if one.name in others and one.kind in terms and isinstance(one.what, Refit)
     }
     step = Step(
-        accepted=contenders[accepted].name,
+        accepted=hypotheses[accepted].name,
         rivals=tuple(found),
         chances=tuple(found.values()),
         groups=groups,
@@ -67,11 +67,13 @@ def shared_anew(told: Mapping[str, float], followed: Sequence[str], chance: Arra
 
 
 def followed_further(step: Step, followed: Sequence[str], chance: Array) -> Step:
-    """The step once some contenders have been followed further, see `shared_anew`; the accepted one is among them."""
+    """The step once some hypotheses have been followed further, see `shared_anew`; the accepted one is among them."""
     return with_chances(step, step.accepted, shared_anew(step.chance | step.others, followed, chance))
 
 
-def place_followed_further(place: Location, followed: Sequence[Contender], taken: int, evidence: Array) -> Location:
+def place_followed_further(
+    place: LocalAnomaly, followed: Sequence[Hypothesis], taken: int, evidence: Array
+) -> LocalAnomaly:
     """The place, which was taken, with its odds against the others that have been followed; evidence (k,): ln [-]."""
     odds = {
         _rival_name(one): tempered_odds(float(evidence[taken]), float(of_one))
@@ -81,16 +83,16 @@ def place_followed_further(place: Location, followed: Sequence[Contender], taken
     return replace(place, odds=place.odds | odds)
 
 
-def _rival_name(one: Contender) -> str:
+def _rival_name(one: Hypothesis) -> str:
     """Under which a rival of a place is told: an effect by its own, another by its kind."""
     return one.name if one.kind == "effect" else one.kind
 
 
-def undecided_of(contenders: Sequence[Contender], followed: Sequence[str], chance: Array) -> Undecided:
-    """All contenders, none of them surely it, once some have been followed further, see `shared_anew`."""
-    told = dict(zip([one.name for one in contenders], map(float, chances_of(contenders)), strict=True))
+def undecided_of(hypotheses: Sequence[Hypothesis], followed: Sequence[str], chance: Array) -> Undecided:
+    """All hypotheses, none of them surely it, once some have been followed further, see `shared_anew`."""
+    told = dict(zip([one.name for one in hypotheses], map(float, chances_of(hypotheses)), strict=True))
     told = shared_anew(told, followed, chance)
-    return Undecided(tuple(contenders), tuple(told[one.name] for one in contenders))
+    return Undecided(tuple(hypotheses), tuple(told[one.name] for one in hypotheses))
 
 
 def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
@@ -109,9 +111,9 @@ def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
     )
 
 
-def location_found(screening: Screening, contenders: Sequence[Contender], which: int, refit: Refit) -> Location:
-    """One contender, something at a place, as a location."""
-    best = contenders[which]
+def anomaly_found(screening: Screening, hypotheses: Sequence[Hypothesis], which: int, refit: Refit) -> LocalAnomaly:
+    """One hypothesis, something at a place, as a anomaly."""
+    best = hypotheses[which]
     places = next(one for one in screening.fingerprints.places if one.term == best.kind)
     kind = kind_named(screening.kinds, best.kind)
     noise, column = screening.base.noise, places.fingerprints[:, best.column : best.column + 1]
@@ -120,8 +122,8 @@ def location_found(screening: Screening, contenders: Sequence[Contender], which:
     share = {str(name): float(white[names == name].sum() / white.sum()) for name in dict.fromkeys(names)}
     # What was not worth a refit counts to first order.
     evidence = {of.name: of.total for of in screening.kinds if of.name != "effect"}
-    evidence |= {_rival_name(one): one.log_evidence for one in reversed(contenders)}
-    return Location(
+    evidence |= {_rival_name(one): one.log_evidence for one in reversed(hypotheses)}
+    return LocalAnomaly(
         **refit.shapes,
         x_error=best.errors[0],
         y_error=best.errors[1],
@@ -139,8 +141,8 @@ def location_found(screening: Screening, contenders: Sequence[Contender], which:
     )
 
 
-def instrument_found(screening: Screening, best: Contender, one: Instrument) -> FaultyInstrument:
-    """The best contender, an instrument, with its offset: s^2 o' C^-1 r / (1 + s^2 o' C^-1 o), o 1 in its readings."""
+def instrument_found(screening: Screening, best: Hypothesis, one: Instrument) -> FaultyInstrument:
+    """The best hypothesis, an instrument, with its offset: s^2 o' C^-1 r / (1 + s^2 o' C^-1 o), o 1 in its readings."""
     noise = screening.base.noise
     kind = kind_named(screening.kinds, best.kind)
     length, score = float(kind.projected.length[best.column]), float(kind.scores[best.column])
@@ -191,10 +193,10 @@ def rivals_among(
     return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
 
 
-def _others(contenders: Sequence[Contender], chance: Array, kind: str) -> dict[str, float]:
-    """Chance of the contenders of other kinds, where it is not negligible against the best."""
+def _others(hypotheses: Sequence[Hypothesis], chance: Array, kind: str) -> dict[str, float]:
+    """Chance of the hypotheses of other kinds, where it is not negligible against the best."""
     return {
         one.name: float(p)
-        for one, p in zip(contenders, chance, strict=True)
+        for one, p in zip(hypotheses, chance, strict=True)
         if one.kind != kind and p >= constants().rival_share * chance.max()
     }

@@ -16,11 +16,11 @@ from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.chances import chances_in_set
-from vegglue.diagnosis.competition import REACH, Contender, contenders_of
+from vegglue.diagnosis.competition import REACH, Hypothesis, hypotheses_of
 from vegglue.diagnosis.discovered import Discovery, LawFound, ProductFound
 from vegglue.diagnosis.product import product_beside
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
-from vegglue.diagnosis.tempered_chances import tempering
+from vegglue.diagnosis.tempered_probabilities import tempering
 from vegglue.effects.grammar import SAME_AS
 from vegglue.effects.law import Law
 from vegglue.engine.first_use import with_compilation
@@ -52,20 +52,20 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
     screening = screen_laws(base, traces)
     if screening.p > constants().false_alarm_rate:
         return Discovery(screening.p, len(screening.laws), (), {})
-    known = _as_vague(screening, contenders_of(screening.listed, watch, screening.kind.total))
+    known = _as_vague(screening, hypotheses_of(screening.listed, watch, screening.kind.total))
     laws = _laws(screening, max((one.log_evidence for one in known), default=-np.inf), watch)
     found = _discovery(screening, sorted([*known, *laws], key=lambda one: -one.log_evidence))
     return replace(found, product=_product(screening, found, watch))
 
 
-def _as_vague(screening: LawScreening, found: Sequence[Contender]) -> list[Contender]:
+def _as_vague(screening: LawScreening, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """What is at a place, of no kind that others have seen in nature, as likely before as laws; all else as it is."""
     places = {one.term for one in screening.listed.fingerprints.places}
     less = np.log(constants().listed_over_laws)
     return [replace(one, log_evidence=one.log_evidence - less) if one.kind in places else one for one in found]
 
 
-def _laws(screening: LawScreening, known: float, watch: Watch) -> list[Contender]:
+def _laws(screening: LawScreening, known: float, watch: Watch) -> list[Hypothesis]:
     """The most promising quantities, each with the best of its laws that were calibrated and the evidence of all its
     laws; known: ln evidence of the best of all else.
     """
@@ -81,7 +81,7 @@ def _laws(screening: LawScreening, known: float, watch: Watch) -> list[Contender
     for said in ranked:
         kept = {law: refit for (of, law), refit in zip(tried, refits, strict=True) if of == said and refit is not None}
         if kept:
-            found.append(_contender(screening, columns[said], kept))
+            found.append(_hypothesis(screening, columns[said], kept))
     return found
 
 
@@ -103,7 +103,7 @@ def _trial(screening: LawScreening, law: int) -> RefitTrial:
     return RefitTrial(one, shapes, (start,))
 
 
-def _contender(screening: LawScreening, columns: np.ndarray, kept: Mapping[int, Refit]) -> Contender:
+def _hypothesis(screening: LawScreening, columns: np.ndarray, kept: Mapping[int, Refit]) -> Hypothesis:
     """The best of the calibrated laws of a quantity, with the evidence of all its columns: as kept where calibrated,
     elsewhere to first order, corrected as that of the best one.
     """
@@ -113,10 +113,10 @@ def _contender(screening: LawScreening, columns: np.ndarray, kept: Mapping[int, 
     evidence = first + (ends[best].log_factor + prior[best] - first[best])
     for column, refit in ends.items():
         evidence[column] = refit.log_factor + prior[column]
-    return Contender("law", ends[best].candidate.name, float(np.logaddexp.reduce(evidence[columns])), best, ends[best])
+    return Hypothesis("law", ends[best].candidate.name, float(np.logaddexp.reduce(evidence[columns])), best, ends[best])
 
 
-def _discovery(screening: LawScreening, ranked: Sequence[Contender]) -> Discovery:
+def _discovery(screening: LawScreening, ranked: Sequence[Hypothesis]) -> Discovery:
     """The causes that hold HELD of the chance together; none where all of them together say too little."""
     evidence = np.array([one.log_evidence for one in ranked])
     if np.logaddexp.reduce(evidence) < 0.0:
@@ -135,7 +135,7 @@ def _discovery(screening: LawScreening, ranked: Sequence[Contender]) -> Discover
     )
 
 
-def _law_found(screening: LawScreening, one: Contender, chance: float) -> LawFound:
+def _law_found(screening: LawScreening, one: Hypothesis, chance: float) -> LawFound:
     refit = one.what
     assert isinstance(refit, Refit)
     of_law = next(law for law in screening.laws if law.candidate.name == one.name)
@@ -162,7 +162,7 @@ def _product(screening: LawScreening, found: Discovery, watch: Watch) -> Product
     return product_beside(screening.listed.search, screening.listed.fingerprints, of_law, refit, watch)
 
 
-def _alike(screening: LawScreening, one: Contender, own: Law) -> tuple[str, ...]:
+def _alike(screening: LawScreening, one: Hypothesis, own: Law) -> tuple[str, ...]:
     """Names of listed effects, and of the nearest law of any other quantity, that leave the same trace as this law, the
     most alike first.
     """

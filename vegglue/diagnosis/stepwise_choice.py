@@ -11,7 +11,7 @@ import numpy as np
 
 from vegglue.diagnosis.comparison import By, held_out_rmse, improvement
 from vegglue.diagnosis.refits import is_near_off
-from vegglue.results.rung import Rung
+from vegglue.results.model_score import ModelScore
 
 # Fall of the held-out squares, over its standard error, from which it is clear: 19 times of 20 it is no chance.
 CLEAR = 2.0
@@ -37,7 +37,7 @@ Reasons = dict[str, str]
 # Sections and experiments that do not judge.
 Untold = Mapping[By, set[str]]
 # The model with some of the nominees, in the order they were named; None where it finds no flow.
-RungWith = Callable[[Names], Rung | None]
+ScoreWith = Callable[[Names], ModelScore | None]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Choice:
     unclear: Mapping[str, str] = field(default_factory=dict)
 
 
-def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False) -> Choice:
+def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = False) -> Choice:
     """Each is tried in the order named, those that do not help by themselves then together; what the last model does
     not need is dropped again, and what is vaguer has to be clearly better than what is known. clearly: errors must fall
     by CLEAR standard errors.
@@ -60,15 +60,17 @@ def chosen(named: Sequence[Nominee], rung_with: RungWith, clearly: bool = False)
 
     def better(kept: Names, more: Names) -> tuple[Names, str]:
         both = tuple(name for name in order if name in {*kept, *more})
-        before = rung_with(kept)
+        before = score_with(kept)
         assert before is not None
-        return both, why_not_kept(before, rung_with(both), clearly, _untold([one for one in named if one.name in more]))
+        return both, why_not_kept(
+            before, score_with(both), clearly, _untold([one for one in named if one.name in more])
+        )
 
     stages, refused = _together(*_one_by_one(order, better), better)
-    kept, refused = _needed_of({one.name: one for one in named}, stages[-1], refused, rung_with)
-    kept, refused = _known_of(named, kept, refused, rung_with)
+    kept, refused = _needed_of({one.name: one for one in named}, stages[-1], refused, score_with)
+    kept, refused = _known_of(named, kept, refused, score_with)
     earlier = [stage for stage in stages if set(stage) < set(kept)]
-    return Choice((*earlier, kept), refused, _unclear_of(named, kept, rung_with))
+    return Choice((*earlier, kept), refused, _unclear_of(named, kept, score_with))
 
 
 Better = Callable[[Names, Names], tuple[Names, str]]
@@ -108,16 +110,18 @@ def _without(refused: Reasons, *names: str) -> Reasons:
     return {name: why for name, why in refused.items() if name not in names}
 
 
-def _needed_of(named: dict[str, Nominee], kept: Names, refused: Reasons, rung_with: RungWith) -> tuple[Names, Reasons]:
+def _needed_of(
+    named: dict[str, Nominee], kept: Names, refused: Reasons, score_with: ScoreWith
+) -> tuple[Names, Reasons]:
     """What is left when all that the model does not need is dropped, and why each of the others is not in it."""
     for name in kept:
         fewer = tuple(one for one in kept if one != name)
-        if why := _why_dropped(named[name], rung_with(()), rung_with(fewer), rung_with(kept)):
-            return _needed_of(named, fewer, {**refused, name: why}, rung_with)
+        if why := _why_dropped(named[name], score_with(()), score_with(fewer), score_with(kept)):
+            return _needed_of(named, fewer, {**refused, name: why}, score_with)
     return kept, refused
 
 
-def _known_of(named: Sequence[Nominee], kept: Names, refused: Reasons, rung_with: RungWith) -> tuple[Names, Reasons]:
+def _known_of(named: Sequence[Nominee], kept: Names, refused: Reasons, score_with: ScoreWith) -> tuple[Names, Reasons]:
     """What is left when what is vaguer makes room for what is known and helps hardly less, and why not the others."""
     for one in named:
         known = one.instead_of
@@ -125,7 +129,7 @@ def _known_of(named: Sequence[Nominee], kept: Names, refused: Reasons, rung_with
             continue
         fewer = tuple(name for name in kept if name != one.name)
         both = tuple(each.name for each in named if each.name in {*fewer, known})
-        without, with_known, vaguer = rung_with(fewer), rung_with(both), rung_with(kept)
+        without, with_known, vaguer = score_with(fewer), score_with(both), score_with(kept)
         assert without is not None
         assert vaguer is not None
         untold = _untold([each for each in named if each.name in (known, one.name)])
@@ -137,14 +141,14 @@ def _known_of(named: Sequence[Nominee], kept: Names, refused: Reasons, rung_with
     return kept, refused
 
 
-def _unclear_of(named: Sequence[Nominee], kept: Names, rung_with: RungWith) -> Reasons:
+def _unclear_of(named: Sequence[Nominee], kept: Names, score_with: ScoreWith) -> Reasons:
     """By how much held-out errors fall with each that is kept, in words, where neither way that is CLEAR.
 
     Not of what the model finds no flow without.
     """
     falls: Reasons = {}
     for one in (each for each in named if each.name in kept):
-        without, last = rung_with(tuple(name for name in kept if name != one.name)), rung_with(kept)
+        without, last = score_with(tuple(name for name in kept if name != one.name)), score_with(kept)
         if without is None or last is None:
             continue
         gains = _gains(without, last, _untold([one]))
@@ -159,7 +163,7 @@ def _fall_in_words(gain: float, error: float) -> str:
     return f"{fall} ± {1e6 * error:.1g}" if np.isfinite(error) else fall
 
 
-def _why_dropped(one: Nominee, parent: Rung | None, without: Rung | None, last: Rung | None) -> str:
+def _why_dropped(one: Nominee, parent: ModelScore | None, without: ModelScore | None, last: ModelScore | None) -> str:
     """Why a model does not need an effect, '' when it does, or when it would be worse than its parent without."""
     if parent is None or without is None or last is None:
         return ""
@@ -172,12 +176,12 @@ def _why_dropped(one: Nominee, parent: Rung | None, without: Rung | None, last: 
     return "" if any(gain > 0.0 for gain, _ in gains.values()) else "held-out errors are no higher without it"
 
 
-def is_off(one: Nominee, rung: Rung) -> bool:
+def is_off(one: Nominee, score: ModelScore) -> bool:
     """Whether the amplitude lies within NEEDED standard errors of the value that does nothing."""
-    return is_near_off(rung.values[one.parameter], one.off)
+    return is_near_off(score.values[one.parameter], one.off)
 
 
-def why_not_kept(before: Rung, after: Rung | None, clearly: bool, untold: Untold) -> str:
+def why_not_kept(before: ModelScore, after: ModelScore | None, clearly: bool, untold: Untold) -> str:
     """Why a model is not better than one before it, '' when it is: held-out errors fall by sections or by experiments
     and rise by neither, but for those that do not judge, and the misfit with all that was seen falls. They may rise one
     way where that is not clear, and less than they fall the other.
@@ -208,7 +212,7 @@ def _untold(tried: Sequence[Nominee]) -> Untold:
     return {by: {one.only_in[by] for one in tried if by in one.only_in} for by in WAYS}
 
 
-def _gains(before: Rung, after: Rung, untold: Untold) -> dict[By, tuple[float, float]]:
+def _gains(before: ModelScore, after: ModelScore, untold: Untold) -> dict[By, tuple[float, float]]:
     """Fall of the held-out squares and its standard error, where anything can be held out."""
     gains = {by: improvement(before, after, by, untold.get(by, ())) for by in WAYS}
     return {by: one for by, one in gains.items() if np.isfinite(one[0])}

@@ -14,9 +14,9 @@ from vegglue.calibration.baseline import log_evidence
 from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.calibration.residual_screening import Screening
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.findings import Findings
-from vegglue.diagnosis.tempered_chances import tempered_chances
-from vegglue.results.causes import LawsSuspected, LawSuspected
+from vegglue.diagnosis.search_state import SearchState
+from vegglue.diagnosis.tempered_probabilities import tempered_probabilities
+from vegglue.results.causes import CandidateLaw, CandidateLaws
 
 # Share of the chance of all laws that those told hold together.
 LAWS_HELD = 0.95
@@ -30,9 +30,9 @@ def laws_beside(screening: Screening) -> LawScreening | None:
     return screen_laws(screening.base, traces, screening.flagged) if traces.laws else None
 
 
-def laws_suspected(
-    first: Screening, last: Screening, found: Findings, beside_first: Callable[[], LawScreening | None]
-) -> LawsSuspected | None:
+def candidate_laws(
+    first: Screening, last: Screening, found: SearchState, beside_first: Callable[[], LawScreening | None]
+) -> CandidateLaws | None:
     """Laws that stand out against the last model, or against the first one where something was accepted; None where
     errors alone leave as much, or beside listed effects that were accepted unless it is clearly a law.
 
@@ -44,44 +44,44 @@ def laws_suspected(
     if screening is None or screening.p >= constants().law_alarm_rate:
         return None
     of_laws = screening.of_each
-    chances = tempered_chances(np.append(of_laws, _against(first, last, found)))[: of_laws.size]
+    chances = tempered_probabilities(np.append(of_laws, _against(first, last, found)))[: of_laws.size]
     order = np.argsort(-chances)
     count = int(np.searchsorted(np.cumsum(chances[order]), LAWS_HELD * chances.sum())) + 1
     laws = tuple(_law(screening, int(j), float(chances[j])) for j in order[:count])
-    suspected = LawsSuspected(screening.p, of_laws.size, float(chances.sum()), laws)
+    suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), laws)
     return None if found.steps and not clearly_a_law(suspected) else suspected
 
 
-def law_goes_first(laws: LawsSuspected | None, found: Findings) -> bool:
+def law_goes_first(laws: CandidateLaws | None, found: SearchState) -> bool:
     """Whether a law is told rather than what else may be said where nothing listed was accepted."""
     return laws is not None and is_likelier(laws) and not found.accepted
 
 
-def is_likelier(laws: LawsSuspected) -> bool:
+def is_likelier(laws: CandidateLaws) -> bool:
     """Whether laws are likelier than all else together."""
     return laws.chance > 0.5
 
 
-def clearly_a_law(laws: LawsSuspected | None) -> bool:
+def clearly_a_law(laws: CandidateLaws | None) -> bool:
     """Whether laws are strong_odds times as likely as all else together: a place then stands in for one."""
     return laws is not None and laws.chance > constants().strong_odds * (1.0 - laws.chance)
 
 
-def _against(first: Screening, last: Screening, found: Findings) -> list[float]:
+def _against(first: Screening, last: Screening, found: SearchState) -> list[float]:
     """ln evidence of what laws are compared with: what was accepted, else what was calibrated, else all that was
     tested.
     """
     if found.accepted:
         return [found.gained(log_evidence(first.base), log_evidence(last.base))]
     if found.undecided:
-        return [one.log_evidence for one in found.undecided.contenders]
+        return [one.log_evidence for one in found.undecided.hypotheses]
     return [kind.total for kind in last.kinds]
 
 
-def _law(screening: LawScreening, law: int, chance: float) -> LawSuspected:
+def _law(screening: LawScreening, law: int, chance: float) -> CandidateLaw:
     one = screening.laws[law]
     reference = screening.settings[screening.best_column(law)].get("reference")
-    return LawSuspected(
+    return CandidateLaw(
         name=one.law.name,
         term=one.law.term.words,
         quantity=one.law.quantity.words,

@@ -21,10 +21,10 @@ from vegglue.report.prior_words import ends_at_bounds
 from vegglue.report.run import Run
 from vegglue.report.typography import NARROW, decimals_between, fixed, html_notation, interval, percent, unit_html
 from vegglue.report.validation_words import UNBELIEVED
+from vegglue.results.candidate_effect import AmplitudeEstimate
 from vegglue.results.diagnosis import Diagnosis, Step
 from vegglue.results.posterior import Posterior
 from vegglue.results.small_misfit import small_misfit_in_short
-from vegglue.results.suspect import AmplitudeEstimate
 from vegglue.wording.numbers import listed, so_many, without_asides
 from vegglue.wording.sentences import phrase
 
@@ -128,7 +128,7 @@ def _effect_in_words(found: Diagnosis, step: Step) -> str:
     listed; 'most likely' where there are any, unless a place that is likelier is told before it.
     """
     name, likelier = step.accepted, step.likelier_place
-    suspect = found.suspect(name)
+    suspect = found.candidate_effect(name)
     short_title, _, more = (html.escape(part.strip()) for part in suspect.title.partition(":"))
     chance = f"({percent(found.chances[name])}) " if step.others or len(step.rivals) > 1 else ""
     doubt = f"most likely {chance}" if chance and not likelier else chance

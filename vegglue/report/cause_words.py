@@ -7,7 +7,7 @@ import numpy as np
 
 from vegglue.report.typography import NARROW, fixed, interval, percent, short, unit_html
 from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD
-from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, Location, Step
+from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, LocalAnomaly, Step
 from vegglue.wording.numbers import so_many
 
 # What a spot of each term means where its score is positive, and where it is negative.
@@ -73,7 +73,7 @@ def accepted_causes(diagnosis: Diagnosis) -> str:
     return " and ".join([*places, *(step.accepted for step in diagnosis.steps)])
 
 
-def what_at(place: Location) -> str:
+def what_at(place: LocalAnomaly) -> str:
     """'a higher bed', by the sign of its amplitude."""
     more, less = TERM_SIGNS[place.term]
     return more if place.amplitude > 0 else less
@@ -91,7 +91,7 @@ def odds_in_words(odds: float) -> str:
     return f"1 to {told}" if odds < 1.0 else f"{told} to 1"
 
 
-def against_rivals(place: Location) -> str:
+def against_rivals(place: LocalAnomaly) -> str:
     """'200 to 1 against drag, 410 to 1 against streamlining': the nearest rivals, '' without."""
     nearest = sorted(place.odds.items(), key=lambda one: one[1])[:RIVALS_TOLD]
     if nearest and nearest[0][1] > TOLD_ODDS:
@@ -100,12 +100,12 @@ def against_rivals(place: Location) -> str:
     return ", ".join(f"{odds_in_words(odds)} against {FAULT_WORDS.get(name, name)}" for name, odds in told)
 
 
-def size_of(place: Location) -> str:
+def size_of(place: LocalAnomaly) -> str:
     """'0.19 m' (HTML)."""
     return f"{short(place.amplitude, 2)}{NARROW}{unit_html(place.unit)}"
 
 
-def place_in_headline(place: Location) -> str:
+def place_in_headline(place: LocalAnomaly) -> str:
     """'a lower bed by 0.19 m at x = 47.3 ± 0.4 m, y = −0.3 ± 0.1 m' (HTML); the word says the sign."""
     amount = f"{short(abs(place.amplitude), 2)}{NARROW}{unit_html(place.unit)}"
     at = ", ".join(
@@ -115,7 +115,7 @@ def place_in_headline(place: Location) -> str:
     return f"{what_at(place)} by {amount} at {at}"
 
 
-def place_in_words(place: Location) -> str:
+def place_in_words(place: LocalAnomaly) -> str:
     """What, how large, where, and the odds, as below the map (HTML)."""
     told = against_rivals(place)
     return (

@@ -353,11 +353,11 @@ def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     if table.empty:
         return
     threshold = diagnosis.first_screening.threshold
-    out = sum(abs(diagnosis.first_score(one)) > threshold for one in diagnosis.suspects)
-    left = [diagnosis.last_score(one) for one in diagnosis.suspects]
+    out = sum(abs(diagnosis.first_score(one)) > threshold for one in diagnosis.candidate_effects)
+    left = [diagnosis.last_score(one) for one in diagnosis.candidate_effects]
     caption = (
-        f"<b>Suspects.</b> Of {so_many(len(diagnosis.suspects), 'effect')}, {out} would improve the fit by more than "
-        f"errors alone seldom do ({fixed(threshold, 1)} standard errors, dashed)"
+        f"<b>Suspects.</b> Of {so_many(len(diagnosis.candidate_effects), 'effect')}, {out} would improve the fit by "
+        f"more than errors alone seldom do ({fixed(threshold, 1)} standard errors, dashed)"
     )
     if accepted_causes(diagnosis):
         still = int(np.sum(np.abs(np.nan_to_num(left)) > threshold))

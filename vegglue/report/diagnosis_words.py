@@ -11,8 +11,8 @@ from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.report.cause_words import InstrumentRow, PlaceRow, instrument_rows, place_rows
 from vegglue.report.key_numbers import KeyNumber
 from vegglue.report.typography import NARROW, as_given, fixed, interval, percent, short, unit_html
-from vegglue.results.diagnosis import Diagnosis, Suspect
-from vegglue.results.suspect import effects_among
+from vegglue.results.candidate_effect import effects_among
+from vegglue.results.diagnosis import CandidateEffect, Diagnosis
 
 # Effects in the open table, a screen of a laptop; the others stand below it, folded.
 SUSPECTS_LISTED = 8
@@ -90,7 +90,7 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
     )
 
 
-def suspect_status(diagnosis: Diagnosis, suspect: Suspect) -> str:
+def suspect_status(diagnosis: Diagnosis, suspect: CandidateEffect) -> str:
     """'accepted', 'rival' (may stand in place of an accepted one), 'stands out' in the last model, whatever size these
     data would show, 'less likely', 'no sign' or 'untestable'.
     """
@@ -98,7 +98,7 @@ def suspect_status(diagnosis: Diagnosis, suspect: Suspect) -> str:
         return "accepted"
     if suspect.name in diagnosis.set:
         return "rival"
-    if suspect.name in diagnosis.verdict.standing_out:
+    if suspect.name in diagnosis.verdict.significant_effects:
         return "stands out"
     if not suspect.detectability.testable:
         return "untestable"
@@ -106,11 +106,11 @@ def suspect_status(diagnosis: Diagnosis, suspect: Suspect) -> str:
     return "less likely" if abs(diagnosis.first_score(suspect)) > threshold else "no sign"
 
 
-def ranked_suspects(diagnosis: Diagnosis) -> list[Suspect]:
+def ranked_suspects(diagnosis: Diagnosis) -> list[CandidateEffect]:
     """By their status, what was accepted first; within each by first score."""
     order = ("accepted", "rival", "stands out", "less likely", "no sign", "untestable")
     return sorted(
-        diagnosis.suspects,
+        diagnosis.candidate_effects,
         key=lambda one: (order.index(suspect_status(diagnosis, one)), -abs(np.nan_to_num(diagnosis.first_score(one)))),
     )
 
@@ -136,7 +136,7 @@ def _suspect_rows(diagnosis: Diagnosis) -> tuple[list[SuspectRow], list[SuspectR
     return rows[:shown], rows[shown:]
 
 
-def _row(diagnosis: Diagnosis, suspect: Suspect) -> SuspectRow:
+def _row(diagnosis: Diagnosis, suspect: CandidateEffect) -> SuspectRow:
     estimate, detectability = suspect.amplitude, suspect.detectability
     unit = unit_html(estimate.unit)
     unit = f'{NARROW}<span class="unit">{unit}</span>' if unit else ""
@@ -186,12 +186,12 @@ def _numbers(diagnosis: Diagnosis) -> list[KeyNumber]:
     fell = diagnosis.changed
     arrow = f"{short(before, 2)} → {short(after, 2)}" if fell else short(after, 2)
     chi2 = f"{misfit.chi2_first:,.0f} → {misfit.chi2:,.0f}" if fell else f"{misfit.chi2:,.0f}"
-    apart = sum(suspect_status(diagnosis, one) == "untestable" for one in diagnosis.suspects)
-    untestable = f"as {len(diagnosis.suspects)} candidates, {apart} of them untestable with these data"
+    apart = sum(suspect_status(diagnosis, one) == "untestable" for one in diagnosis.candidate_effects)
+    untestable = f"as {len(diagnosis.candidate_effects)} candidates, {apart} of them untestable with these data"
     return [
         KeyNumber("chi², correlated errors", chi2, misfit.of_freedom),
         KeyNumber("velocity error", f"{arrow}{NARROW}m/s", "root mean square, in sample"),
-        KeyNumber("effects tried", f"{effects_among(diagnosis.suspects)}", untestable),
+        KeyNumber("effects tried", f"{effects_among(diagnosis.candidate_effects)}", untestable),
         KeyNumber("correlation of neighbours", fixed(errors.correlation, 2), "of the errors along a section"),
         *([] if errors.scale <= 1.0 else [_errors_made_larger(errors.scale)]),
         KeyNumber("error of the grid", f"{short(1000 * errors.grid_error, 2)}{NARROW}mm/s", "counted as an error"),

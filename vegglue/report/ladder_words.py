@@ -7,7 +7,7 @@ from vegglue.effects.identity import EffectIdentity
 from vegglue.report.cause_words import accepted_causes
 from vegglue.report.run import Run
 from vegglue.report.typography import NARROW, short, unit_html
-from vegglue.results.ladder import Ladder
+from vegglue.results.model_comparison import ModelComparison
 from vegglue.wording.numbers import listed
 
 # Ways of judging a model, the most telling first: field of a step, and the measurements it is about.
@@ -19,7 +19,7 @@ JUDGED_ON = {
 }
 
 
-def ladder_in_words(ladder: Ladder, causes: str = "") -> str:
+def ladder_in_words(ladder: ModelComparison, causes: str = "") -> str:
     """How far the error falls from the first model to the last, by the most telling way of judging.
 
     causes: what was added, in words (text), where that is known.
@@ -41,7 +41,7 @@ def ladder_in_words(ladder: Ladder, causes: str = "") -> str:
     return " ".join(filter(None, [fall, _unclear_in_words(ladder)]))
 
 
-def _unclear_in_words(ladder: Ladder) -> str:
+def _unclear_in_words(ladder: ModelComparison) -> str:
     """Of which part of what was added nobody can say that it helps, '' for none."""
     if not ladder.unclear:
         return ""
@@ -60,7 +60,7 @@ def _from_to(before: float, after: float) -> str:
     return f"{'falls' if after < before else 'rises'} from {short(before, 2)} to {_speed(after)}"
 
 
-def _all_added(ladder: Ladder) -> list[str]:
+def _all_added(ladder: ModelComparison) -> list[str]:
     last = [name for step in ladder.steps[1:] for name in step.added]
     return list(dict.fromkeys(last))
 
@@ -83,7 +83,7 @@ def causes_of(run: Run) -> str:
     return accepted_causes(found) if effects | places == set(_all_added(ladder)) else ""
 
 
-def ladder_rows(ladder: Ladder) -> dict[str, list[float]]:
+def ladder_rows(ladder: ModelComparison) -> dict[str, list[float]]:
     """Errors of each model in turn [m/s], by what they are judged on, without what nothing is known of."""
     rows = {words: [float(getattr(step, name)) for step in ladder.steps] for name, words in JUDGED_ON.items()}
     return {words: values for words, values in rows.items() if any(map(math.isfinite, values))}

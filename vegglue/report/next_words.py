@@ -9,7 +9,7 @@ from vegglue.report.cause_words import instrument_at
 from vegglue.report.run import Run, command_about
 from vegglue.report.typography import NARROW, short
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.ladder import LadderStep
+from vegglue.results.model_comparison import ComparedModel
 from vegglue.results.open_questions import HIDDEN_BEHIND, Question
 from vegglue.wording.numbers import so_many
 
@@ -53,7 +53,7 @@ def _asks_for_more(found: Diagnosis) -> bool:
     return bool(found.steps or found.places)
 
 
-def _page_of(run: Run, step: LadderStep) -> str:
+def _page_of(run: Run, step: ComparedModel) -> str:
     config = f"<code>{html.escape(step.config)}</code>"
     if step.name not in run.loop.pages:
         return config

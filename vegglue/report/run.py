@@ -23,7 +23,7 @@ from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.report.style import Picture, publish, publish_text
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
-from vegglue.results.ladder import Ladder
+from vegglue.results.model_comparison import ModelComparison
 from vegglue.results.open_questions import Question
 from vegglue.results.posterior import Posterior
 from vegglue.whole_files import folder_within
@@ -42,7 +42,7 @@ class LoopResults:
     """
 
     behind: Diagnosis | None = None
-    ladder: Ladder | None = None
+    ladder: ModelComparison | None = None
     questions: tuple[Question, ...] | None = None
     pages: Mapping[str, str] = field(default_factory=dict)
 

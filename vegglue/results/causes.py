@@ -19,7 +19,7 @@ NEEDS_MORE = 3.3
 
 
 @dataclass(frozen=True)
-class Location:
+class LocalAnomaly:
     """Where [m] something unlisted changes a term of the equations: middle x, y, half length, half width of the spot,
     and standard errors of x and y over all spots that could be it; x_spread, y_spread: the same where traces are taken
     to be nature's own, over which `extend` spreads it.
@@ -116,7 +116,7 @@ class FieldMapKept:
 
 
 @dataclass(frozen=True)
-class LawSuspected:
+class CandidateLaw:
     """A law of the grammar, to first order: its name in the library, the term it changes and the quantity it depends on
     in words, its equation, reference r (None: none), a plausible strength a and the one found [-], and its chance among
     all that was compared [-].
@@ -139,7 +139,7 @@ class LawSuspected:
 
 
 @dataclass(frozen=True)
-class LawsSuspected:
+class CandidateLaws:
     """Laws that stand out in what is left, whatever was accepted. p: chance that errors alone make laws stand out as
     much; tried: how many; chance: of all of them together among all that was compared [-]; laws: the likeliest first,
     those that hold 95 % of it.
@@ -148,10 +148,10 @@ class LawsSuspected:
     p: float
     tried: int
     chance: float
-    laws: tuple[LawSuspected, ...]
+    laws: tuple[CandidateLaw, ...]
 
     @property
-    def alike(self) -> tuple[LawSuspected, ...]:
+    def alike(self) -> tuple[CandidateLaw, ...]:
         """Laws of the same term and quantity as the likeliest."""
         best = self.laws[0]
         return tuple(one for one in self.laws if (one.term, one.quantity) == (best.term, best.quantity))

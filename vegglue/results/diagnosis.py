@@ -1,6 +1,6 @@
 """What a diagnosis says, as values: the verdict, the effects that explain the misfit, where it lies, and all numbers.
 
-What is no effect of the library stands in causes.py, one effect of it in suspect.py.
+What is no effect of the library stands in causes.py, one effect of it in candidate_effect.py.
 How they lie in diagnosis.h5 is said in diagnosis_file.py, the object of `diagnose --json` in diagnosis_json.py.
 """
 
@@ -13,16 +13,16 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.decision_constants import constants
 from vegglue.measurements.kinds import stations_in_short
+from vegglue.results.candidate_effect import CandidateEffect, counted_in_words
 from vegglue.results.causes import (
+    CandidateLaws,
     FaultyInstrument,
     FieldFound,
     FieldMapKept,
-    LawsSuspected,
-    Location,
+    LocalAnomaly,
     ModelErrorUsed,
     PlaceMap,
 )
-from vegglue.results.suspect import Suspect, counted_in_words
 from vegglue.wording.numbers import in_short, interval_in_short, so_many
 
 # instrument: some readings are off. Whether more is missing says `Verdict.clears_the_model`.
@@ -47,7 +47,7 @@ class Step:
     chi2_after: float
     p_family: float
     others: dict[str, float] = field(default_factory=dict)
-    places: dict[str, Location] = field(default_factory=dict)
+    places: dict[str, LocalAnomaly] = field(default_factory=dict)
 
     @property
     def chance(self) -> dict[str, float]:
@@ -69,23 +69,23 @@ BEFORE_ALL_ELSE = "Before anything can be said of the model: "
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was concluded. location: of something that no listed effect explains, None without; not_excluded: groups
+    """What was concluded. anomaly: of something that no listed effect explains, None without; not_excluded: groups
     of effects among which one that is there undetected, besides what was accepted, is nine times of ten.
     clears_the_model: whether nothing is missing in the model, an instrument or none being off; tells_laws: whether the
     sentence tells of laws that stand out. left_over: its part that says what the model with all that was accepted still
-    asks for, '' for nothing; standing_out: effects that stand out in it, and were not accepted, with the family-wise p
-    of each [-].
+    asks for, '' for nothing; significant_effects: effects that stand out in it, and were not accepted, with the
+    family-wise p of each [-].
     """
 
     kind: VerdictKind
     sentence: str
     remarks: tuple[str, ...]
-    location: Location | None
+    anomaly: LocalAnomaly | None
     not_excluded: tuple[tuple[str, ...], ...]
     clears_the_model: bool
     tells_laws: bool
     left_over: str = ""
-    standing_out: dict[str, float] = field(default_factory=dict)
+    significant_effects: dict[str, float] = field(default_factory=dict)
 
     @property
     def doubts_the_data(self) -> bool:
@@ -188,7 +188,7 @@ class Diagnosis:
     name: str
     version: str
     verdict: Verdict
-    suspects: tuple[Suspect, ...]
+    candidate_effects: tuple[CandidateEffect, ...]
     steps: tuple[Step, ...]
     misfit: Misfit
     errors: EstimatedErrors
@@ -196,12 +196,12 @@ class Diagnosis:
     parameters: ParameterEstimates
     predictions: Predictions
     place_map: PlaceMap
-    places: tuple[Location, ...] = ()
+    places: tuple[LocalAnomaly, ...] = ()
     instruments: tuple[FaultyInstrument, ...] = ()
     field: FieldFound | None = None
     model_error: ModelErrorUsed | None = None
     field_map: FieldMapKept | None = None
-    laws: LawsSuspected | None = None
+    laws: CandidateLaws | None = None
 
     @property
     def set(self) -> list[str]:
@@ -231,26 +231,30 @@ class Diagnosis:
         """Whether anything was taken into the model or set aside."""
         return bool(self.steps or self.places or self.instruments)
 
-    def first_score(self, suspect: Suspect) -> float:
+    def first_score(self, candidate_effect: CandidateEffect) -> float:
         """The score of an effect before any was accepted [standard errors]."""
-        return self.first_screening.scores.get(suspect.name, suspect.test.score)
+        return self.first_screening.scores.get(candidate_effect.name, candidate_effect.test.score)
 
-    def last_score(self, suspect: Suspect) -> float:
+    def last_score(self, candidate_effect: CandidateEffect) -> float:
         """The score of an effect in the last model [standard errors]; NaN where it is the first, or was refitted."""
-        return suspect.test.score if self.changed and not suspect.amplitude.refitted else float("nan")
+        return candidate_effect.test.score if self.changed and not candidate_effect.amplitude.refitted else float("nan")
 
-    def p_of_score(self, suspect: Suspect) -> float:
+    def p_of_score(self, candidate_effect: CandidateEffect) -> float:
         """The family-wise p [-] of the score that is told last; NaN where it is of another score, and a refit tells."""
-        told = self.last_score(suspect) if np.isfinite(self.last_score(suspect)) else self.first_score(suspect)
-        return suspect.test.p_family if suspect.test.score == told else float("nan")
+        told = (
+            self.last_score(candidate_effect)
+            if np.isfinite(self.last_score(candidate_effect))
+            else self.first_score(candidate_effect)
+        )
+        return candidate_effect.test.p_family if candidate_effect.test.score == told else float("nan")
 
-    def suspect(self, name: str) -> Suspect:
+    def candidate_effect(self, name: str) -> CandidateEffect:
         """The effect of that name; KeyError without."""
-        return {one.name: one for one in self.suspects}[name]
+        return {one.name: one for one in self.candidate_effects}[name]
 
     def __repr__(self) -> str:
-        misfit, sizes = self.misfit, [(name, self.suspect(name).amplitude) for name in self.set]
-        tested = f"{counted_in_words(self.suspects)} tested, vegglue {self.version}"
+        misfit, sizes = self.misfit, [(name, self.candidate_effect(name).amplitude) for name in self.set]
+        tested = f"{counted_in_words(self.candidate_effects)} tested, vegglue {self.version}"
         return in_short(
             f"Diagnosis of {self.name}: {self.verdict.kind}",
             [

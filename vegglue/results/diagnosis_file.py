@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 from pydantic import TypeAdapter
 
-from vegglue.results.causes import UNIT_OF_FIELD, LawsSuspected
+from vegglue.results.candidate_effect import AmplitudeEstimate, CandidateEffect, Detectability, ScoreTest
+from vegglue.results.causes import UNIT_OF_FIELD, CandidateLaws
 from vegglue.results.diagnosis import (
     Diagnosis,
     EstimatedErrors,
@@ -20,7 +21,7 @@ from vegglue.results.diagnosis import (
     FieldFound,
     FieldMapKept,
     FirstScreening,
-    Location,
+    LocalAnomaly,
     Misfit,
     ModelErrorUsed,
     ParameterEstimates,
@@ -30,11 +31,10 @@ from vegglue.results.diagnosis import (
     Verdict,
     VerdictKind,
 )
-from vegglue.results.diagnosis_json import flat_suspect
+from vegglue.results.diagnosis_json import flat_candidate_effect
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
 from vegglue.results.fitting import IN_WORDS, YES_OR_NO, ReadGroup, fitting, names_of, stated_as, stations_from
 from vegglue.results.layout import Group, Stored, Variable, table_group
-from vegglue.results.suspect import AmplitudeEstimate, Detectability, ScoreTest, Suspect
 
 # Datasets of the group `stations` that are not columns of the table of stations.
 AT_STATIONS = ("prediction_first", "prediction", "error")
@@ -43,14 +43,14 @@ SPOTS = dict.fromkeys(("x", "y", "score"), Stored(("place",)))
 FIELD_MAP = {
     "x": Stored(("x",)), "y": Stored(("y",)), "value": Stored(("x", "y")), "error": Stored(("x", "y")),
 }  # fmt: skip
-NUMBERS_OF_SUSPECT = (
+NUMBERS_OF_CANDIDATE = (
     "amplitude", "score", "p_family", "visibility", "smallest_detectable", "objective", "likeness", "off", "scale",
     "low95", "high95", "least", "most",
 )  # fmt: skip
-SUSPECT_COLUMNS = {
+CANDIDATE_COLUMNS = {
     **dict.fromkeys(("name", "title", "unit", "mimicked_by", "shapes"), Stored(("suspect",), type=IN_WORDS)),
     **dict.fromkeys(("testable", "refitted"), Stored(("suspect",), type=YES_OR_NO)),
-    **dict.fromkeys(NUMBERS_OF_SUSPECT, Stored(("suspect",))),
+    **dict.fromkeys(NUMBERS_OF_CANDIDATE, Stored(("suspect",))),
 }
 ZONE_COLUMNS = {
     **dict.fromkeys(("experiment", "section", "zone"), Stored(("zone_number",), type=IN_WORDS)),
@@ -59,14 +59,14 @@ ZONE_COLUMNS = {
 
 
 def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
-    """All groups of diagnosis.h5: stations with predictions before and after, suspects, zones, the map of places, and
-    cosines of fingerprints.
+    """All groups of diagnosis.h5: stations with predictions before and after, candidate effects, zones, the map of
+    places, and cosines of fingerprints.
     """
     at_stations = diagnosis.predictions
     stations = table_group(at_stations.station, "station", STATION_UNITS)
     arrays = zip(AT_STATIONS, (at_stations.first, at_stations.last, at_stations.error), strict=True)
     values = {name: Variable(("station",), array, VALUE_UNIT) for name, array in arrays}
-    suspects = pd.DataFrame([_row(suspect) for suspect in diagnosis.suspects])
+    candidate_effects = pd.DataFrame([_row(candidate_effect) for candidate_effect in diagnosis.candidate_effects])
     places = diagnosis.place_map
     spots = {
         "x": Variable(("place",), places.x, "m"),
@@ -77,7 +77,7 @@ def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
     names = np.array(first.compared, object)
     return {
         "stations": Group(stations.coordinates, {**stations.variables, **values}),
-        "suspects": table_group(suspects, "suspect", {}),
+        "suspects": table_group(candidate_effects, "suspect", {}),
         "zones": table_group(diagnosis.misfit.zones, "zone_number", {}),
         "places": Group({"place": np.arange(places.x.size)}, spots),
         "alike": Group({"name": names, "other": names}, {"cosine": Variable(("name", "other"), first.cosine)}),
@@ -118,10 +118,10 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
     }
     composed = {
         "steps": [asdict(step) for step in diagnosis.steps],
-        "where": None if verdict.location is None else asdict(verdict.location),
+        "where": None if verdict.anomaly is None else asdict(verdict.anomaly),
         "remarks": verdict.remarks,
         "not_excluded": verdict.not_excluded,
-        "standing_out": verdict.standing_out,
+        "standing_out": verdict.significant_effects,
         "flagged": errors.flagged,
         "first_scores": diagnosis.first_screening.scores,
         "first_parameters": diagnosis.parameters.first,
@@ -138,12 +138,12 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
 def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[str, Any]) -> Diagnosis:
     """The diagnosis whose file has these groups and attributes."""
     stations, places = fitting(groups["stations"], STATION_VALUES), fitting(groups["places"], SPOTS)
-    suspects = _table_from(groups["suspects"], "suspect", SUSPECT_COLUMNS)
+    candidate_effects = _table_from(groups["suspects"], "suspect", CANDIDATE_COLUMNS)
     found = Diagnosis(
         name=stated_as(str, attributes, "name"),
         version=stated_as(str, attributes, "version"),
         verdict=_verdict_from(attributes),
-        suspects=tuple(_suspect_from(row) for row in suspects.to_dict("records")),
+        candidate_effects=tuple(_candidate_effect_from(row) for row in candidate_effects.to_dict("records")),
         steps=_parsed(tuple[Step, ...], attributes["steps"]),
         misfit=Misfit(
             chi2_first=stated_as(float, attributes, "chi2_first"),
@@ -163,12 +163,12 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
         ),
         predictions=Predictions(stations_from(stations, *AT_STATIONS), *(stations[name] for name in AT_STATIONS)),
         place_map=PlaceMap(stated_as(str, attributes, "mapped_term"), places["x"], places["y"], places["score"]),
-        places=_parsed(tuple[Location, ...], attributes["locations"]),
+        places=_parsed(tuple[LocalAnomaly, ...], attributes["locations"]),
         instruments=_instruments_from(attributes["instruments"]),
         field=_parsed(FieldFound | None, attributes["field"]),
         model_error=_parsed(ModelErrorUsed | None, attributes["model_error"]),
         field_map=FieldMapKept(**fitting(groups["field"], FIELD_MAP)) if "field" in groups else None,
-        laws=_parsed(LawsSuspected | None, attributes["laws"]),
+        laws=_parsed(CandidateLaws | None, attributes["laws"]),
     )
     _refuse_strays(found)
     return found
@@ -176,7 +176,7 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
 
 def _refuse_strays(found: Diagnosis) -> None:
     """Errors: ValueError where a step names an effect, or a list a station, that the diagnosis does not hold."""
-    effects = {one.name for one in found.suspects}
+    effects = {one.name for one in found.candidate_effects}
     for step in found.steps:
         if step.accepted not in step.chance or not set(step.rivals) <= effects:
             raise ValueError(f"a step names {', '.join((step.accepted, *step.rivals))!r}, not all of them its suspects")
@@ -196,12 +196,12 @@ def _verdict_from(attributes: Mapping[str, Any]) -> Verdict:
         kind=kind,
         sentence=stated_as(str, attributes, "sentence"),
         remarks=_parsed(tuple[str, ...], attributes["remarks"]),
-        location=_parsed(Location | None, attributes["where"]),
+        anomaly=_parsed(LocalAnomaly | None, attributes["where"]),
         not_excluded=_parsed(tuple[tuple[str, ...], ...], attributes["not_excluded"]),
         clears_the_model=stated_as(bool, attributes, "clears_the_model"),
         tells_laws=stated_as(bool, attributes, "tells_laws"),
         left_over=stated_as(str, attributes, "left_over"),
-        standing_out=_parsed(dict[str, float], attributes["standing_out"]),
+        significant_effects=_parsed(dict[str, float], attributes["standing_out"]),
     )
 
 
@@ -232,14 +232,14 @@ def _table_from(group: ReadGroup, dim: str, columns: Mapping[str, Stored]) -> pd
     return pd.DataFrame({name: there[name] for name in there if name != dim})
 
 
-def _row(suspect: Suspect) -> dict[str, Any]:
-    row = flat_suspect(suspect)
+def _row(candidate_effect: CandidateEffect) -> dict[str, Any]:
+    row = flat_candidate_effect(candidate_effect)
     ends = dict(zip(("low95", "high95", "least", "most"), (*row.pop("interval95"), *row.pop("support")), strict=True))
-    return row | ends | {"shapes": json.dumps(suspect.shapes)}
+    return row | ends | {"shapes": json.dumps(candidate_effect.shapes)}
 
 
-def _suspect_from(row: Mapping[str, Any]) -> Suspect:
-    return Suspect(
+def _candidate_effect_from(row: Mapping[str, Any]) -> CandidateEffect:
+    return CandidateEffect(
         name=row["name"],
         title=row["title"],
         shapes=_parsed(dict[str, float], row["shapes"]),

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from typing import Any
 
 from vegglue.plain_json import plain
-from vegglue.results.diagnosis import Diagnosis, Suspect
+from vegglue.results.diagnosis import CandidateEffect, Diagnosis
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -14,12 +14,12 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": verdict.kind,
         "sentence": verdict.sentence,
         "left_over": verdict.left_over,
-        "standing_out": verdict.standing_out,
+        "standing_out": verdict.significant_effects,
         "set": diagnosis.set,
         "groups": diagnosis.groups,
         "not_excluded": verdict.not_excluded,
-        "where": None if verdict.location is None else asdict(verdict.location),
-        "effects": [flat_suspect(suspect) for suspect in diagnosis.suspects],
+        "where": None if verdict.anomaly is None else asdict(verdict.anomaly),
+        "effects": [flat_candidate_effect(candidate_effect) for candidate_effect in diagnosis.candidate_effects],
         "steps": [asdict(step) for step in diagnosis.steps],
         "remarks": verdict.remarks,
         "chi2": {"first": misfit.chi2_first, "last": misfit.chi2, "freedom": misfit.freedom, "p": misfit.p},
@@ -38,12 +38,12 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     return {name: plain(value) for name, value in tree.items()}
 
 
-def flat_suspect(suspect: Suspect) -> dict[str, Any]:
-    """All numbers of a suspect by the names they have in JSON and in diagnosis.h5."""
-    amplitude, test, detectability = suspect.amplitude, suspect.test, suspect.detectability
+def flat_candidate_effect(candidate_effect: CandidateEffect) -> dict[str, Any]:
+    """All numbers of a candidate_effect by the names they have in JSON and in diagnosis.h5."""
+    amplitude, test, detectability = candidate_effect.amplitude, candidate_effect.test, candidate_effect.detectability
     return {
-        "name": suspect.name,
-        "title": suspect.title,
+        "name": candidate_effect.name,
+        "title": candidate_effect.title,
         "unit": amplitude.unit,
         "amplitude": amplitude.value,
         "interval95": amplitude.interval95,
@@ -56,7 +56,7 @@ def flat_suspect(suspect: Suspect) -> dict[str, Any]:
         "objective": amplitude.objective,
         "mimicked_by": detectability.confounder,
         "likeness": detectability.cosine,
-        "shapes": suspect.shapes,
+        "shapes": candidate_effect.shapes,
         "off": amplitude.off,
         "scale": amplitude.scale,
         "support": amplitude.support,

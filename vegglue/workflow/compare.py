@@ -8,16 +8,16 @@ import pandas as pd
 
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.comparison import held_out_rmse, rung, rung_in_short
+from vegglue.diagnosis.comparison import held_out_rmse, model_score, model_score_in_short
 from vegglue.diagnosis.excluded_stations import MEASUREMENT, exclusion_in_words
 from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.kept_words import ladder_that_fits, rung_that_fits, write_ladder, write_rung
-from vegglue.results.ladder import Ladder, LadderStep
-from vegglue.results.rung import Rung
+from vegglue.results.json_store import comparison_that_fits, model_score_that_fits, write_comparison, write_model_score
+from vegglue.results.model_comparison import ComparedModel, ModelComparison
+from vegglue.results.model_score import ModelScore
 from vegglue.wording.numbers import in_short, so_many
 from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
 from vegglue.workflow.set_aside import left_out
@@ -28,23 +28,23 @@ ALIKE_IN_ALL = [*MEASUREMENT, "standard_error", "used"]
 
 @dataclass(frozen=True)
 class Comparison:
-    """One rung for each model, in the order they were given, and the measurements that none of them uses, since a
+    """One score for each model, in the order they were given, and the measurements that none of them uses, since a
     diagnosis has set them aside.
     """
 
-    rungs: tuple[Rung, ...]
+    model_scores: tuple[ModelScore, ...]
     left_out: pd.DataFrame
 
     def __repr__(self) -> str:
-        heading = f"Comparison of {so_many(len(self.rungs), 'model')}, root mean square errors of velocity [m/s]"
-        return in_short(heading, [*map(rung_in_short, self.rungs), exclusion_in_words(self.left_out)])
+        heading = f"Comparison of {so_many(len(self.model_scores), 'model')}, root mean square errors of velocity [m/s]"
+        return in_short(heading, [*map(model_score_in_short, self.model_scores), exclusion_in_words(self.left_out)])
 
 
 @one_thread()
 def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent) -> Comparison:
     """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one, and kept in
-    comparison.json in the folder of each, unless one model is there twice, or a ladder is kept there that begins with
-    another model.
+    comparison.json in the folder of each, unless one model is there twice, or a ladder kept there begins with another
+    model.
 
     Stations that the diagnosis of any of them has set aside are left out of all. What a model misses is kept in
     rung.json, and not computed again for exactly the same. Errors: InputError when models have
@@ -52,29 +52,29 @@ def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1,
     """
     _refuse_other_measurements(cases)
     hashes, aside = [case_hash(case) for case in cases], left_out(cases, runs)
-    rungs = []
+    scores = []
     with at_most(jobs):
         for number, case in enumerate(cases):
             watch(Progress(with_compilation(f"comparing {case.name}"), number, len(cases), "models"))
-            rungs.append(rung_of(case, runs, aside, watch))
-    found = Comparison(tuple(rungs), aside)
+            scores.append(model_score_of(case, runs, aside, watch))
+    found = Comparison(tuple(scores), aside)
     draw_ladder_of(found, cases[-1], runs)
     if len({case.name for case in cases}) == len(cases):  # a model beside itself is no ladder
-        ladder = ladder_of(found, cases, hashes)
+        comparison = comparison_of(found, cases, hashes)
         for case, config_hash in zip(cases, hashes, strict=True):
-            if not tells_more(ladder_that_fits(folder_of(runs, case), config_hash), ladder):
-                write_ladder(folder_of(runs, case), ladder, config_hash)
+            if not tells_more(comparison_that_fits(folder_of(runs, case), config_hash), comparison):
+                write_comparison(folder_of(runs, case), comparison, config_hash)
     return found
 
 
-def tells_more(kept: Ladder | None, ladder: Ladder) -> bool:
-    """Whether a ladder that is kept begins with a model that is not in this one, or says of the same models why it
+def tells_more(kept: ModelComparison | None, comparison: ModelComparison) -> bool:
+    """Whether a comparison that is kept begins with a model that is not in this one, or says of the same models why it
     ends there: the page would lose where it began, which readings were set aside there, or that reason.
     """
     if kept is None:
         return False
-    hashes = [step.config_hash for step in ladder.steps]
-    same = kept.left_out == ladder.left_out and [step.config_hash for step in kept.steps] == hashes
+    hashes = [step.config_hash for step in comparison.steps]
+    same = kept.left_out == comparison.left_out and [step.config_hash for step in kept.steps] == hashes
     return kept.steps[0].config_hash not in hashes or (same and bool(kept.reason))
 
 
@@ -109,20 +109,20 @@ def _measured(case: Case) -> pd.DataFrame:
     return read_observations(case).table[ALIKE_IN_ALL]
 
 
-def rung_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch) -> Rung:
+def model_score_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch) -> ModelScore:
     """The case where it predicts best, without the measurements set aside; kept for the next command."""
-    kept = kept_rung(case, runs, aside)
+    kept = kept_model_score(case, runs, aside)
     if kept is not None:
         return kept
     folder, wanted = folder_of(runs, case), case_hash(case)
-    made = rung(calibrated(case, folder, aside, watch), validation_of(case, folder, watch))
-    write_rung(folder, made, rows_set_aside(aside), wanted)
+    made = model_score(calibrated(case, folder, aside, watch), validation_of(case, folder, watch))
+    write_model_score(folder, made, rows_set_aside(aside), wanted)
     return made
 
 
-def kept_rung(case: Case, runs: Path | str, aside: pd.DataFrame) -> Rung | None:
+def kept_model_score(case: Case, runs: Path | str, aside: pd.DataFrame) -> ModelScore | None:
     """What an earlier command found for exactly this case without these measurements, under its title of now."""
-    kept = rung_that_fits(folder_of(runs, case), rows_set_aside(aside), case_hash(case))
+    kept = model_score_that_fits(folder_of(runs, case), rows_set_aside(aside), case_hash(case))
     return None if kept is None else replace(kept, title=case.title)
 
 
@@ -132,34 +132,36 @@ def rows_set_aside(aside: pd.DataFrame) -> list[tuple[str | float, ...]]:
 
 
 def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
-    """Draw the ladder in the folder of its last case; returns the picture."""
+    """Draw the comparison in the folder of its last case; returns the picture."""
     from vegglue.report.ladder_figure import save_ladder_figure
 
     picture = folder_of(runs, last) / "ladder.png"
-    save_ladder_figure(found.rungs, picture)
+    save_ladder_figure(found.model_scores, picture)
     return picture
 
 
-def keep_ladder(ladder: Ladder, cases: Sequence[Case], hashes: Sequence[str], runs: Path | str) -> None:
-    """Keep the ladder in the folder of each of its cases, for their pages. Errors: StorageError."""
+def keep_comparison(
+    comparison: ModelComparison, cases: Sequence[Case], hashes: Sequence[str], runs: Path | str
+) -> None:
+    """Keep the comparison in the folder of each of its cases, for their pages. Errors: StorageError."""
     for case, config_hash in zip(cases, hashes, strict=True):
-        write_ladder(folder_of(runs, case), ladder, config_hash)
+        write_comparison(folder_of(runs, case), comparison, config_hash)
 
 
-def ladder_of(
+def comparison_of(
     found: Comparison, cases: Sequence[Case], hashes: Sequence[str], reason: str = "", verdict: str = ""
-) -> Ladder:
-    """The ladder of compared models; hashes: of the cases as they were read; reason, verdict: see `Ladder`."""
+) -> ModelComparison:
+    """Models as they are kept; hashes: of the cases as they were read; reason, verdict: see `ModelComparison`."""
     before: tuple[str, ...] = ()
     steps = []
-    for case, config_hash, one in zip(cases, hashes, found.rungs, strict=True):
+    for case, config_hash, one in zip(cases, hashes, found.model_scores, strict=True):
         steps.append(_step_of(case, config_hash, one, tuple(name for name in one.effects if name not in before)))
         before = one.effects
-    return Ladder(tuple(steps), len(found.left_out), reason, verdict)
+    return ModelComparison(tuple(steps), len(found.left_out), reason, verdict)
 
 
-def _step_of(case: Case, config_hash: str, one: Rung, added: tuple[str, ...]) -> LadderStep:
-    return LadderStep(
+def _step_of(case: Case, config_hash: str, one: ModelScore, added: tuple[str, ...]) -> ComparedModel:
+    return ComparedModel(
         name=case.name,
         config=case.source.name,
         config_hash=config_hash,

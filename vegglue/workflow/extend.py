@@ -15,7 +15,7 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import as_yaml, case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
-from vegglue.diagnosis.comparison import rung
+from vegglue.diagnosis.comparison import model_score
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.nominations import Addition, choice_among, places_tried, tried_additions, values_tried
 from vegglue.diagnosis.stepwise_choice import Choice, Names
@@ -26,10 +26,10 @@ from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.kept_words import write_rung
+from vegglue.results.json_store import write_model_score
 from vegglue.results.result_files import diagnosis_that_fits
 from vegglue.wording.numbers import in_digits
-from vegglue.workflow.compare import Comparison, keep_ladder, ladder_of, rows_set_aside
+from vegglue.workflow.compare import Comparison, comparison_of, keep_comparison, rows_set_aside
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import (
     best_parameters,
@@ -81,8 +81,8 @@ def extend_stepwise(
     case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent, force: bool = False
 ) -> StepwiseExtension:
     """Add the effects and the places that the diagnosis found, one or together, while errors of held-out measurements
-    and the misfit with all others fall; see `stepwise_choice`. The ladder is kept in comparison.json of each case, and
-    read there where the case, its diagnosis and its children are as they were.
+    and the misfit with all others fall; see `stepwise_choice`. It is kept in comparison.json of each case, and read
+    there where the case, its diagnosis and its children are as they were.
 
     force: replace a child that was written or edited by hand, too. Errors: InputError when there is one.
     """
@@ -97,11 +97,11 @@ def extend_stepwise(
     if hashes[0] != wanted:  # children are of the files as they are now, their numbers of those before
         source = shown_path(case.source)
         raise InputError(f"{source}: a file that it names changed while it was extended; run `vegglue extend` again.")
-    for one, errors, config_hash in zip(extension.cases, extension.comparison.rungs, hashes, strict=True):
-        write_rung(folder_of(runs, one), errors, rows_set_aside(extension.comparison.left_out), config_hash)
-    ladder = ladder_of(extension.comparison, extension.cases, hashes, extension.reason, extension.sentence)
-    ladder = replace(ladder, unclear=extension.unclear)
-    keep_ladder(ladder, extension.cases, hashes, runs)
+    for one, errors, config_hash in zip(extension.cases, extension.comparison.model_scores, hashes, strict=True):
+        write_model_score(folder_of(runs, one), errors, rows_set_aside(extension.comparison.left_out), config_hash)
+    comparison = comparison_of(extension.comparison, extension.cases, hashes, extension.reason, extension.sentence)
+    comparison = replace(comparison, unclear=extension.unclear)
+    keep_comparison(comparison, extension.cases, hashes, runs)
     return extension
 
 
@@ -131,9 +131,9 @@ def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, forc
     # Only now are the measurements for validation looked at.
     bases = [replace(base, model=replace(base.model, case=one)) for one, base in zip(cases, bases, strict=True)]
     unseen = [validation_of(one, folder_of(runs, one), watch) for one in cases]
-    ladder = in_threads(rung, list(zip(bases, unseen, strict=True)))
+    comparison = in_threads(model_score, list(zip(bases, unseen, strict=True)))
     words, unclear = in_words(case, found, choice), tuple(choice.unclear)
-    return StepwiseExtension(tuple(cases), Comparison(tuple(ladder), aside), found.verdict.sentence, words, unclear)
+    return StepwiseExtension(tuple(cases), Comparison(tuple(comparison), aside), found.verdict.sentence, words, unclear)
 
 
 def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:

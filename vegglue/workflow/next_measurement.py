@@ -11,18 +11,18 @@ from vegglue.calibration.candidates import Candidate
 from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
+from vegglue.diagnosis.candidate_effects import POWER_QUANTILE
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.next_measurement import MeasurementWorth, Rival, worth_of_measurements
-from vegglue.diagnosis.suspects import POWER_QUANTILE
 from vegglue.effects.grammar import LAWS
 from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.causes import LawsSuspected, LawSuspected
-from vegglue.results.diagnosis import Diagnosis, Step, Suspect
-from vegglue.results.kept_words import questions_that_fit, write_questions
+from vegglue.results.causes import CandidateLaw, CandidateLaws
+from vegglue.results.diagnosis import CandidateEffect, Diagnosis, Step
+from vegglue.results.json_store import questions_that_fit, write_questions
 from vegglue.results.open_questions import HIDDEN_BEHIND, ProposedMeasurement, Question
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.run_folder import calibrated, folder_of
@@ -51,7 +51,7 @@ def next_measurement(
     kept = None if between else questions_that_fit(folder_of(runs, case), wanted)
     if kept is not None:
         return [*kept]
-    by_name = [one.name for one in found.suspects]
+    by_name = [one.name for one in found.candidate_effects]
     possible = [*by_name, *_laws_by_name(found)]
     unknown = [name for name in between if name not in possible]
     if unknown:
@@ -129,8 +129,8 @@ def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
     if len(laws) > 1:
         return _asked(case, found, laws)
     # What calibration hides best, of all that would leave a trace without it.
-    seen = found.verdict.standing_out
-    hidden = [one for one in found.suspects if not one.detectability.testable and one.name not in seen]
+    seen = found.verdict.significant_effects
+    hidden = [one for one in found.candidate_effects if not one.detectability.testable and one.name not in seen]
     strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
     return [question for one in strongest for question in _asked(case, found, [one.name])]
 
@@ -152,11 +152,11 @@ def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str
         return [(" from ".join(names), rivals_of(case, found, names))]
     if names[0] in _laws_by_name(found):
         return [(f"{names[0]} from what calibration makes of it", rivals_of(case, found, names))]
-    single = next(one for one in found.suspects if one.name == names[0])
+    single = next(one for one in found.candidate_effects if one.name == names[0])
     return [(_what_hides(single), rivals_of(case, found, names, plausible=True))]
 
 
-def laws_to_tell_apart(laws: LawsSuspected | None) -> list[str]:
+def laws_to_tell_apart(laws: CandidateLaws | None) -> list[str]:
     """Laws that could be what is missing, the likeliest of each term and quantity: the forms of one leave traces that
     hardly differ.
     """
@@ -166,18 +166,18 @@ def laws_to_tell_apart(laws: LawsSuspected | None) -> list[str]:
     return list(likeliest.values())[:MOST_LAWS]
 
 
-def _laws_by_name(found: Diagnosis) -> dict[str, LawSuspected]:
+def _laws_by_name(found: Diagnosis) -> dict[str, CandidateLaw]:
     return {} if found.laws is None else {one.name: one for one in found.laws.laws}
 
 
-def _what_hides(suspect: Suspect) -> str:
-    return f"{suspect.name}{HIDDEN_BEHIND}{suspect.detectability.confounder}"
+def _what_hides(candidate_effect: CandidateEffect) -> str:
+    return f"{candidate_effect.name}{HIDDEN_BEHIND}{candidate_effect.detectability.confounder}"
 
 
-def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
+def _raw_trace(case: Case, found: Diagnosis, candidate_effect: CandidateEffect) -> float:
     """Length of the trace of a plausible amplitude before projection, in standard errors."""
-    amplitude = candidate_named(case, found.predictions.station, suspect.name).effect.amplitude
-    detectability = suspect.detectability
+    amplitude = candidate_named(case, found.predictions.station, candidate_effect.name).effect.amplitude
+    detectability = candidate_effect.detectability
     gain = amplitude.gain(amplitude.off + detectability.smallest)
     length = found.first_screening.threshold + POWER_QUANTILE
     return length * amplitude.plausible_gain / gain / max(detectability.visibility, 1e-6)
@@ -186,11 +186,11 @@ def _raw_trace(case: Case, found: Diagnosis, suspect: Suspect) -> float:
 def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
     """Effects of a diagnosis by name, at the size it found or a plausible one; laws at their size to first order."""
     rivals: list[Rival] = []
-    for suspect in (one for one in found.suspects if one.name in names):
-        candidate = candidate_named(case, found.predictions.station, suspect.name)
+    for candidate_effect in (one for one in found.candidate_effects if one.name in names):
+        candidate = candidate_named(case, found.predictions.station, candidate_effect.name)
         amplitude = candidate.effect.amplitude
-        gain = amplitude.plausible_gain if plausible else amplitude.gain(suspect.amplitude.value)
-        rivals.append((candidate, suspect.shapes, gain))
+        gain = amplitude.plausible_gain if plausible else amplitude.gain(candidate_effect.amplitude.value)
+        rivals.append((candidate, candidate_effect.shapes, gain))
     for name, law in _laws_by_name(found).items():
         if name in names:
             rivals.append((Candidate(LAWS[name].effect, scale=law.scale), law.shapes, law.strength))

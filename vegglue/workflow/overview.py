@@ -8,7 +8,7 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.progress import Progress, Watch, silent
 from vegglue.report.overview import write_overview
-from vegglue.results.kept_words import ladder_that_fits
+from vegglue.results.json_store import comparison_that_fits
 from vegglue.workflow.report import results_of
 from vegglue.workflow.run_folder import as_solved, folder_of
 
@@ -32,10 +32,10 @@ def overview(cases: Sequence[Case], *, runs: Path | str = "runs", trust: bool = 
 
 
 def _with_posterior(case: Case, runs: Path | str, trust: bool) -> Case:
-    """The case; where it has no posterior the last child of its ladder that has one, else the last of all."""
-    ladder = ladder_that_fits(folder_of(runs, case), case_hash(case))
-    if ladder is None or (folder_of(runs, case) / "posterior.h5").exists():
+    """The case; where it has no posterior the last child of its comparison that has one, else the last of all."""
+    comparison = comparison_that_fits(folder_of(runs, case), case_hash(case))
+    if comparison is None or (folder_of(runs, case) / "posterior.h5").exists():
         return case
-    made = [one for one in ladder.steps if (Path(runs) / one.name / "posterior.h5").exists()]
-    child = case.source.with_name((made or ladder.steps)[-1].config)
+    made = [one for one in comparison.steps if (Path(runs) / one.name / "posterior.h5").exists()]
+    child = case.source.with_name((made or comparison.steps)[-1].config)
     return load_case(child, trust) if child.exists() else case

@@ -16,7 +16,7 @@ from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.report.page import write_report
 from vegglue.report.run import LoopResults, Run
-from vegglue.results.kept_words import ladder_that_fits, questions_that_fit
+from vegglue.results.json_store import comparison_that_fits, questions_that_fit
 from vegglue.results.posterior import Posterior
 from vegglue.results.result_files import diagnosis_that_fits, read_ensemble, read_posterior
 from vegglue.results.resume import begun_or_finished
@@ -75,8 +75,8 @@ def _as_inferred(observations: Observations, posterior: Posterior, aside: pd.Dat
 
 def _refuse_if_the_run_went_on(case: Case, runs: Path | str) -> None:
     """Errors: InputError when the loop extended the model, and the posterior is that of the last one only."""
-    ladder = ladder_that_fits(folder_of(runs, case), case_hash(case))
-    last = ladder.steps[-1].name if ladder is not None else case.name
+    comparison = comparison_that_fits(folder_of(runs, case), case_hash(case))
+    last = comparison.steps[-1].name if comparison is not None else case.name
     page = Path(runs) / last / "report.html"
     if last != case.name and page.exists():
         raise InputError(
@@ -88,14 +88,16 @@ def _refuse_if_the_run_went_on(case: Case, runs: Path | str) -> None:
 def loop_results_of(case: Case, runs: Path | str, above: str) -> LoopResults:
     """What diagnose, extend, compare and next left of exactly this case, and of the model its ladder begins with."""
     runs, wanted = Path(runs), case_hash(case)
-    ladder = ladder_that_fits(runs / case.name, wanted)
-    first, first_hash = (case.name, wanted) if ladder is None else (ladder.steps[0].name, ladder.steps[0].config_hash)
-    steps = () if ladder is None else ladder.steps
+    comparison = comparison_that_fits(runs / case.name, wanted)
+    first, first_hash = (
+        (case.name, wanted) if comparison is None else (comparison.steps[0].name, comparison.steps[0].config_hash)
+    )
+    steps = () if comparison is None else comparison.steps
     own = questions_that_fit(runs / case.name, wanted)
     made = [one.name for one in steps if (runs / one.name / "posterior.h5").exists()]
     return LoopResults(
         behind=diagnosis_that_fits(runs / first / "diagnosis.h5", first_hash),
-        ladder=ladder,
+        ladder=comparison,
         questions=own if own is not None else questions_that_fit(runs / first, first_hash),
         pages={name: f"{above}{name}/report.html" for name in made},
     )

@@ -50,7 +50,7 @@ def _mark(hidden: Hidden, diagnosis: Diagnosis) -> Mark:
     still = hidden.name in [name for group in diagnosis.verdict.not_excluded for name in group]
     amplitude = None
     if inside:
-        low, high = diagnosis.suspect(hidden.name).amplitude.interval95
+        low, high = diagnosis.candidate_effect(hidden.name).amplitude.interval95
         amplitude = bool(low <= hidden.amplitude <= high)
     return Mark(hidden, named, inside, still, amplitude, float("nan"), inside)
 
@@ -127,6 +127,6 @@ def _told(mark: Mark, diagnosis: Diagnosis) -> str:
 
 def _other_shapes(hidden: Hidden, diagnosis: Diagnosis) -> str:
     """Settings of shape the effect was found with, where they differ from those of the truth by a twentieth or more."""
-    found = diagnosis.suspect(hidden.name).shapes
+    found = diagnosis.candidate_effect(hidden.name).shapes
     others = [name for name, true in hidden.shapes.items() if not np.isclose(found.get(name, true), true, rtol=0.05)]
     return " and ".join(f"{name} = {found[name]:.3g} instead of {hidden.shapes[name]:.3g}" for name in others)

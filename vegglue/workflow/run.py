@@ -12,7 +12,7 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.resume import begun_or_finished
-from vegglue.workflow.compare import Comparison, draw_ladder_of, keep_ladder, ladder_of, rung_of
+from vegglue.workflow.compare import Comparison, comparison_of, draw_ladder_of, keep_comparison, model_score_of
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.discover import discover
 from vegglue.workflow.extend import extend_stepwise
@@ -84,21 +84,21 @@ def _with_a_law(
     case: Case, alone: Comparison, runs: Path | str, jobs: int, watch: Watch, show: Show, force: bool
 ) -> Case:
     """The case with a law that is in no list, where one is found and errors at held-out sections are less with it than
-    those of the case `alone`; else the case. Only then their ladder is kept.
+    those of the case `alone`; else the case. Only then their comparison is kept.
     """
     law = discover(case, runs=runs, jobs=jobs, watch=watch, force=force)
     show(case, law)
     if law.child is None:
         return case
     with at_most(jobs):
-        with_law = rung_of(law.child, runs, alone.left_out, watch)
-    both, cases = Comparison((alone.rungs[0], with_law), alone.left_out), [case, law.child]
+        with_law = model_score_of(law.child, runs, alone.left_out, watch)
+    both, cases = Comparison((alone.model_scores[0], with_law), alone.left_out), [case, law.child]
     draw_ladder_of(both, law.child, runs)
     show(law.child, both)
-    if not held_out_rmse(with_law) < held_out_rmse(alone.rungs[0]):  # nor where nothing could be held out: NaN
+    if not held_out_rmse(with_law) < held_out_rmse(alone.model_scores[0]):  # nor where nothing could be held out: NaN
         return case
     hashes = [case_hash(one) for one in cases]
-    keep_ladder(ladder_of(both, cases, hashes), cases, hashes, runs)
+    keep_comparison(comparison_of(both, cases, hashes), cases, hashes, runs)
     return law.child
 
 

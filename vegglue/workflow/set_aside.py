@@ -8,27 +8,27 @@ import pandas as pd
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.results.kept_words import ladder_that_fits
+from vegglue.results.json_store import comparison_that_fits
 from vegglue.results.result_files import diagnosis_that_fits
 
 
 def left_out(cases: Sequence[Case], runs: Path | str) -> pd.DataFrame:
     """The measurements that are set aside of any of the cases, see `set_aside_of`."""
-    # A ladder may begin with one of the cases as it was before: of its name, but of another hash.
+    # A comparison may begin with one of the cases as it was before: of its name, but of another hash.
     models = dict.fromkeys(one for case in cases for one in judged_by(case, Path(runs)).items())
     return _set_aside(models, Path(runs))
 
 
 def set_aside_of(case: Case, runs: Path | str) -> pd.DataFrame:
-    """Those that the diagnosis of a case has set aside, or that of the model which its ladder begins with."""
+    """Those that the diagnosis of a case has set aside, or that of the model which its comparison begins with."""
     return _set_aside(judged_by(case, Path(runs)).items(), Path(runs))
 
 
 def judged_by(case: Case, runs: Path) -> dict[str, str]:
     """Names and hashes of the models whose diagnoses count: its own, and the first of its ladder."""
     wanted = case_hash(case)
-    ladder = ladder_that_fits(runs / case.name, wanted)
-    first = {} if ladder is None else {ladder.steps[0].name: ladder.steps[0].config_hash}
+    comparison = comparison_that_fits(runs / case.name, wanted)
+    first = {} if comparison is None else {comparison.steps[0].name: comparison.steps[0].config_hash}
     return {**first, case.name: wanted}
 
 

@@ -1,4 +1,4 @@
-"""How a case was extended, and whether that is kept: its ladder in comparison.json, each model in rung.json."""
+"""How a case was extended, and whether that is kept: its comparison in comparison.json, each model in rung.json."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +9,10 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.errors import InputError
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.kept_words import ladder_that_fits
-from vegglue.results.ladder import LadderStep
+from vegglue.results.json_store import comparison_that_fits
+from vegglue.results.model_comparison import ComparedModel
 from vegglue.wording.numbers import in_short
-from vegglue.workflow.compare import Comparison, kept_rung
+from vegglue.workflow.compare import Comparison, kept_model_score
 from vegglue.workflow.run_folder import folder_of
 
 
@@ -40,7 +40,7 @@ def kept_extension(case: Case, found: Diagnosis, runs: Path | str) -> StepwiseEx
     Never that of a case with code or a command of the user's, as a child could name another.
     """
     wanted = case_hash(case)
-    kept = ladder_that_fits(folder_of(runs, case), wanted)
+    kept = comparison_that_fits(folder_of(runs, case), wanted)
     if kept is None or case.effect_file is not None or case.engine is not None:
         return None
     first, *others = kept.steps
@@ -49,13 +49,13 @@ def kept_extension(case: Case, found: Diagnosis, runs: Path | str) -> StepwiseEx
         return None
     children = [child for step in others if (child := _child_of(case, step)) is not None]
     cases = (case, *children)
-    rungs = [one for each in cases if (one := kept_rung(each, runs, aside)) is not None]
-    if len(rungs) < len(kept.steps):
+    scores = [one for each in cases if (one := kept_model_score(each, runs, aside)) is not None]
+    if len(scores) < len(kept.steps):
         return None
-    return StepwiseExtension(cases, Comparison(tuple(rungs), aside), sentence, kept.reason, kept.unclear)
+    return StepwiseExtension(cases, Comparison(tuple(scores), aside), sentence, kept.reason, kept.unclear)
 
 
-def _child_of(parent: Case, step: LadderStep) -> Case | None:
+def _child_of(parent: Case, step: ComparedModel) -> Case | None:
     """The case of a later step, beside its parent; None where it is gone, or another."""
     try:
         child = load_case(parent.source.with_name(step.config))

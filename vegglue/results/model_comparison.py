@@ -11,7 +11,7 @@ ERRORS = ("in_sample", "held_out_sections", "held_out_experiments", "unseen", "n
 
 
 @dataclass(frozen=True)
-class LadderStep:
+class ComparedModel:
     """One model: its case and config hash, the effects it has and the model before has not, how many parameters.
 
     Root mean square errors of velocities along x [m/s], NaN where there are none: of what the model was calibrated to,
@@ -31,30 +31,30 @@ class LadderStep:
 
 
 @dataclass(frozen=True)
-class Ladder:
+class ModelComparison:
     """Models side by side; left_out: measurements that none of them uses; reason: why it ends where it does, in words;
     verdict: the sentence of the diagnosis that named what was added. Both are '' where nobody searched. unclear: names
     of what was added whose fall of held-out errors cannot be told from none.
     """
 
-    steps: tuple[LadderStep, ...]
+    steps: tuple[ComparedModel, ...]
     left_out: int
     reason: str
     verdict: str = ""
     unclear: tuple[str, ...] = ()
 
 
-def ladder_from(tree: Mapping[str, Any]) -> Ladder:
-    """The ladder of an object of JSON, which has null for no number.
+def comparison_from(tree: Mapping[str, Any]) -> ModelComparison:
+    """The comparison of an object of JSON, which has null for no number.
 
     Errors: KeyError, TypeError or ValueError where it is none.
     """
     steps = tuple(_step_from(step) for step in tree["steps"])
-    return Ladder(
+    return ModelComparison(
         steps, int(tree["left_out"]), str(tree["reason"]), str(tree["verdict"]), tuple(map(str, tree["unclear"]))
     )
 
 
-def _step_from(step: Mapping[str, Any]) -> LadderStep:
+def _step_from(step: Mapping[str, Any]) -> ComparedModel:
     errors = {name: number_kept(step[name]) for name in ERRORS}
-    return LadderStep(**{**step, **errors, "added": tuple(step["added"])})
+    return ComparedModel(**{**step, **errors, "added": tuple(step["added"])})

@@ -8,7 +8,7 @@ from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import prior_shrinkage
 from vegglue.decision_constants import constants
 from vegglue.normal_range import NORMAL95
-from vegglue.results.suspect import AmplitudeEstimate, Detectability, ScoreTest, Suspect
+from vegglue.results.candidate_effect import AmplitudeEstimate, CandidateEffect, Detectability, ScoreTest
 
 # Lengths of a fingerprint, in standard errors, that may be there undetected: thresholds are near a score of 3.2, so
 # that longer ones stand out and shorter ones change little. Which it is nobody knows.
@@ -24,11 +24,11 @@ POWER_QUANTILE = 1.645
 TESTABLE = 2.0
 
 
-def suspects_of(screening: Screening) -> dict[str, Suspect]:
+def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
     """All effects of a screening by name, none of them refitted."""
     threshold = screening.effects.threshold(constants().effect_alarm_rate)
     candidates = screening.fingerprints.candidates
-    return {one.name: _suspect(screening, j, threshold) for j, one in enumerate(candidates)}
+    return {one.name: _candidate_effect(screening, j, threshold) for j, one in enumerate(candidates)}
 
 
 def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
@@ -44,10 +44,10 @@ def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(names[j] for j in group) for group in groups)
 
 
-def _suspect(screening: Screening, candidate: int, threshold: float) -> Suspect:
+def _candidate_effect(screening: Screening, candidate: int, threshold: float) -> CandidateEffect:
     one, column = screening.fingerprints.candidates[candidate], screening.best_column(candidate)
     score = screening.best_score(candidate)
-    return Suspect(
+    return CandidateEffect(
         name=one.name,
         title=one.effect.title,
         shapes=screening.fingerprints.settings[column],

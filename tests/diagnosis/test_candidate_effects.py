@@ -10,9 +10,9 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import Candidate
 from vegglue.calibration.fingerprints import Fingerprints
 from vegglue.calibration.residual_screening import screen
-from vegglue.diagnosis.suspects import suspects_of
+from vegglue.diagnosis.candidate_effects import candidate_effects_of
 from vegglue.effects.library import library
-from vegglue.results.diagnosis import Suspect
+from vegglue.results.diagnosis import CandidateEffect
 
 STATION = stations_of(CASE_OF_TWINS, ("A", "B"), 6)
 
@@ -20,7 +20,7 @@ STATION = stations_of(CASE_OF_TWINS, ("A", "B"), 6)
 LISTED = library()["bank_trend"]
 
 
-def on_linear_model(visible: float, end: float = 5.0) -> tuple[Suspect, Baseline]:
+def on_linear_model(visible: float, end: float = 5.0) -> tuple[CandidateEffect, Baseline]:
     """An effect of 1.5 plausible sizes, each some `visible` standard errors long and `end` of them possible, as it is
     told to first order, and the model calibrated with it.
     """
@@ -37,15 +37,15 @@ def on_linear_model(visible: float, end: float = 5.0) -> tuple[Suspect, Baseline
     )
     screening = screen(base, (), known)
     assert (screening.base.noise.correlation, screening.base.noise.scale) == (0.0, 1.0)
-    (suspect,) = suspects_of(screening).values()
-    return suspect, at_best(CASE_OF_TWINS, STATION, values, np.hstack([slope, trace]))
+    (candidate_effect,) = candidate_effects_of(screening).values()
+    return candidate_effect, at_best(CASE_OF_TWINS, STATION, values, np.hstack([slope, trace]))
 
 
 @pytest.mark.parametrize("visible", [0.2, 5.0])
 def test_sizes_are_told_with_their_prior_as_those_of_refits(visible: float) -> None:
     """What the data hardly see was told as 1.4 plausible sizes, give or take 10: its refit says 0, give or take 2."""
-    suspect, refitted = on_linear_model(visible)
-    fitted, told = refitted.fitted, suspect.amplitude
+    candidate_effect, refitted = on_linear_model(visible)
+    fitted, told = refitted.fitted, candidate_effect.amplitude
     error = 1.96 * fitted.covariance[-1, -1] ** 0.5
     assert told.value == pytest.approx(fitted.point.z[-1], abs=1e-6)
     assert told.interval95 == pytest.approx((told.value - error, told.value + error), rel=1e-3)
@@ -54,13 +54,13 @@ def test_sizes_are_told_with_their_prior_as_those_of_refits(visible: float) -> N
 @pytest.mark.parametrize("visible", [0.2, 5.0])
 def test_the_least_sum_of_squares_is_told_with_the_prior_of_the_amplitude(visible: float) -> None:
     """Without it an effect that the data hardly see was told to explain more than its refit does."""
-    suspect, refitted = on_linear_model(visible)
-    assert suspect.amplitude.objective == pytest.approx(refitted.fitted.objective, abs=1e-6)
+    candidate_effect, refitted = on_linear_model(visible)
+    assert candidate_effect.amplitude.objective == pytest.approx(refitted.fitted.objective, abs=1e-6)
 
 
 @pytest.mark.parametrize(("end", "testable"), [(5.0, True), (1.5, False)])
 def test_what_would_be_seen_only_beyond_its_bounds_is_untestable(end: float, testable: bool) -> None:
     """The turning of the earth ends at 1.5 plausible sizes, and was told to be testable at two."""
-    suspect, _ = on_linear_model(2.6, end)
-    assert 1.5 < suspect.detectability.smallest < 2.0
-    assert suspect.detectability.testable is testable
+    candidate_effect, _ = on_linear_model(2.6, end)
+    assert 1.5 < candidate_effect.detectability.smallest < 2.0
+    assert candidate_effect.detectability.testable is testable

@@ -15,7 +15,7 @@ from vegglue.decision_constants import constants
 LARGEST_LOG_ODDS = 100.0
 
 
-def tempered_chances(evidence: Array, trace_error: float | None = None) -> Array:
+def tempered_probabilities(evidence: Array, trace_error: float | None = None) -> Array:
     """p_j of E_j (k,) [-]; trace_error: relative error of a fingerprint [-]."""
     weight = np.exp((evidence - evidence.max()) / tempering(evidence, trace_error))
     return np.asarray(weight / weight.sum())

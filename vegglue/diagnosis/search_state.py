@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import Contender
-from vegglue.results.diagnosis import FaultyInstrument, Location, Step
+from vegglue.diagnosis.competition import Hypothesis
+from vegglue.results.diagnosis import FaultyInstrument, LocalAnomaly, Step
 
 
 @dataclass(frozen=True)
-class Charge:
+class PriorWeight:
     """What one finding brought and cost: the fall of chi2 with it, and the ln of its chance before the data."""
 
     name: str
@@ -18,24 +18,24 @@ class Charge:
 
 @dataclass(frozen=True)
 class Undecided:
-    """Contenders that competed last and led to nothing, most evidence first, and the chance of each (k,) [-]."""
+    """Hypotheses that competed last and led to nothing, most evidence first, and the chance of each (k,) [-]."""
 
-    contenders: tuple[Contender, ...]
+    hypotheses: tuple[Hypothesis, ...]
     chances: tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class Findings:
-    """charges: of all that is held. flagged: readings set aside, indices among the used stations. of_shape: ln evidence
-    of places as they competed, less that in the model, whose covariance holds the error of their shape. p: of the last
-    alarm, and the rate below which it is sounded. undecided: what competed last and led to nothing. absurd:
+class SearchState:
+    """prior_weights: of all that is held. flagged: readings set aside, indices among the used stations. of_shape:
+    ln evidence of places as they competed, less that in the model, whose covariance holds the error of their shape. p:
+    of the last alarm, and the rate below which it is sounded. undecided: what competed last and led to nothing. absurd:
     values that no flow of the case can have, in sentences.
     """
 
     steps: tuple[Step, ...] = ()
-    places: tuple[Location, ...] = ()
+    places: tuple[LocalAnomaly, ...] = ()
     instruments: tuple[FaultyInstrument, ...] = ()
-    charges: tuple[Charge, ...] = ()
+    prior_weights: tuple[PriorWeight, ...] = ()
     flagged: tuple[int, ...] = ()
     of_shape: float = 0.0
     p: float = 1.0
@@ -50,7 +50,7 @@ class Findings:
     @property
     def explained(self) -> float:
         """Fall of chi2 by effects and places."""
-        return sum(one.explained for one in self.charges)
+        return sum(one.explained for one in self.prior_weights)
 
     @property
     def slack(self) -> float:
@@ -60,7 +60,7 @@ class Findings:
     @property
     def log_prior(self) -> float:
         """ln of the chance of all that was found before the data."""
-        return sum(one.log_prior for one in self.charges)
+        return sum(one.log_prior for one in self.prior_weights)
 
     def gained(self, before: float, after: float) -> float:
         """ln evidence of all that was found together, as it competed, from those of the first and the last model."""

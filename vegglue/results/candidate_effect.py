@@ -78,7 +78,7 @@ class Detectability:
 
 
 @dataclass(frozen=True)
-class Suspect:
+class CandidateEffect:
     """One effect as the data see it, in the last model in which it was tested; shapes: at which it scores best."""
 
     name: str
@@ -89,15 +89,15 @@ class Suspect:
     detectability: Detectability
 
 
-def effects_among(suspects: Sequence[Suspect]) -> int:
+def effects_among(candidate_effects: Sequence[CandidateEffect]) -> int:
     """How many effects they are, wherever each may act."""
-    return len({EffectIdentity.parse(one.name).name for one in suspects})
+    return len({EffectIdentity.parse(one.name).name for one in candidate_effects})
 
 
-def counted_in_words(suspects: Sequence[Suspect]) -> str:
+def counted_in_words(candidate_effects: Sequence[CandidateEffect]) -> str:
     """`54 effects`; `67 candidates of 54 effects` where some of them are one effect in one experiment, section, device
     or patch each.
     """
-    number = effects_among(suspects)
+    number = effects_among(candidate_effects)
     told = so_many(number, "effect")
-    return told if number == len(suspects) else f"{so_many(len(suspects), 'candidate')} of {told}"
+    return told if number == len(candidate_effects) else f"{so_many(len(candidate_effects), 'candidate')} of {told}"

@@ -1,12 +1,12 @@
-"""Rungs of an error ladder that tests share: small, with what could not be held out."""
+"""ModelScores of an error ladder that tests share: small, with what could not be held out."""
 
 import numpy as np
 
 from vegglue.measurements.kinds import KINDS
-from vegglue.results.rung import HeldOut, InSample, PredictiveScores, Rung
+from vegglue.results.model_score import HeldOut, InSample, ModelScore, PredictiveScores
 
 
-def a_rung(name: str, validation: float = np.nan) -> Rung:
+def a_model_score(name: str, validation: float = np.nan) -> ModelScore:
     """Three parameters; held-out errors of 0.03 and 0.04 m/s at its two velocities."""
     rmse = dict.fromkeys(KINDS, np.nan) | {"velocity": 0.021, "level": 0.002}
     held_out = HeldOut(
@@ -14,4 +14,4 @@ def a_rung(name: str, validation: float = np.nan) -> Rung:
     )
     values = {name: (value - 0.1, value, value + 0.1) for name, value in (("n_b", 1.0), ("phi", 0.9), ("k_s", 1.1))}
     seen, scores = InSample(rmse, 8.0, 2, 0.01), PredictiveScores(1.0, 0.5, 0.95)
-    return Rung(name, "", (), values, seen, held_out, scores, {"phi": 0.4}, validation)
+    return ModelScore(name, "", (), values, seen, held_out, scores, {"phi": 0.4}, validation)

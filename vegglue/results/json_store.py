@@ -12,41 +12,41 @@ from typing import Any, TypeVar
 
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.plain_json import plain
-from vegglue.results.ladder import Ladder, ladder_from
+from vegglue.results.model_comparison import ModelComparison, comparison_from
+from vegglue.results.model_score import ModelScore, model_score_from
 from vegglue.results.open_questions import Question, questions_from
-from vegglue.results.rung import Rung, rung_from
 from vegglue.whole_files import MAKE_ROOM
 
-RUNG_FORMAT, LADDER_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 3", "vegglue questions 3"
-RUNG_FILE, COMPARISON_FILE, QUESTIONS_FILE = "rung.json", "comparison.json", "questions.json"
+SCORE_FORMAT, COMPARISON_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 3", "vegglue questions 3"
+SCORE_FILE, COMPARISON_FILE, QUESTIONS_FILE = "rung.json", "comparison.json", "questions.json"
 Kept = TypeVar("Kept")
 # A measurement that is left out: where it stands, and its value.
 MeasurementRow = Sequence[str | float]
 
 
-def write_rung(folder: Path, rung: Rung, left_out: Sequence[MeasurementRow], config_hash: str) -> None:
+def write_model_score(folder: Path, score: ModelScore, left_out: Sequence[MeasurementRow], config_hash: str) -> None:
     """Keep what a model misses, calibrated without some measurements. Errors: StorageError."""
-    told = {"left_out": [*map(list, left_out)], "rung": asdict(rung)}
-    _write(folder / RUNG_FILE, RUNG_FORMAT, config_hash, told)
+    told = {"left_out": [*map(list, left_out)], "rung": asdict(score)}
+    _write(folder / SCORE_FILE, SCORE_FORMAT, config_hash, told)
 
 
-def rung_that_fits(folder: Path, left_out: Sequence[MeasurementRow], config_hash: str) -> Rung | None:
+def model_score_that_fits(folder: Path, left_out: Sequence[MeasurementRow], config_hash: str) -> ModelScore | None:
     """What the model of exactly this config misses, without exactly these measurements; None where it is not kept."""
 
-    def understand(told: Any) -> Rung | None:
-        return rung_from(told["rung"]) if told["left_out"] == [*map(list, left_out)] else None
+    def understand(told: Any) -> ModelScore | None:
+        return model_score_from(told["rung"]) if told["left_out"] == [*map(list, left_out)] else None
 
-    return _read_if_it_fits(folder / RUNG_FILE, RUNG_FORMAT, config_hash, understand)
+    return _read_if_it_fits(folder / SCORE_FILE, SCORE_FORMAT, config_hash, understand)
 
 
-def write_ladder(folder: Path, ladder: Ladder, config_hash: str) -> None:
+def write_comparison(folder: Path, comparison: ModelComparison, config_hash: str) -> None:
     """Keep a comparison in the folder of one of its models, whose config hash is given. Errors: StorageError."""
-    _write(folder / COMPARISON_FILE, LADDER_FORMAT, config_hash, asdict(ladder))
+    _write(folder / COMPARISON_FILE, COMPARISON_FORMAT, config_hash, asdict(comparison))
 
 
-def ladder_that_fits(folder: Path, config_hash: str) -> Ladder | None:
+def comparison_that_fits(folder: Path, config_hash: str) -> ModelComparison | None:
     """The comparison kept there for exactly this config, None without."""
-    return _read_if_it_fits(folder / COMPARISON_FILE, LADDER_FORMAT, config_hash, ladder_from)
+    return _read_if_it_fits(folder / COMPARISON_FILE, COMPARISON_FORMAT, config_hash, comparison_from)
 
 
 def write_questions(folder: Path, questions: Sequence[Question], config_hash: str) -> None:

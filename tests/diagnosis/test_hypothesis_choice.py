@@ -1,23 +1,23 @@
-"""Which contender is taken, of made-up evidence."""
+"""Which hypothesis is taken, of made-up evidence."""
 
 import numpy as np
 import pytest
 
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import Contender
-from vegglue.diagnosis.contender_choice import (
+from vegglue.diagnosis.competition import Hypothesis
+from vegglue.diagnosis.hypothesis_choice import (
     MOST_FOLLOWED,
     What,
     chance_of_a_place,
-    chosen_contender,
+    chosen_hypothesis,
     nearly_as_likely,
 )
 
 
 def followed(**evidence: float) -> list[str]:
-    """Kinds of those followed, of contenders by their kinds, most evidence first."""
-    contenders = [Contender(kind, kind, log, 0, None) for kind, log in evidence.items()]
-    return [contenders[j].kind for j in nearly_as_likely(contenders)]
+    """Kinds of those followed, of hypotheses by their kinds, most evidence first."""
+    hypotheses = [Hypothesis(kind, kind, log, 0, None) for kind, log in evidence.items()]
+    return [hypotheses[j].kind for j in nearly_as_likely(hypotheses)]
 
 
 def test_what_is_nearly_as_likely_is_followed() -> None:
@@ -51,10 +51,10 @@ def test_what_is_vague_has_to_lead_what_is_known(
     """odds: of the likeliest against each; little evidence, so that it is not tempered."""
     likely = 1.0 / np.array(odds)
     at_a_place = likely[[one == "place" for one in what]].sum() / likely.sum()
-    assert chosen_contender(what, np.log(likely), at_a_place) == expected
+    assert chosen_hypothesis(what, np.log(likely), at_a_place) == expected
 
 
 def test_chances_of_places_count_together() -> None:
     kinds = ("drag", "effect", "bed", "probe")
-    contenders = [Contender(kind, kind, 0.0, 0, None) for kind in kinds]
-    assert chance_of_a_place(contenders, (0.5, 0.2, 0.2, 0.1)) == pytest.approx(0.7)
+    hypotheses = [Hypothesis(kind, kind, 0.0, 0, None) for kind in kinds]
+    assert chance_of_a_place(hypotheses, (0.5, 0.2, 0.2, 0.1)) == pytest.approx(0.7)

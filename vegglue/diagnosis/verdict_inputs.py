@@ -5,28 +5,28 @@ from dataclasses import dataclass
 from dataclasses import field as by_default
 
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.findings import Findings
+from vegglue.diagnosis.search_state import SearchState
 from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.normal_range import NORMAL95
-from vegglue.results.causes import FaultyInstrument, LawsSuspected
+from vegglue.results.causes import CandidateLaws, FaultyInstrument
 from vegglue.results.diagnosis import EstimatedErrors, FieldFound, Misfit, ModelErrorUsed, VerdictKind
 
 
 @dataclass(frozen=True)
-class Grounds:
+class VerdictInputs:
     """What a verdict rests on. unseen: errors at what was not seen over those expected [-], NaN if unknown; by_chance:
     what of that errors alone exceed in 5 % of cases; neighbours: whether readings side by side were set aside;
     strained: the parameter furthest off its prior, and how far; between: errors between the sections that were
     measured, over those of the data [-], at most; laws: those that stand out; on_map: where places lie on the map;
     stretch: what is told of the part of the channel that was measured, '' for nothing; places_searched: whether there
     was water deep enough to look for something at a place; carried: sections that clearly carry another discharge than
-    stated; standing_out: effects that stand out in the last model, with the family-wise p of each [-]; remainder:
-    whether all of these may be what is left of what was accepted.
+    stated; significant_effects: effects that stand out in the last model, with the family-wise p of each [-];
+    remainder: whether all of these may be what is left of what was accepted.
     """
 
     errors: EstimatedErrors
     misfit: Misfit
-    findings: Findings
+    state: SearchState
     field: FieldFound | None
     model_error: ModelErrorUsed | None
     not_excluded: tuple[tuple[str, ...], ...]
@@ -35,12 +35,12 @@ class Grounds:
     strained: tuple[str, float]
     between: float = 1.0
     by_chance: float = 1.0
-    laws: LawsSuspected | None = None
+    laws: CandidateLaws | None = None
     stretch: str = ""
     on_map: str = ""
     places_searched: bool = True
     carried: tuple[CarriedDischarge, ...] = ()
-    standing_out: Mapping[str, float] = by_default(default_factory=dict)
+    significant_effects: Mapping[str, float] = by_default(default_factory=dict)
     remainder: bool = False
 
 

@@ -54,7 +54,7 @@ class PredictiveScores:
 
 
 @dataclass(frozen=True)
-class Rung:
+class ModelScore:
     """One model of the ladder. values: parameters with their 95 % intervals; homogeneity: chance that a parameter is
     the same in all experiments, by name; validation: root mean square error of velocities that no calibration has seen
     [m/s], NaN without them.
@@ -71,13 +71,13 @@ class Rung:
     validation: float
 
 
-def rung_from(tree: Mapping[str, Any]) -> Rung:
-    """The rung of an object of JSON, which has null for no number.
+def model_score_from(tree: Mapping[str, Any]) -> ModelScore:
+    """The score of a model from an object of JSON, which has null for no number.
 
     Errors: KeyError, TypeError or ValueError where it is none.
     """
     seen, held_out = tree["in_sample"], tree["held_out"]
-    return Rung(
+    return ModelScore(
         name=str(tree["name"]),
         title=str(tree["title"]),
         effects=tuple(tree["effects"]),
