@@ -15,8 +15,7 @@ from vegglue.diagnosis.comparison import held_out_rmse
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.workflow.diagnose import diagnose
-from vegglue.workflow.extend import extend_stepwise
-from vegglue.workflow.stepwise_extension import StepwiseExtension
+from vegglue.workflow.extend import StepwiseExtension, extend_stepwise
 
 OPEN_CASES = Path(__file__).parents[1] / "data" / "open_cases"
 # Largest error of velocities that no calibration has seen, once the effect is added [m/s].

@@ -15,8 +15,8 @@ from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING
 from vegglue.inference.glue import glue
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
-from vegglue.report.page import write_report
-from vegglue.report.run import Run
+from vegglue.pages.page import write_report
+from vegglue.pages.run import Run
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 

@@ -14,12 +14,12 @@ AT_HOME_EVERYWHERE = {"numpy", "scipy"}
 # Folders or files where each library may be imported. A new home is a decision: say it here.
 HOMES = {
     "h5py": {"results"},
-    "jinja2": {"report", "wording"},
+    "jinja2": {"pages", "wording"},
     "joblib": {"parallel"},
-    "matplotlib": {"report"},
+    "matplotlib": {"pages"},
     "numba": {"compilation"},
     "pandas": {
-        "calibration", "diagnosis", "engine", "flow", "inference", "measurements", "report", "results", "workflow",
+        "calibration", "diagnosis", "engine", "flow", "inference", "measurements", "pages", "results", "workflow",
     },
     "pydantic": {"case", "importers", "results"},
     "rich": {"cli"},

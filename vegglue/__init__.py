@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from vegglue.workflow.load import load
     from vegglue.workflow.new import new
     from vegglue.workflow.next_measurement import next_measurement
-    from vegglue.workflow.overview import overview
-    from vegglue.workflow.report import report
+    from vegglue.workflow.report import overview, report
     from vegglue.workflow.run import run
     from vegglue.workflow.simulate import simulate
     from vegglue.workflow.twin import make_twin, reveal
@@ -49,6 +48,7 @@ _ELSEWHERE = {
     "on_cluster": "cluster",
     "extend_stepwise": "workflow.extend",
     "make_twin": "workflow.twin",
+    "overview": "workflow.report",
     "reveal": "workflow.twin",
 }
 

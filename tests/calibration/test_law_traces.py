@@ -14,7 +14,7 @@ from vegglue.case.schema import ModelError
 from vegglue.effects.grammar import LAWS
 from vegglue.engine.interface import Model, Point, by_itself, linearise, responses
 from vegglue.engine.model import coarser
-from vegglue.workflow.run_folder import model_in
+from vegglue.workflow.case_run import CaseRun
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 NAMES = (
@@ -26,7 +26,7 @@ NAMES = (
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    coarse = coarser(model_in(load_case(CONFIG)))
+    coarse = coarser(CaseRun(load_case(CONFIG)).model)
     assert coarse is not None
     return coarse
 

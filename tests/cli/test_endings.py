@@ -205,7 +205,7 @@ def test_an_effect_that_ends_the_program_is_told(tmp_path: Path, say: Say) -> No
 def test_a_best_fit_that_is_none_counts_as_not_there(tmp_path: Path, say: Say, value: str) -> None:
     from vegglue.case.config import load_case
     from vegglue.case.resolved_config import case_hash
-    from vegglue.workflow.run_folder import kept_best_fit
+    from vegglue.workflow.case_run import kept_best_fit
 
     case = load_case(tmp_path / "brook.yaml")
     theta = ", ".join(f'"{name}": {value}' for name in case.parameters)

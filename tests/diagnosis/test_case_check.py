@@ -14,7 +14,7 @@ from vegglue.case.polygons import distance_to_outline
 from vegglue.diagnosis.boundaries import remarks_on_discharges
 from vegglue.diagnosis.case_check import check_case, doubts_about
 from vegglue.measurements.observations import read_observations
-from vegglue.report.channel import save_channel_figure
+from vegglue.pages.channel import save_channel_figure
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

@@ -19,6 +19,7 @@ from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.workflow import discover as verb
+from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.check import check_effects, doubts_of
 from vegglue.workflow.discover import DiscoveredCase, discover
 
@@ -142,7 +143,7 @@ def test_a_law_beyond_its_range_is_doubted(
     """In the experiments whose measured cells lie outside, by the numbers that its file holds."""
     child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=seen)).child
     assert child is not None
-    said = doubts_of(child)
+    said = doubts_of(CaseRun(child))
     assert [name for name in child.experiments if any(f"`{name}`" in one for one in said)] == doubted
     for one in said:
         assert one.startswith(
@@ -155,7 +156,7 @@ def test_a_law_is_doubted_where_nothing_is_measured_too(monkeypatch: pytest.Monk
     child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=(0.5, 0.9))).child
     assert child is not None
     dry = Experiment(discharge={"upstream": 0.3}, level=0.4)
-    said = doubts_of(child.model_copy(update={"experiments": {**child.experiments, "dry summer": dry}}))
+    said = doubts_of(CaseRun(child.model_copy(update={"experiments": {**child.experiments, "dry summer": dry}})))
     assert any("`dry summer`" in one and "on under water lie outside" in one for one in said)
 
 
@@ -164,7 +165,7 @@ def test_a_law_is_not_doubted_where_it_does_not_act(monkeypatch: pytest.MonkeyPa
     child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=(0.5, 0.9))).child
     assert child is not None
     in_mid = {name: entry.model_copy(update={"experiments": ("mid",)}) for name, entry in child.effects.items()}
-    (said,) = doubts_of(child.model_copy(update={"effects": in_mid}))
+    (said,) = doubts_of(CaseRun(child.model_copy(update={"effects": in_mid})))
     assert "in experiment `mid`" in said
 
 
@@ -208,7 +209,7 @@ def test_what_a_diagnosis_set_aside_has_no_say(monkeypatch: pytest.MonkeyPatch, 
     """As in every other verb that compares models."""
     case, make_verdict = load_case(CONFIG), list[pd.DataFrame]()
     first = read_observations(case).table.iloc[[0]]
-    monkeypatch.setattr(verb, "set_aside_of", lambda *_: first[MEASUREMENT])
+    monkeypatch.setattr(verb, "excluded_in", lambda *_: first[MEASUREMENT])
 
     def discover_laws(model: Model, *_: object) -> Discovery:
         make_verdict.append(model.station)

@@ -19,9 +19,8 @@ from vegglue.diagnosis.excluded_stations import excluded_by, excluding, exclusio
 from vegglue.engine.interface import Model, Point
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import write_diagnosis
-from vegglue.workflow import run_folder
+from vegglue.workflow.case_run import CaseRun, excluded_in_all
 from vegglue.workflow.extend import write_child
-from vegglue.workflow.set_aside import left_out
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +29,7 @@ CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return run_folder.model_in(load_case(CONFIG))
+    return CaseRun(load_case(CONFIG)).model
 
 
 def flagging(model: Model, *rows: int) -> Diagnosis:
@@ -75,7 +74,7 @@ def test_compare_leaves_out_what_a_diagnosis_has_flagged(
     case = load_case(CONFIG)
     added = [(candidate_named(case, model.station, "discharge_error[high]"), {})]
     child, runs = write_child(case, tmp_path / "child.yaml", added), tmp_path / "runs"
-    monkeypatch.setattr("vegglue.workflow.run_folder.kept_baseline", quickly)
+    monkeypatch.setattr("vegglue.workflow.case_run.kept_baseline", quickly)
     stations = int(model.station["used"].sum())
     for flagged, said in (((), 0), ((3, 20), 2)):
         found = flagging(model, *flagged)
@@ -94,4 +93,4 @@ def test_a_diagnosis_of_another_state_of_the_case_leaves_nothing_out(model: Mode
     (tmp_path / case.name).mkdir()
     found = flagging(model, 3)
     write_diagnosis(tmp_path / case.name / "diagnosis.h5", found, "", "e" * 64)
-    assert left_out([case], tmp_path).empty
+    assert excluded_in_all([CaseRun(case, tmp_path)]).empty

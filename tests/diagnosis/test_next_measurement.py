@@ -12,12 +12,12 @@ from vegglue.case.config import load_case
 from vegglue.case.gridded_site import in_experiment
 from vegglue.diagnosis.next_measurement import HIGHER, HOURS, LEVEL_POWER, _with_other_discharges, planned
 from vegglue.engine.interface import Model
-from vegglue.workflow.run_folder import model_in
+from vegglue.workflow.case_run import CaseRun
 
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return model_in(load_case(Path(__file__).parents[2] / "configs" / "twin.yaml"))
+    return CaseRun(load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")).model
 
 
 def test_a_section_again_costs_its_own_verticals(model: Model) -> None:

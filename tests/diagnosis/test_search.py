@@ -22,8 +22,8 @@ from vegglue.effects.library import library
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.progress import silent
+from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import TwinBase
-from vegglue.workflow.run_folder import model_in
 from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
@@ -31,7 +31,7 @@ CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return model_in(load_case(CONFIG))
+    return CaseRun(load_case(CONFIG)).model
 
 
 def test_laws_are_measured_by_what_the_data_have_seen(model: Model) -> None:
@@ -87,7 +87,7 @@ def test_laws_are_looked_for_with_no_listed_effect_beside_them(model: Model) -> 
 @cache
 def ground_of(seed: int) -> TwinBase:
     """The truth before something is hidden in it: most tests share it."""
-    model = model_in(load_case(CONFIG))
+    model = CaseRun(load_case(CONFIG)).model
     return twin_base(model, true_place(len(model.names), seed))
 
 

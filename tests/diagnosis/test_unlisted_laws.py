@@ -19,7 +19,7 @@ from vegglue.diagnosis.unlisted_laws import candidate_laws, clearly_a_law, laws_
 from vegglue.effects.grammar import LAWS
 from vegglue.results.causes import CandidateLaws
 from vegglue.results.diagnosis import Step
-from vegglue.workflow.run_folder import model_in
+from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
@@ -98,7 +98,7 @@ def test_a_place_is_compared_with_laws_by_what_it_explained(monkeypatch: pytest.
 @pytest.mark.slow
 def test_a_law_that_is_in_no_list_is_not_nothing() -> None:
     """The example of docs/discover.md. `diagnose` alone once said that nothing was missing."""
-    model = model_in(load_case(CONFIG))
+    model = CaseRun(load_case(CONFIG)).model
     ground = twin_base(model, true_place(len(model.names), 2))
     station, _ = measured_twin(ground, ["law_viscosity_offset_step=-1.12"], 8.0, "white", 2)
     found = diagnose_model(replace(model, station=station))

@@ -9,6 +9,7 @@ from field_folders import CHANNEL, JUNE, folder_of
 import vegglue
 from vegglue.calibration import baseline
 from vegglue.errors import InputError
+from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.check import doubts_of
 
 
@@ -19,7 +20,7 @@ def test_a_survey_on_land_is_doubted(tmp_path: Path, dry: int, doubtful: bool) -
     table = "\n".join(["x,y,u,u_se", *(f"{x},{y},0.4,0.02" for x, y in places)])
     case = vegglue.import_folder(folder_of(tmp_path / "brook", CHANNEL + JUNE, a__csv=table), tmp_path / "brook.yaml")
     said = "above the water: most of its velocities; check their y, the bed and the outlet level."
-    assert any(said in one for one in doubts_of(case)) == doubtful
+    assert any(said in one for one in doubts_of(CaseRun(case))) == doubtful
     remarks = vegglue.check(case, runs=tmp_path / "runs").remarks
     assert sum("outside the wet channel" in one for one in remarks) == 1
     assert any(said in one for one in remarks) == doubtful

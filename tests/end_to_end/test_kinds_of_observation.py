@@ -27,11 +27,11 @@ from vegglue.inference.refine import refine
 from vegglue.inference.solve_ensemble import solve_ensemble, solve_flow
 from vegglue.measurements.kinds import KINDS
 from vegglue.measurements.observations import Observations, read_observations
-from vegglue.report.channel import save_channel_figure
-from vegglue.report.diagnosis_figures import save_diagnosis_figure, save_fingerprint_figure
-from vegglue.report.ladder_figure import save_ladder_figure
-from vegglue.report.page import write_report
-from vegglue.report.run import Run
+from vegglue.pages.channel import save_channel_figure
+from vegglue.pages.diagnosis_figures import save_diagnosis_figure, save_fingerprint_figure
+from vegglue.pages.ladder_figure import save_ladder_figure
+from vegglue.pages.page import write_report
+from vegglue.pages.run import Run
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
@@ -106,7 +106,7 @@ def whole_line(folder: Path, names: tuple[str, ...]) -> Line:
     solve_ensemble(case, observations, folder / "ensemble.h5", 1, lambda progress: None)
     ensemble = read_ensemble(folder / "ensemble.h5")
     found = diagnose_model(model_of(case, observations))
-    return Line(folder, case, observations, ensemble, refine(ensemble, case, observations), found)
+    return Line(folder, case, observations, ensemble, refine(ensemble, model_of(case, observations)), found)
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from vegglue.engine.marching import marching
 from vegglue.engine.model import coarser
 from vegglue.flow.prolongation import on_grid
 from vegglue.flow.wet_band import widen
-from vegglue.workflow.run_folder import model_in
+from vegglue.workflow.case_run import CaseRun
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 
@@ -40,7 +40,7 @@ def with_effects(model: Model, *names: str) -> Model:
 @pytest.fixture(scope="module")
 def models() -> tuple[Model, Model]:
     """Of cells of twice the size and of four times."""
-    fine = coarser(model_in(load_case(CONFIG)))
+    fine = coarser(CaseRun(load_case(CONFIG)).model)
     assert fine is not None
     coarse = coarser(fine)
     assert coarse is not None

@@ -14,7 +14,7 @@ from vegglue.errors import InputError
 from vegglue.importers.confluence import case_from_confluence, discharge, flat_bed, holds_confluence
 from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.workflow.run_folder import model_in, validation_of
+from vegglue.workflow.case_run import CaseRun
 
 PUBLISHED = Path(__file__).parents[3] / "shared" / "real" / "confluence"
 SECTIONS = (-1.0, -0.4, 0.1, 0.8, 1.4)
@@ -65,7 +65,7 @@ def test_only_its_own_layout_is_recognised(tmp_path: Path) -> None:
 def test_every_second_section_is_held_out(imported: Path) -> None:
     case = load_case(imported)
     seen = read_observations(case).table
-    unseen = validation_of(case)
+    unseen = CaseRun(case).validation_model
     assert unseen is not None
     velocity = seen[seen["kind"] == "velocity"]
     assert sorted(velocity["x"].unique()) == [-1.0, 0.1, 1.4]
@@ -83,7 +83,7 @@ def test_velocities_across_are_seen_and_held_out_beside_those_along(imported: Pa
     assert across["standard_error"].to_numpy() == pytest.approx(
         np.sqrt(0.01**2 + 0.0002**2 + (0.05 * np.where(across["x"] <= 0.0, SLOW, FAST)) ** 2), abs=1e-5
     )
-    unseen = validation_of(case)
+    unseen = CaseRun(case).validation_model
     assert unseen is not None
     assert unseen.station["kind"].value_counts().to_dict() == {"velocity": 10, "velocity_across": 8}
 
@@ -111,7 +111,7 @@ def test_the_side_walls_have_friction_of_their_own(imported: Path) -> None:
     case = load_case(imported)
     assert case.friction.walls is not None
     assert case.friction.walls.coefficient == "n_w"
-    model = model_in(case)
+    model = CaseRun(case).model
     point = linearise(model, np.zeros(len(model.names)))
     assert point is not None
     assert np.abs(point.slope[:, model.names.index("n_w")]).max() > 1e-3
@@ -161,7 +161,7 @@ def test_the_angle_is_that_of_the_mouth(imported: Path) -> None:
 @pytest.mark.slow
 def test_water_flows_in_the_middle_of_the_priors(imported: Path) -> None:
     for bed in ("junction", "junction-flat"):
-        model = model_in(load_case(imported.with_stem(bed)))
+        model = CaseRun(load_case(imported.with_stem(bed))).model
         point = linearise(model, np.zeros(len(model.names)))
         assert point is not None
         assert point.prediction[(model.station["kind"] == "velocity").to_numpy()] == pytest.approx(0.45, abs=0.45)
@@ -191,7 +191,7 @@ def test_on_the_published_set_the_surveyed_bed_halves_the_error(tmp_path: Path) 
     target = tmp_path / "confluence.yaml"
     import_command(PUBLISHED, target)
     surveyed, plane = (
-        diagnose_model(model_in(load_case(target.with_stem(bed)))) for bed in ("confluence", "confluence-flat")
+        diagnose_model(CaseRun(load_case(target.with_stem(bed))).model) for bed in ("confluence", "confluence-flat")
     )
     assert not surveyed.steps
     assert surveyed.verdict.kind in ("none-of-these", "cannot-tell"), surveyed.verdict.sentence

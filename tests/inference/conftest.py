@@ -21,7 +21,7 @@ def reach(tmp_path_factory: pytest.TempPathFactory) -> SolvedReach:
 def refined(reach: SolvedReach) -> Posterior:
     case, observations, ensemble = reach
     with at_most(1):
-        return refine(ensemble, case, observations)
+        return refine(ensemble, model_of(case, observations))
 
 
 @pytest.fixture(scope="session")

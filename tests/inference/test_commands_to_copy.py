@@ -7,7 +7,7 @@ import pytest
 from refined_reach import SolvedReach
 
 from vegglue.cli.brief_posterior import show_posterior
-from vegglue.report.next_words import next_steps
+from vegglue.pages.next_words import next_steps
 from vegglue.results.posterior import Posterior
 
 

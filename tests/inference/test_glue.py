@@ -19,7 +19,7 @@ from vegglue.flow.status import FAILED
 from vegglue.inference.glue import glue
 from vegglue.inference.posterior_summary import correct_phi_for_canopy, marginals, prior_mass_near_bounds
 from vegglue.measurements.observations import Observations
-from vegglue.report.posterior_words import posterior_in_words
+from vegglue.pages.posterior_words import posterior_in_words
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import LEVELS, Posterior
 

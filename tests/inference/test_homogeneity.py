@@ -24,7 +24,7 @@ from vegglue.inference.homogeneity import (
     without_prior,
 )
 from vegglue.measurements.observations import read_observations
-from vegglue.report.homogeneity_words import homogeneity_in_words
+from vegglue.pages.homogeneity_words import homogeneity_in_words
 from vegglue.results.posterior import Posterior, Transfer
 
 

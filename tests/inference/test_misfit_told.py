@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from vegglue.report.key_numbers import against_measurement_error
-from vegglue.report.posterior_words import measurement_error
+from vegglue.pages.key_numbers import against_measurement_error
+from vegglue.pages.posterior_words import measurement_error
 from vegglue.results.posterior import Posterior
 
 

@@ -64,7 +64,8 @@ def both_ways(tmp_path_factory: pytest.TempPathFactory) -> tuple[Posterior, Post
     case, observations = measured(folder)
     solve_ensemble(case, observations, folder / "ensemble.h5", 1, lambda _: None)
     with at_most(1):
-        return refine(read_ensemble(folder / "ensemble.h5"), case, observations), refine(None, case, observations)
+        model = model_of(case, observations)
+        return refine(read_ensemble(folder / "ensemble.h5"), model), refine(None, model)
 
 
 @pytest.mark.slow

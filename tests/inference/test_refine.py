@@ -20,9 +20,9 @@ from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.flow.status import FAILED
 from vegglue.inference.refine import log_posterior, refinable, refine, solved_for
+from vegglue.pages.posterior_words import posterior_in_words
+from vegglue.pages.validation_words import validation_in_words
 from vegglue.parallel import at_most
-from vegglue.report.posterior_words import posterior_in_words
-from vegglue.report.validation_words import validation_in_words
 from vegglue.results.posterior import Posterior
 from vegglue.results.refinement import GroupsLeftOut
 from vegglue.results.result_files import read_posterior, write_posterior
@@ -80,7 +80,7 @@ def test_the_log_density_is_that_of_errors_and_prior(reach: SolvedReach, refined
 def test_numbers_do_not_depend_on_the_jobs(reach: SolvedReach, refined: Posterior) -> None:
     case, observations, ensemble = reach
     with at_most(2):
-        again = refine(ensemble, case, observations)
+        again = refine(ensemble, model_of(case, observations))
     assert np.array_equal(again.sample.weights, refined.sample.weights)
     assert np.array_equal(again.sample.prediction, refined.sample.prediction)
     assert np.array_equal(again.predicted.predictive, refined.predicted.predictive)
@@ -155,7 +155,7 @@ def test_a_group_of_smaller_errors_is_not_told_better_for_them(refined: Posterio
 @pytest.mark.slow
 def test_errors_taken_from_the_residual_are_said_to_be(tmp_path: Path) -> None:
     case, observations, ensemble = solved_reach(tmp_path, (FEW_MEMBERS[0], "simulate: {members: 64, seed: 7}"))
-    posterior = refine(ensemble, case, observations)
+    posterior = refine(ensemble, model_of(case, observations))
     assert posterior.refinement is not None
     assert posterior.refinement.error_model.errors == "estimated"
     left = posterior.fit.best_residual
@@ -197,7 +197,7 @@ def test_missing_standard_errors_are_told(reach: SolvedReach) -> None:
         InputError,
         match="no standard error is stated for 15 of velocity, the first at x = 8, y = -2 m: add",
     ):
-        refine(ensemble, case, unknown)
+        refine(ensemble, model_of(case, unknown))
 
 
 def test_far_places_are_solved_on_their_own(reach: SolvedReach) -> None:
@@ -217,7 +217,7 @@ def test_an_ensemble_without_a_solved_member_is_told(reach: SolvedReach, rule: s
     )
     case = case.model_copy(update={"infer": case.infer.model_copy(update={"sigma": rule})})
     with pytest.raises(InputError, match=f"none of the {len(none.status)} members was solved"):
-        refine(none, case, observations)
+        refine(none, model_of(case, observations))
 
 
 @pytest.mark.slow

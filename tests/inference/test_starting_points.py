@@ -25,9 +25,9 @@ from vegglue.inference.posterior_modes import (
 )
 from vegglue.inference.refine import log_posterior, refine
 from vegglue.measurements.observations import read_observations
+from vegglue.pages.posterior_words import posterior_in_words
 from vegglue.parallel import at_most
 from vegglue.progress import silent
-from vegglue.report.posterior_words import posterior_in_words
 from vegglue.results.posterior import Posterior
 
 
@@ -45,7 +45,7 @@ def test_starts_are_the_best_that_lie_apart(reach: SolvedReach) -> None:
 def test_points_of_the_prior_lead_to_the_same_posterior(reach: SolvedReach, refined: Posterior) -> None:
     case, observations, _ = reach
     with at_most(1):
-        found = refine(None, case, observations)
+        found = refine(None, model_of(case, observations))
     assert found.settings.ensemble_hash == ""
     assert found.weighting.effective_size >= 1000
     assert found.refinement is not None

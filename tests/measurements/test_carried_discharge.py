@@ -26,7 +26,7 @@ from vegglue.measurements.section_discharge import (
     discharge_mismatches,
     mismatched_discharges,
 )
-from vegglue.report.answer_words import why_not_to_rely
+from vegglue.pages.answer_words import why_not_to_rely
 from vegglue.results.diagnosis import BEFORE_ALL_ELSE
 
 # Water that enters over a stretch of a bank, and a discharge that is not the reported one: more passes the sections.
@@ -207,7 +207,7 @@ def test_the_page_says_that_the_verdict_is_not_to_be_relied_on(tmp_path: Path, m
     doubting = a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}{DOUBT}: check it."})
     explained, toy = (replace(a_toy(tmp_path), diagnosis=one) for one in (a_diagnosis(), doubting))
     before = why_not_to_rely(toy)
-    monkeypatch.setattr("vegglue.report.answer_words.mismatched_discharges", lambda *_: [HIGHER])
+    monkeypatch.setattr("vegglue.pages.answer_words.mismatched_discharges", lambda *_: [HIGHER])
     assert DOUBT in why_not_to_rely(toy)
     assert DOUBT not in before
     assert DOUBT not in why_not_to_rely(explained)  # what was found may be why

@@ -9,9 +9,9 @@ from posteriors import a_posterior, a_refinement
 from verdicts import FITS, inputs, said
 
 from vegglue.cli.brief_posterior import brief_posterior
-from vegglue.report.key_numbers import against_measurement_error
-from vegglue.report.posterior_words import fit_in_words
-from vegglue.report.validation_words import chi2_in_words
+from vegglue.pages.key_numbers import against_measurement_error
+from vegglue.pages.posterior_words import fit_in_words
+from vegglue.pages.validation_words import chi2_in_words
 from vegglue.results.diagnosis import Misfit
 from vegglue.results.small_misfit import is_too_small, small_misfit_in_words
 

@@ -8,7 +8,7 @@ from blind_lines import Told, interval
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from vegglue.report.style import COLOUR, SMALL, WIDTH, styled
+from vegglue.pages.style import COLOUR, SMALL, WIDTH, styled
 
 # By truth: its label and its colour.
 TRUTHS = {"second": ("second solver", COLOUR["measured"]), "own": ("own equations", COLOUR["model"])}

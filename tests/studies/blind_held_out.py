@@ -30,7 +30,7 @@ from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.workflow.run_folder import calibrated_anew
+from vegglue.workflow.case_run import calibrated_anew
 
 Errors = dict[str, Any]
 

@@ -25,7 +25,7 @@ from blind_lines import (
     targets_met,
 )
 
-from vegglue.report.style import save
+from vegglue.pages.style import save
 
 WIDTH = 120  # of the lines of a page
 

@@ -23,6 +23,7 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.importers.config_parts import MODEL_ERROR, VISCOSITY, VISCOSITY_FACTOR, viscosity_prior
+from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import (
     BAD_PROBE_EXCESS,
     LARGEST_SIZE,
@@ -33,7 +34,6 @@ from vegglue.workflow.hidden_effect import (
     chosen_effect,
     visible_length,
 )
-from vegglue.workflow.run_folder import model_in
 from vegglue.workflow.sealed_answer import UNLISTED, Hidden
 from vegglue.workflow.twin_measurements import errors_named, finer, true_place
 
@@ -96,7 +96,7 @@ def model_of(study: str) -> Model:
     """The model with the error of its own and the prior of viscosity that an imported case has, and errors of its
     site.
     """
-    model = model_in(load_case(CONFIGS / f"{study}.yaml"))
+    model = CaseRun(load_case(CONFIGS / f"{study}.yaml")).model
     free = Parameter(**viscosity_prior(EDDY_VISCOSITY, VISCOSITY_FACTOR))
     case: Case = model.case.model_copy(
         update={

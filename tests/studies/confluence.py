@@ -17,9 +17,9 @@ from vegglue.diagnosis.comparison import held_out_rmse, model_score
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.engine.interface import Model, linearise
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
+from vegglue.workflow.case_run import CaseRun, calibrated
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.extend import extend_stepwise
-from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "confluence.md"
@@ -48,8 +48,8 @@ def error(model: Model, prediction: np.ndarray, kind: str) -> float:
 
 
 def row_of(title: str, case: Case, runs: Path) -> Row:
-    base = calibrated(case, folder_of(runs, case), excluded_by())
-    unseen = validation_of(case)
+    run = CaseRun(case, runs)
+    base, unseen = calibrated(run, excluded_by()), run.validation_model
     assert unseen is not None
     there = linearise(unseen, base.fitted.point.z)
     found = model_score(base)

@@ -29,7 +29,7 @@ from vegglue.wording.numbers import (
     so_many,
 )
 from vegglue.workflow.compare import Comparison
-from vegglue.workflow.stepwise_extension import StepwiseExtension
+from vegglue.workflow.extend import StepwiseExtension
 
 MOST_LINES, MOST_LETTERS = 12, 600
 

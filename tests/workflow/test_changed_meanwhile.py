@@ -18,7 +18,7 @@ from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.errors import InputError
 from vegglue.inference import solve_ensemble
 from vegglue.results.result_files import stored_hash
-from vegglue.workflow import compare, extend, infer, next_measurement, run_folder, stepwise_extension
+from vegglue.workflow import case_run, compare, extend, infer, next_measurement
 
 FEW = ("simulate: {members: 1024,", "infer: {method: glue}\nsimulate: {members: 16,")
 Meanwhile = Callable[[ModuleType, str], None]
@@ -66,10 +66,10 @@ def test_a_posterior_is_of_the_data_that_were_read(case: Case, meanwhile: Meanwh
 
 def test_a_best_fit_is_of_the_data_that_were_read(case: Case, meanwhile: Meanwhile) -> None:
     before = case_hash(case)
-    meanwhile(run_folder, "calibrated_anew")
-    folder = run_folder.folder_of("runs", case)
-    run_folder.calibrated(case, folder, excluded_by())
-    assert json.loads((folder / "best.json").read_text())["config_hash"] == before != case_hash(case)
+    meanwhile(case_run, "calibrated_anew")
+    run = case_run.CaseRun(case)
+    case_run.calibrated(run, excluded_by())
+    assert json.loads((run.folder / "best.json").read_text())["config_hash"] == before != case_hash(case)
 
 
 def test_questions_are_of_the_data_that_were_read(case: Case, meanwhile: Meanwhile) -> None:
@@ -96,7 +96,7 @@ def test_no_ladder_is_kept_of_children_of_other_data(
     case: Case, meanwhile: Meanwhile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(extend, "diagnose", lambda *given, **more: a_diagnosis())
-    one = stepwise_extension.StepwiseExtension((case,), compare.Comparison((), excluded_by()), "", "")
-    meanwhile(extend, "_extended", lambda *given: one)
+    one = extend.StepwiseExtension((case,), compare.Comparison((), excluded_by()), "", "")
+    meanwhile(extend, "extended", lambda *given: one)
     with pytest.raises(InputError, match=r"brook\.yaml: a file that it names changed while it was extended; run"):
         vegglue.extend_stepwise(case, jobs=1)

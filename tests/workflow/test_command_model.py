@@ -22,8 +22,8 @@ from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.progress import silent
+from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.command_model import _beside_what_was_reckoned, _kept_place, command_tried, with_command
-from vegglue.workflow.run_folder import validation_of
 
 SMALL = ("members: 1024", "members: 8")
 WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
@@ -189,11 +189,11 @@ def test_measurements_for_validation_are_predicted_by_the_command(tmp_path: Path
     flow, file = "{May: {discharge: 1.5, level: 0.9}}", "{kind: velocity, file: unseen.csv, experiment: May}"
     unseen = f"validation: {{experiments: {flow}, observations: [{file}]}}\nsimulate:"
     case = commanded(tmp_path, SMOOTH, "", COARSE, SMALL, WITH_ERROR, ("simulate:", unseen))
-    folder = tmp_path / "runs"
+    run = CaseRun(case, tmp_path / "runs")
     place = {"config_hash": case_hash(case), "z": HERE.tolist(), "settled": True, "places": 1}
-    (folder / "engine").mkdir(parents=True)
-    (folder / "engine" / "place.json").write_text(json.dumps(place), encoding="utf-8")
-    model = validation_of(case, folder)
+    (run.folder / "engine").mkdir(parents=True)
+    (run.folder / "engine" / "place.json").write_text(json.dumps(place), encoding="utf-8")
+    model = run.validation_model
     assert model is not None
     point = linearise(model, HERE)
     assert point is not None

@@ -17,9 +17,8 @@ from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.results.json_store import comparison_that_fits, write_comparison
 from vegglue.results.model_comparison import ComparedModel, ModelComparison
-from vegglue.workflow import compare, set_aside
-from vegglue.workflow.run_folder import folder_of
-from vegglue.workflow.set_aside import judged_by
+from vegglue.workflow import case_run, compare
+from vegglue.workflow.case_run import CaseRun, excluded_in_all, folder_of, judged_by
 
 
 @pytest.fixture
@@ -107,13 +106,13 @@ def test_a_model_is_judged_by_its_diagnosis_of_now_beside_a_ladder_of_before(
 ) -> None:
     """The ladder of the second began with the first as it was: what that set aside since then counted again."""
     asked = list[tuple[str, str]]()
-    monkeypatch.setattr(set_aside, "diagnosis_that_fits", lambda path, wanted: asked.append((path.parent.name, wanted)))
+    monkeypatch.setattr(case_run, "diagnosis_that_fits", lambda path, wanted: asked.append((path.parent.name, wanted)))
     second = case.model_copy(update={"name": "second"})
     before = ComparedModel("brook", "brook.yaml", "as it was", (), 3, *[0.1] * 5)
     write_comparison(folder_of(tmp_path, second), ModelComparison((before,), 0, ""), case_hash(second))
     for cases in ([case, second], [second, case]):
         asked.clear()
-        assert set_aside.left_out(cases, tmp_path).empty
+        assert excluded_in_all([CaseRun(one, tmp_path) for one in cases]).empty
         assert set(asked) == {(one.name, case_hash(one)) for one in cases} | {("brook", "as it was")}
 
 
@@ -128,8 +127,8 @@ def test_what_a_model_misses_is_computed_once(case: Case, tmp_path: Path, monkey
     assert again.title == "Brook in June"
     np.testing.assert_equal(asdict(replace(again, title=first.title)), asdict(first))
     aside = read_observations(case).table[MEASUREMENT].iloc[[0]]
-    assert compare.kept_model_score(case, runs, excluded_by()) is not None
-    assert compare.kept_model_score(case, runs, aside) is None
+    assert compare.kept_model_score(CaseRun(case, runs), excluded_by()) is not None
+    assert compare.kept_model_score(CaseRun(case, runs), aside) is None
 
 
 def test_a_ladder_that_says_why_it_ends_is_kept() -> None:

@@ -19,7 +19,7 @@ def test_a_diagnosis_is_written_after_all_that_belongs_to_it(tmp_path: Path, mon
     monkeypatch.setattr(verb, "keep_best_fit", lambda *given: order.append("best fit"))
     monkeypatch.setattr(verb, "write_diagnosis", lambda *given: order.append("diagnosis"))
     monkeypatch.setattr(
-        "vegglue.report.diagnosis_figures.save_diagnosis_figure", lambda *given: order.append("picture")
+        "vegglue.pages.diagnosis_figures.save_diagnosis_figure", lambda *given: order.append("picture")
     )
     vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1)
     assert order == ["picture", "best fit", "diagnosis"]
@@ -29,11 +29,11 @@ def test_a_fingerprint_is_drawn_without_what_was_set_aside(tmp_path: Path, monke
     """A probe that its diagnosis had found to be off still bent the place at which it was drawn."""
     case, aside, seen = vegglue.load_case(write_reach(tmp_path, COARSE)), pd.DataFrame({"x": [1.0]}), list[object]()
 
-    def calibrated(case: object, folder: object, aside: object, watch: object) -> None:
+    def calibrated(run: object, aside: object) -> None:
         seen.append(aside)
         raise InputError("enough is known")
 
-    monkeypatch.setattr(verb, "set_aside_of", lambda case, runs: aside)
+    monkeypatch.setattr(verb, "excluded_in", lambda run: aside)
     monkeypatch.setattr(verb, "calibrated", calibrated)
     with pytest.raises(InputError, match="enough is known"):
         verb.draw_fingerprint_of(case, library()["wind"], runs=tmp_path / "runs")

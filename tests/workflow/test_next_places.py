@@ -24,8 +24,8 @@ from vegglue.results.diagnosis import ParameterEstimates, Step
 from vegglue.results.json_store import write_questions
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.workflow import next_measurement as verb
+from vegglue.workflow.case_run import folder_of
 from vegglue.workflow.next_measurement import next_measurement
-from vegglue.workflow.run_folder import folder_of
 
 PLACE = an_anomaly()
 AT = f"{PLACE.effect}[x{PLACE.x:g},y{PLACE.y:g}]"

@@ -10,7 +10,7 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.errors import InputError
 from vegglue.results.json_store import write_comparison
 from vegglue.results.model_comparison import ComparedModel, ModelComparison
-from vegglue.workflow.overview import overview
+from vegglue.workflow.report import overview
 
 
 def with_a_law_as_child(folder: Path) -> None:

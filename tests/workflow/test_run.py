@@ -8,13 +8,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from diagnoses import a_diagnosis, candidate_laws_of
+from diagnoses import a_diagnosis, laws_suspected_of
 from reach import here
 
 from vegglue.case.config import load_case
-from vegglue.case.schema import Case
-from vegglue.results.causes import CandidateLaws
+from vegglue.results.causes import LawsSuspected
 from vegglue.workflow import run as whole_way
+from vegglue.workflow.case_run import CaseRun
 
 ROOT = Path(__file__).parents[2]
 TWIN = load_case(ROOT / "configs" / "twin.yaml")
@@ -43,9 +43,9 @@ def test_a_hidden_effect_is_named_added_and_the_error_falls(went: tuple[Path, st
     accused = next(one for one in said["effects"] if one["name"] == "discharge_error[high]")
     assert accused["p_family"] < 0.01
     here(folder, "extend", "hidden/small.yaml", "--auto")
-    scores = json.loads(here(folder, "compare", "hidden/small.yaml", child, "--json").stdout)["rungs"]
-    assert scores[1]["held_out_sections"] < scores[0]["held_out_sections"]
-    assert scores[1]["chi2"] < 0.8 * scores[0]["chi2"]
+    model_scores = json.loads(here(folder, "compare", "hidden/small.yaml", child, "--json").stdout)["rungs"]
+    assert model_scores[1]["held_out_sections"] < model_scores[0]["held_out_sections"]
+    assert model_scores[1]["chi2"] < 0.8 * model_scores[0]["chi2"]
     by_hand = f"extends: small.yaml\nname: {child.stem.replace('+', '-')}-mine\n"
     child.write_text(by_hand, encoding="utf-8")
     again = here(folder, "extend", "hidden/small.yaml", "--auto", succeed=False)
@@ -74,57 +74,68 @@ def test_one_command_goes_the_whole_way_and_is_not_repeated(went: tuple[Path, st
 
 
 def gone(
-    kind: str, places: int, error_with_law: float, patched: pytest.MonkeyPatch, laws: CandidateLaws | None = None
+    kind: str,
+    places: int,
+    error_with_law: float,
+    patched: pytest.MonkeyPatch,
+    folder: Path,
+    laws: LawsSuspected | None = None,
 ) -> tuple[list[str], list[str]]:
     """Cases whose ensembles `run` makes, and the kinds of results it shows, where nothing is solved."""
     found = a_diagnosis(verdict={"kind": kind, "tells_laws": laws is not None})
     found = replace(found, places=found.places[:1] * places, laws=laws)
-    scores = {TWIN.name: 0.02, WITH_LAW.name: error_with_law}
+    model_scores = {TWIN.name: 0.02, WITH_LAW.name: error_with_law}
     alone = SimpleNamespace(model_scores=(TWIN.name,), left_out=None)
     made, shown, kept = list[str](), list[str](), list[str]()
 
-    def make_posterior(case: Case, *_: Any) -> bool:
-        made.append(case.name)
+    def make_posterior(run: CaseRun, *_: Any) -> bool:
+        made.append(run.case.name)
         return False
 
     fakes: dict[str, Any] = {
         "refuse_to_shrink": lambda *_: None,
-        "diagnose": lambda case, **_: found,
-        "extend_stepwise": lambda case, **_: SimpleNamespace(cases=(TWIN,), comparison=alone),
-        "discover": lambda case, **_: SimpleNamespace(child=WITH_LAW, law=True),
-        "model_score_of": lambda case, *_: case.name,
-        "comparison_of": lambda *_: None,
-        "keep_comparison": lambda ladder, cases, *_: kept.append(cases[-1].name),
-        "held_out_rmse": lambda score: scores[score],
-        "next_measurement": lambda case, **_: [],
-        "draw_ladder_of": lambda *_: Path("ladder.png"),
-        "_make_posterior": make_posterior,
+        "diagnose": lambda *_: found,
+        "extend_stepwise": lambda *_: SimpleNamespace(cases=(TWIN,), comparison=alone),
+        "discover": lambda *_: SimpleNamespace(child=WITH_LAW, law=True),
+        "rung_of": lambda run, *_: run.case.name,
+        "ladder_of": lambda *_: None,
+        "keep_ladder": lambda _, several: kept.append(several[-1].case.name),
+        "held_out_rmse": lambda model_score: model_scores[model_score],
+        "next_measurement": lambda *_: [],
+        "draw_ladder_of": lambda *_: None,
+        "make_posterior": make_posterior,
     }
     for name, fake in fakes.items():
         patched.setattr(whole_way, name, fake)
-    whole_way.run(TWIN, show=lambda _, result: shown.append("law" if hasattr(result, "law") else ""))
+    whole_way.run(TWIN, runs=folder, show=lambda _, result: shown.append("law" if hasattr(result, "law") else ""))
     assert kept == [name for name in made if name == WITH_LAW.name], (
         "the ladder of a law that is not kept is not, either"
     )
     return made, [one for one in shown if one]
 
 
-def test_a_law_is_searched_where_no_known_effect_explains_what_acts_all_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert gone("none-of-these", 0, 0.01, monkeypatch) == (["twin-law"], ["law"])
+def test_a_law_is_searched_where_no_known_effect_explains_what_acts_all_over(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert gone("none-of-these", 0, 0.01, monkeypatch, tmp_path) == (["twin-law"], ["law"])
 
 
 @pytest.mark.parametrize(("kind", "places"), [("none-of-these", 1), ("cannot-tell", 0)])
-def test_a_law_that_stands_out_is_searched(kind: str, places: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    laws = candidate_laws_of("law_bank_speed_step")
-    assert gone(kind, places, 0.01, monkeypatch, laws) == (["twin-law"], ["law"])
+def test_a_law_that_stands_out_is_searched(
+    kind: str, places: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    laws = laws_suspected_of("law_bank_speed_step")
+    assert gone(kind, places, 0.01, monkeypatch, tmp_path, laws) == (["twin-law"], ["law"])
 
 
-def test_a_law_that_does_not_lower_errors_is_told_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert gone("none-of-these", 0, 0.03, monkeypatch) == (["twin"], ["law"])
+def test_a_law_that_does_not_lower_errors_is_told_and_not_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    assert gone("none-of-these", 0, 0.03, monkeypatch, tmp_path) == (["twin"], ["law"])
     nothing_held_out = float("nan")
-    assert gone("none-of-these", 0, nothing_held_out, monkeypatch) == (["twin"], ["law"])
+    assert gone("none-of-these", 0, nothing_held_out, monkeypatch, tmp_path) == (["twin"], ["law"])
 
 
 @pytest.mark.parametrize(("kind", "places"), [("none-of-these", 1), ("nothing-missing", 0), ("cannot-tell", 0)])
-def test_no_law_is_searched_for_a_place_or_in_silence(kind: str, places: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert gone(kind, places, 0.01, monkeypatch) == (["twin"], [])
+def test_no_law_is_searched_for_a_place_or_in_silence(
+    kind: str, places: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert gone(kind, places, 0.01, monkeypatch, tmp_path) == (["twin"], [])

@@ -11,13 +11,13 @@ from model_scores import a_model_score
 from reach import write_reach
 
 import vegglue
-from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.results.json_store import write_model_score
 from vegglue.workflow import extend
+from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.compare import Comparison, comparison_of, keep_comparison, rows_set_aside
-from vegglue.workflow.stepwise_extension import kept_extension
+from vegglue.workflow.extend import kept_extension
 
 FOUND = a_diagnosis()
 ASIDE = excluded_by(FOUND)
@@ -28,22 +28,18 @@ def family(tmp_path: Path) -> tuple[Case, Case]:
     """A case and its child, and how it was extended to it, kept in `runs`."""
     parent = vegglue.load_case(write_reach(tmp_path, WITH_ERRORS))
     cases = parent, vegglue.extend(parent, "streamlining")
-    hashes, comparison = (
-        [case_hash(one) for one in cases],
-        Comparison(tuple(a_model_score(c.name) for c in cases), ASIDE),
-    )
-    ladder = comparison_of(comparison, cases, hashes, "Added: streamlining.", FOUND.verdict.sentence)
-    for one, score, config_hash in zip(cases, comparison.model_scores, hashes, strict=True):
-        (tmp_path / "runs" / one.name).mkdir(parents=True)
-        write_model_score(tmp_path / "runs" / one.name, score, rows_set_aside(ASIDE), config_hash)
-    keep_comparison(ladder, cases, hashes, tmp_path / "runs")
+    several = [CaseRun(one, tmp_path / "runs") for one in cases]
+    comparison = Comparison(tuple(a_model_score(one.name) for one in cases), ASIDE)
+    for run, model_score in zip(several, comparison.model_scores, strict=True):
+        write_model_score(run.folder, model_score, rows_set_aside(ASIDE), run.config_hash)
+    keep_comparison(comparison_of(comparison, several, "Added: streamlining.", FOUND.verdict.sentence), several)
     return cases
 
 
 def test_it_is_read_back(family: tuple[Case, Case], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     parent, child = family
     monkeypatch.setattr(extend, "diagnose", lambda *given, **more: FOUND)
-    monkeypatch.setattr(extend, "_extended", pytest.fail)
+    monkeypatch.setattr(extend, "extended", pytest.fail)
     found = vegglue.extend_stepwise(parent, runs=tmp_path / "runs")
     assert [one.name for one in found.cases] == [parent.name, child.name]
     assert (found.sentence, found.reason) == (FOUND.verdict.sentence, "Added: streamlining.")
@@ -53,29 +49,29 @@ def test_it_is_read_back(family: tuple[Case, Case], tmp_path: Path, monkeypatch:
 
 def test_another_diagnosis_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
     other = replace(FOUND, verdict=replace(FOUND.verdict, sentence="Missing: wind."))
-    assert kept_extension(family[0], other, tmp_path / "runs") is None
+    assert kept_extension(CaseRun(family[0], tmp_path / "runs"), other) is None
 
 
 def test_other_readings_set_aside_extend_again(family: tuple[Case, Case], tmp_path: Path) -> None:
     flagged = () if FOUND.errors.flagged else (0,)
     other = replace(FOUND, errors=replace(FOUND.errors, flagged=flagged))
-    assert kept_extension(family[0], other, tmp_path / "runs") is None
+    assert kept_extension(CaseRun(family[0], tmp_path / "runs"), other) is None
 
 
 def test_another_model_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
     other = family[0].model_copy(update={"eddy_viscosity": 0.03})
-    assert kept_extension(other, FOUND, tmp_path / "runs") is None
+    assert kept_extension(CaseRun(other, tmp_path / "runs"), FOUND) is None
 
 
 def test_a_child_that_was_edited_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
     path = family[1].source
     path.write_text(path.read_text(encoding="utf-8") + "eddy_viscosity: 0.03\n", encoding="utf-8")
-    assert kept_extension(family[0], FOUND, tmp_path / "runs") is None
+    assert kept_extension(CaseRun(family[0], tmp_path / "runs"), FOUND) is None
 
 
 def test_a_child_that_is_gone_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
     family[1].source.unlink()
-    assert kept_extension(family[0], FOUND, tmp_path / "runs") is None
+    assert kept_extension(CaseRun(family[0], tmp_path / "runs"), FOUND) is None
 
 
 def test_code_that_a_child_names_is_never_run(family: tuple[Case, Case], tmp_path: Path) -> None:
@@ -83,4 +79,4 @@ def test_code_that_a_child_names_is_never_run(family: tuple[Case, Case], tmp_pat
     path = family[1].source
     (tmp_path / "own.py").write_text("raise AssertionError('it was run')\n", encoding="utf-8")
     path.write_text(path.read_text(encoding="utf-8") + "effect_file: own.py\n", encoding="utf-8")
-    assert kept_extension(family[0], FOUND, tmp_path / "runs") is None
+    assert kept_extension(CaseRun(family[0], tmp_path / "runs"), FOUND) is None

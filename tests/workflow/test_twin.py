@@ -20,9 +20,9 @@ from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Step
 from vegglue.results.result_files import write_diagnosis
+from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import TwinBase
 from vegglue.workflow.reveal import guess_in_words, marks
-from vegglue.workflow.run_folder import model_in
 from vegglue.workflow.sealed_answer import Answer, Hidden, opened_answer, sealed_answer
 from vegglue.workflow.twin_files import config_in, in_rows_of_twin, write_twin
 from vegglue.workflow.twin_measurements import errors_named, measured_twin, true_place, twin_base
@@ -34,7 +34,7 @@ CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 
 @pytest.fixture(scope="module")
 def ground() -> TwinBase:
-    model = model_in(load_case(CONFIG))
+    model = CaseRun(load_case(CONFIG)).model
     return twin_base(model, true_place(len(model.names), 3))
 
 
@@ -223,7 +223,7 @@ def test_the_folder_of_a_twin(ground: TwinBase, tmp_path: Path) -> None:
     assert all(observation.synthetic for observation in load_case(target).observations)
     target.with_name("riddle-1+viscosity.yaml").touch()
     assert config_in(tmp_path / "Riddle 1") == target, "beside a child that `run` has written"
-    model = model_in(load_case(target))
+    model = CaseRun(load_case(target)).model
     assert model.case.name == "riddle-1"
     assert model.station["value"].to_numpy() == pytest.approx(station["value"].to_numpy(), abs=6e-6)
     assert model.names == ground.model.names

@@ -13,11 +13,12 @@ from reach import COARSE, ROOT, write_reach
 import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.measurements.observations import SET_ASIDE, read_observations
+from vegglue.pages.posterior_words import posterior_in_words
 from vegglue.progress import Progress
-from vegglue.report.posterior_words import posterior_in_words
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import comparison_that_fits, questions_that_fit
 from vegglue.results.result_files import stored_hash, write_diagnosis
+from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.infer import is_inferred
 from vegglue.workflow.report import results_of
 
@@ -152,19 +153,19 @@ def test_a_posterior_leaves_out_what_the_diagnosis_set_aside(tmp_path: Path) -> 
     runs = tmp_path / "runs"
     case = vegglue.load_case(str(write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)))
     table = read_observations(case).table
-    ensemble = vegglue.simulate(case, runs=runs, jobs=1)
+    run, ensemble = CaseRun(case, runs), vegglue.simulate(case, runs=runs, jobs=1)
     before = vegglue.infer(case, ensemble, method="glue", runs=runs, jobs=1)
     assert before.fit.used == 15
-    assert is_inferred(case, runs)
+    assert is_inferred(CaseRun(case, runs))
     nothing = np.full(len(table), np.nan)
     predictions = {"station": table, "first": nothing, "last": nothing, "error": nothing}
     found = a_diagnosis(predictions=predictions, errors={"flagged": (3, 7)})
     write_diagnosis(runs / "brook" / "diagnosis.h5", found, "", case_hash(case))
-    assert not is_inferred(case, runs), "it still holds them"
-    assert results_of(case, case, runs).set_aside_since == 2
+    assert not is_inferred(CaseRun(case, runs)), "it still holds them"
+    assert results_of(run, run).set_aside_since == 2
     after = vegglue.infer(case, ensemble, method="glue", runs=runs, jobs=1)
     assert after.fit.used == 13
     assert after.station.index[after.station["reason"] == SET_ASIDE].tolist() == [3, 7]
     assert "2 measurements of 15 are left out, as the diagnosis set them aside." in posterior_in_words(after)
-    assert is_inferred(case, runs)
-    assert results_of(case, case, runs).set_aside_since == 0
+    assert is_inferred(CaseRun(case, runs))
+    assert results_of(run, run).set_aside_since == 0

@@ -9,6 +9,6 @@ Help and a refused config come at once, since files of commands import nothing h
 `vegglue.NAME`, which imports them then, and all else that needs numpy is imported in the function that needs it.
 `tests/cli/test_startup.py` holds that.
 
-May import: case, diagnosis, effects, flow, inference, measurements, report, results, wording, workflow.
+May import: case, diagnosis, effects, flow, inference, measurements, pages, results, wording, workflow.
 Open first: main.py, ensemble_commands.py.
 """

@@ -8,11 +8,11 @@ from vegglue.case.schema import Case
 from vegglue.cli.output import command_line
 from vegglue.errors import shown_path
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
-from vegglue.report.homogeneity_words import homogeneity_rejected, moving_parameters
-from vegglue.report.posterior_words import correlated_pairs, errors_by_kind, fit_in_words
-from vegglue.report.prior_words import off_its_prior, pressed_bounds
-from vegglue.report.typography import PLAIN_TEXT
-from vegglue.report.validation_words import chi2_in_words, where_it_stands
+from vegglue.pages.homogeneity_words import homogeneity_rejected, moving_parameters
+from vegglue.pages.posterior_words import correlated_pairs, errors_by_kind, fit_in_words
+from vegglue.pages.prior_words import off_its_prior, pressed_bounds
+from vegglue.pages.typography import PLAIN_TEXT
+from vegglue.pages.validation_words import chi2_in_words, where_it_stands
 from vegglue.results.posterior import CLAIMED_FROM, Posterior
 
 # A terminal as it opens is 24 lines high; lines up to 100 columns are read without turning the head.

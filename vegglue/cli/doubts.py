@@ -5,26 +5,30 @@
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import vegglue
 
 if TYPE_CHECKING:
-    from vegglue.case.schema import Case
+    from vegglue.workflow.case_run import CaseRun
 
 
-def opened_case(config: Path, trust: bool) -> "Case":
-    """The case of a config, its measurements doubted aloud. Errors: InputError, as load_case and read_observations."""
-    (case,) = opened_cases([config], trust)
-    return case
+def opened_run(config: Path, trust: bool) -> "CaseRun":
+    """The run of a config, after warnings about its measurements. Raises InputError."""
+    (run,) = opened_runs([config], trust)
+    return run
 
 
-def opened_cases(configs: Sequence[Path], trust: bool) -> "list[Case]":
-    """The same of several, each sentence once."""
+def opened_runs(configs: Sequence[Path], trust: bool) -> "list[CaseRun]":
+    """The same of several configs, each warning once."""
     cases = [vegglue.load_case(config, trust) for config in configs]
+    from vegglue.workflow.case_run import CaseRun
     from vegglue.workflow.check import doubts_of
 
-    for sentence in dict.fromkeys(sentence for case in cases for sentence in doubts_of(case)):
+    first, *others = [CaseRun(case) for case in cases]
+    several = [first, *(replace(one, beside=first) for one in others)]
+    for sentence in dict.fromkeys(sentence for run in several for sentence in doubts_of(run)):
         print(f"Doubtful: {sentence}", file=sys.stderr, flush=True)
-    return cases
+    return several

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 import vegglue
-from vegglue.cli.doubts import opened_case
+from vegglue.cli.doubts import opened_run
 from vegglue.cli.hearing import heard
 from vegglue.cli.options import RUNS, Cluster, Config, Force, Jobs, Json, Members, Quiet, Runs, Trust
 from vegglue.cli.output import command_line, print_object
@@ -40,14 +40,14 @@ def simulate_command(
 
     With --force, members for which the command of an `engine` failed are run again.
     """
-    case = opened_case(config, trust)
-    from vegglue.workflow.run_folder import of_size
+    opened = opened_run(config, trust)
     from vegglue.workflow.simulate import is_up_to_date, refuse_all_failed
 
-    case = of_size(case, members)
-    current = is_up_to_date(case, runs, force)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        ensemble = vegglue.simulate(case, runs=runs, jobs=jobs, watch=watch, force=force)
+        run = opened.with_settings(runs, jobs, watch, force).sized(members)
+        current = is_up_to_date(run)
+        ensemble = vegglue.simulate(run)
+    case = run.case
     if as_object:
         from vegglue.cli.objects import object_of
 
@@ -74,10 +74,10 @@ def infer_command(
     trust: Trust = False,
 ) -> None:
     """Infer the parameters from the measurements and say what was found."""
-    case = opened_case(config, trust)
+    opened = opened_run(config, trust)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        posterior = vegglue.infer(case, runs=runs, method=method, members=members, jobs=jobs, watch=watch)
-    tell(case, runs, posterior, as_object)
+        posterior = vegglue.infer(opened.with_settings(runs, jobs, watch), method=method, members=members)
+    tell(opened.case, runs, posterior, as_object)
 
 
 def report_command(
@@ -89,10 +89,10 @@ def report_command(
     trust: Trust = False,
 ) -> None:
     """Make the page and the figures of a run."""
-    case = opened_case(config, trust)
+    opened = opened_run(config, trust)
     with heard(quiet, as_object) as watch:
-        page = vegglue.report(case, runs=runs, members=members, watch=watch)
-    tell(case, runs, page, as_object)
+        page = vegglue.report(opened.with_settings(runs, watch=watch), members=members)
+    tell(opened.case, runs, page, as_object)
 
 
 def run_command(
@@ -107,7 +107,7 @@ def run_command(
     force: Force = False,
 ) -> None:
     """The whole loop: diagnose, add what is missing, watch the error fall; posterior and report of the last model."""
-    case, results = opened_case(config, trust), list[tuple[Any, Any]]()
+    opened, results = opened_run(config, trust), list[tuple[Any, Any]]()
 
     def show(of: Any, result: Any) -> None:
         results.append((of, result))
@@ -115,7 +115,7 @@ def run_command(
             tell(of, runs, result, as_object)
 
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        extension = vegglue.run(case, runs=runs, members=members, jobs=jobs, watch=watch, show=show, force=force)
+        extension = vegglue.run(opened.with_settings(runs, jobs, watch, force), members=members, show=show)
     if as_object:
         from vegglue.cli.objects import run_object
 
@@ -128,8 +128,8 @@ def run_command(
 
 def _in_short(extension: Any, results: Sequence[tuple[Any, Any]]) -> list[str]:
     """A line each: the verdict, what was added, laws, the verdict on the last model, and parameters at bounds."""
-    from vegglue.report.prior_words import ends_at_bounds
-    from vegglue.report.typography import PLAIN_TEXT
+    from vegglue.pages.prior_words import ends_at_bounds
+    from vegglue.pages.typography import PLAIN_TEXT
     from vegglue.results.posterior import Posterior
     from vegglue.workflow.discover import DiscoveredCase
 

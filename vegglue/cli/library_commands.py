@@ -100,7 +100,7 @@ def effects_command(
 
 
 def _list(known: "tuple[Effect, ...]", as_object: bool) -> None:
-    from vegglue.report.effect_page import by_stage, effect_json
+    from vegglue.pages.effect_page import by_stage, effect_json
 
     if as_object:
         print_object([effect_json(effect) for effect in known])
@@ -117,7 +117,7 @@ def _list(known: "tuple[Effect, ...]", as_object: bool) -> None:
 
 
 def _show(effect: "Effect", case: "Case | None", as_object: bool) -> None:
-    from vegglue.report.effect_page import effect_in_words, effect_json, work_in_case
+    from vegglue.pages.effect_page import effect_in_words, effect_json, work_in_case
 
     doing = list(work_in_case(case, effect)) if case is not None else []
     if as_object:

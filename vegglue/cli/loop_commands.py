@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import vegglue
-from vegglue.cli.doubts import opened_case, opened_cases
+from vegglue.cli.doubts import opened_run, opened_runs
 from vegglue.cli.hearing import heard
 from vegglue.cli.options import FLAG, RUNS, Cluster, Config, Force, Jobs, Json, Quiet, Runs, Trust, number_given
 from vegglue.cli.output import command_line, print_object
@@ -70,10 +70,10 @@ def diagnose_command(
     trust: Trust = False,
 ) -> None:
     """Say where the model fails, which effect is missing, and how sure that is."""
-    case = opened_case(config, trust)
+    opened = opened_run(config, trust)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        found = vegglue.diagnose(case, runs=runs, jobs=jobs, watch=watch)
-    tell(case, runs, found, as_object)
+        found = vegglue.diagnose(opened.with_settings(runs, jobs, watch))
+    tell(opened.case, runs, found, as_object)
     if not (quiet or as_object):
         print(f"Next: {_after(found, config, runs, trust)}")
 
@@ -102,10 +102,10 @@ def discover_command(
     force: Force = False,
 ) -> None:
     """Say which law, in no list, explains the misfit; write it as an effect file and a child config."""
-    case = opened_case(config, trust)
+    opened = opened_run(config, trust)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        found = vegglue.discover(case, without=without or [], runs=runs, to=to, jobs=jobs, watch=watch, force=force)
-    tell(case, runs, found, as_object)
+        found = vegglue.discover(opened.with_settings(runs, jobs, watch, force), without=without or [], to=to)
+    tell(opened.case, runs, found, as_object)
 
 
 def extend_command(
@@ -134,13 +134,13 @@ def extend_command(
     if auto and (to is not None or shape):
         given = "--to" if to is not None else "--shape"
         raise InputError(f"extend: expected {given} with --add only, got it with --auto, which finds its own; drop it.")
-    case = opened_case(config, trust) if auto else vegglue.load_case(config, trust)
     if auto:
+        opened = opened_run(config, trust)
         with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-            extension = vegglue.extend_stepwise(case, runs=runs, jobs=jobs, watch=watch, force=force)
-        tell(case, runs, extension, as_object)
+            extension = vegglue.extend_stepwise(opened.with_settings(runs, jobs, watch, force))
+        tell(opened.case, runs, extension, as_object)
         return
-    child = vegglue.extend(case, add or [], shapes=shapes, to=to, force=force, runs=runs)
+    child = vegglue.extend(vegglue.load_case(config, trust), add or [], shapes=shapes, to=to, force=force, runs=runs)
     target = shown_path(child.source)
     if as_object:
         print_object({"config": target, "case": child.name, "added": add})
@@ -160,10 +160,10 @@ def compare_command(
     trust: Trust = False,
 ) -> None:
     """Set models side by side: their errors on what they have seen, on what was held out, and what each step cost."""
-    cases = opened_cases(configs, trust)
+    opened = opened_runs(configs, trust)
     with heard(quiet, as_object) as watch:
-        found = vegglue.compare(cases, runs=runs, jobs=jobs, watch=watch)
-    tell(cases[-1], runs, found, as_object)
+        found = vegglue.compare([one.with_settings(runs, jobs, watch) for one in opened])
+    tell(opened[-1].case, runs, found, as_object)
 
 
 def overview_command(
@@ -191,7 +191,7 @@ def next_command(
     trust: Trust = False,
 ) -> None:
     """Say which measurement would tell the remaining rivals apart, by gain per hour of field work."""
-    case = opened_case(config, trust)
+    opened = opened_run(config, trust)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        found = vegglue.next_measurement(case, between=between or [], runs=runs, jobs=jobs, watch=watch)
-    tell(case, runs, found, as_object)
+        found = vegglue.next_measurement(opened.with_settings(runs, jobs, watch), between=between or [])
+    tell(opened.case, runs, found, as_object)

@@ -10,8 +10,8 @@ from vegglue.diagnosis.comparison import model_score_json
 from vegglue.diagnosis.discovered import LawFound
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.measurements.section_discharge import CarriedDischarge
-from vegglue.report.posterior_words import posterior_in_words
-from vegglue.report.prior_words import off_its_prior, pressed_bounds
+from vegglue.pages.posterior_words import posterior_in_words
+from vegglue.pages.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_json import diagnosis_json
 from vegglue.results.ensemble import Ensemble
@@ -20,7 +20,7 @@ from vegglue.results.posterior import Posterior
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.discover import DiscoveredCase
-from vegglue.workflow.stepwise_extension import StepwiseExtension
+from vegglue.workflow.extend import StepwiseExtension
 
 Told = dict[str, Any]
 

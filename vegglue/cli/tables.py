@@ -9,7 +9,7 @@ from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.measurements.section_discharge import CarriedDischarge
-from vegglue.report.homogeneity_words import REJECTED_BELOW
+from vegglue.pages.homogeneity_words import REJECTED_BELOW
 from vegglue.results.diagnosis import CandidateEffect, Diagnosis
 from vegglue.results.model_score import ModelScore
 from vegglue.results.open_questions import Question

@@ -16,7 +16,7 @@ from vegglue.wording.numbers import so_many
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.discover import DiscoveredCase
-from vegglue.workflow.stepwise_extension import StepwiseExtension
+from vegglue.workflow.extend import StepwiseExtension
 
 
 def show(case: Case, runs: Path, result: Any) -> None:

@@ -22,9 +22,7 @@ from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.prior import sample_prior
 from vegglue.case.schema import Case
-from vegglue.engine.interface import Engine, Model, predict
-from vegglue.engine.model import model_of
-from vegglue.engine.newton import NEWTON
+from vegglue.engine.interface import Model, predict
 from vegglue.inference.glue import check_stations, efficiency
 from vegglue.inference.homogeneity import transfer
 from vegglue.inference.importance_sampling import Mixture, Sample, mixture_at_modes, sample
@@ -32,7 +30,6 @@ from vegglue.inference.leave_one_out import leave_one_out, leave_out, log_likeli
 from vegglue.inference.posterior_modes import ModesAndErrors, members_of, modes_and_errors, points_of_prior
 from vegglue.inference.posterior_summary import posterior_of
 from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
-from vegglue.measurements.observations import Observations
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import InferenceSettings, Posterior, WeightedSample
@@ -159,20 +156,18 @@ EFFECTIVE_DRAWS = 1000
 DRAWN_WITHIN = 0.02
 
 
-def refine(
-    ensemble: Ensemble | None, case: Case, observations: Observations, watch: Watch = silent, engine: Engine = NEWTON
-) -> Posterior:
+def refine(ensemble: Ensemble | None, model: Model, watch: Watch = silent) -> Posterior:
     """EFFECTIVE_DRAWS of the posterior, or as many as some thousand runs give, and how well they predict unseen data.
 
     Errors: InputError when the stations are not those that were simulated, a standard error is missing (`sigma: known`)
     or no flow is found from the best members.
     """
-    model = model_of(case, observations, engine)
+    case = model.case
     if ensemble is None:
         watch(Progress("trying points of the prior"))
         tried = points_of_prior(model)
     else:
-        check_stations(ensemble, observations.table, case.source)
+        check_stations(ensemble, model.station, case.source)
         tried = members_of(ensemble, model)
     base = modes_and_errors(model, tried, case.infer.sigma, watch)
     run = partial(predict, solved_for(base.model, base.noise), [one.point for one in base.fits])

@@ -195,7 +195,9 @@ LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
 SPARSE_MEMBERS, SPARSE_CHUNK = 256, 64
 
 
-def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int, watch: Watch) -> None:
+def solve_ensemble(
+    case: Case, observations: Observations, path: Path, jobs: int, watch: Watch, site: Site | None = None
+) -> None:
     """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
 
     Errors: InputError when an inflow or the outlet holds no cell centre, or the fields to be kept exceed their budget;
@@ -203,7 +205,7 @@ def solve_ensemble(case: Case, observations: Observations, path: Path, jobs: int
     """
     wanted = simulation_hash(case)  # before anything else is read: what changes meanwhile makes it out of date
     refuse_too_many(case, observations)
-    site = build_site(case)
+    site = site or build_site(case)
     refuse_ranges_without_cells(case, site.grid)
     if sentence := excess(case, site.grid):
         raise InputError(f"{shown_path(case.source)}: {sentence}")

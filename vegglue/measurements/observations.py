@@ -99,7 +99,7 @@ def read_observations(case: Case) -> Observations:
         )
     table = _within_the_grid(case, _joined(stations))
     _refuse_measured_twice(case, table)
-    _refuse_unknown_limits(case, table)
+    refuse_unknown_limits(case, table)
     return Observations(
         table=table,
         points=_joined([section.points for section in sections.values()]),
@@ -134,7 +134,7 @@ def _refuse_measured_twice(case: Case, table: pd.DataFrame) -> None:
         )
 
 
-def _refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:
+def refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:
     """Errors: InputError for a section or device that an effect is limited to, but no measurement comes from."""
     for name, entry in case.effects.items():
         for column, words in (("section", entry.sections), ("device", entry.devices)):

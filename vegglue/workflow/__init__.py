@@ -3,7 +3,7 @@ hidden effect.
 
 What draws is imported where a figure is drawn, so that results that are up to date are shown sooner.
 
-May import: calibration, case, diagnosis, effects, engine, flow, importers, inference, measurements, report, results,
+May import: calibration, case, diagnosis, effects, engine, flow, importers, inference, measurements, pages, results,
 wording.
-Open first: run.py, run_folder.py.
+Open first: run.py, case_run.py.
 """

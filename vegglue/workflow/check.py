@@ -7,18 +7,16 @@ import numpy as np
 
 from vegglue.calibration.laws_in_case import laws_beyond_their_range
 from vegglue.case.case_effects import effect_of
-from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.diagnosis.case_check import check_case, doubts_about
 from vegglue.effects.library import effects_of
 from vegglue.engine.interface import linearise
-from vegglue.engine.model import coarser, model_of
+from vegglue.engine.model import coarser
 from vegglue.errors import InputError
-from vegglue.measurements.observations import read_observations
 from vegglue.measurements.section_discharge import CarriedDischarge, carried_discharges
 from vegglue.parallel import one_thread
+from vegglue.workflow.case_run import CaseRun, case_run
 from vegglue.workflow.command_model import command_tried
-from vegglue.workflow.run_folder import folder_of, model_in, validation_of
 
 
 @dataclass(frozen=True)
@@ -34,43 +32,45 @@ class CheckedCase:
 
 
 @one_thread()
-def check(case: Case, *, runs: Path | str = "runs") -> CheckedCase:
+def check(case: Case | CaseRun, *, runs: Path | str = "runs") -> CheckedCase:
     """Read everything the case names, say what is odd, and draw the channel in runs/<name>/channel.png; try the command
     of its `engine`, if it has one.
 
     Errors: InputError for a file that cannot be read, or a command that fails.
     """
-    from vegglue.report.channel import save_channel_figure  # late: every command says what is odd, one draws
+    from vegglue.pages.channel import save_channel_figure  # late: every command says what is odd, one draws
 
-    observations, site = read_observations(case), build_site(case)
-    picture = folder_of(runs, case) / "channel.png"
-    remarks = [*check_case(case, site, observations), *_beyond_seen(case)]
+    run = case_run(case, runs)
+    case, observations, site = run.case, run.observations, run.site
+    picture = run.folder / "channel.png"
+    remarks = [*check_case(case, site, observations), *beyond_seen(run)]
     save_channel_figure(case, site, observations, picture)
     if case.engine is not None:
-        remarks.append(command_tried(model_of(case, observations), picture.parent))
+        remarks.append(command_tried(run.model, run.folder))
     table = observations.table
     carried = tuple(carried_discharges(case, site, table))
     return CheckedCase(tuple(remarks), carried, site.bed.size, len(table), int(table["used"].sum()), picture)
 
 
 @one_thread()
-def doubts_of(case: Case) -> list[str]:
+def doubts_of(run: CaseRun) -> list[str]:
     """What would mislead all that is computed with the measurements of a case, one sentence each; none for sound ones.
 
     Errors: InputError for a file that cannot be read.
     """
-    return [*doubts_about(case, build_site(case), read_observations(case)), *_beyond_seen(case)]
+    return [*doubts_about(run.case, run.site, run.observations), *beyond_seen(run)]
 
 
-def _beyond_seen(case: Case) -> list[str]:
+def beyond_seen(run: CaseRun) -> list[str]:
     """Laws that are used where nobody has seen them, in the experiments of the case and of its validation.
 
     Told of the flow in the middle of the prior on coarse cells: depths and speeds hang on discharge and outlet most.
     """
+    case = run.case
     if not any(effect_of(case, key).seen for key in case.effects) or case.engine is not None:
         return []
     found: list[str] = []
-    for model in filter(None, (model_in(case), validation_of(case))):
+    for model in filter(None, (run.model, run.validation_model)):
         cheap = coarser(model) or model
         point = linearise(cheap, np.zeros(len(cheap.names)))
         found += [] if point is None else list(laws_beyond_their_range(cheap, point))

@@ -6,21 +6,18 @@ from pathlib import Path
 
 import pandas as pd
 
-from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import held_out_rmse, model_score, model_score_in_short
 from vegglue.diagnosis.excluded_stations import MEASUREMENT, exclusion_in_words
 from vegglue.engine.first_use import with_compilation
 from vegglue.errors import InputError
-from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.json_store import comparison_that_fits, model_score_that_fits, write_comparison, write_model_score
 from vegglue.results.model_comparison import ComparedModel, ModelComparison
 from vegglue.results.model_score import ModelScore
 from vegglue.wording.numbers import in_short, so_many
-from vegglue.workflow.run_folder import calibrated, folder_of, validation_of
-from vegglue.workflow.set_aside import left_out
+from vegglue.workflow.case_run import CaseRun, calibrated, case_run, excluded_in_all
 
 # On which errors hang that are set side by side, of each station.
 ALIKE_IN_ALL = [*MEASUREMENT, "standard_error", "used"]
@@ -41,62 +38,70 @@ class Comparison:
 
 
 @one_thread()
-def compare(cases: Sequence[Case], *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent) -> Comparison:
+def compare(
+    cases: Sequence[Case | CaseRun], *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent
+) -> Comparison:
     """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one, and kept in
-    comparison.json in the folder of each, unless one model is there twice, or a ladder kept there begins with another
-    model.
+    comparison.json in the folder of each, unless one model is there twice, or a ladder is kept there that begins with
+    another model.
 
     Stations that the diagnosis of any of them has set aside are left out of all. What a model misses is kept in
-    rung.json, and not computed again for exactly the same. Errors: InputError when models have
+    model_score.json, and not computed again for exactly the same. Errors: InputError when models have
     other measurements, or one name and differ, when one finds no flow, or a station has no standard error.
     """
-    _refuse_other_measurements(cases)
-    hashes, aside = [case_hash(case) for case in cases], left_out(cases, runs)
-    scores = []
-    with at_most(jobs):
-        for number, case in enumerate(cases):
-            watch(Progress(with_compilation(f"comparing {case.name}"), number, len(cases), "models"))
-            scores.append(model_score_of(case, runs, aside, watch))
-    found = Comparison(tuple(scores), aside)
-    draw_ladder_of(found, cases[-1], runs)
-    if len({case.name for case in cases}) == len(cases):  # a model beside itself is no ladder
-        comparison = comparison_of(found, cases, hashes)
-        for case, config_hash in zip(cases, hashes, strict=True):
-            if not tells_more(comparison_that_fits(folder_of(runs, case), config_hash), comparison):
-                write_comparison(folder_of(runs, case), comparison, config_hash)
+    several = [case_run(case, runs, jobs, watch) for case in cases]
+    hashes = [run.config_hash for run in several]  # before anything is read, see CaseRun.config_hash
+    refuse_other_measurements(several)
+    aside, model_scores = excluded_in_all(several), []
+    with at_most(several[0].jobs):
+        for number, run in enumerate(several):
+            run.watch(Progress(with_compilation(f"comparing {run.case.name}"), number, len(several), "models"))
+            model_scores.append(model_score_of(run, aside))
+    found = Comparison(tuple(model_scores), aside)
+    draw_ladder_of(found, several[-1])
+    if len({run.case.name for run in several}) == len(several):  # a model beside itself is no ladder
+        ladder = comparison_of(found, several)
+        for run, wanted in zip(several, hashes, strict=True):
+            if not tells_more(comparison_that_fits(run.folder, wanted), ladder):
+                write_comparison(run.folder, ladder, wanted)
     return found
 
 
-def tells_more(kept: ModelComparison | None, comparison: ModelComparison) -> bool:
-    """Whether a comparison that is kept begins with a model that is not in this one, or says of the same models why it
+def tells_more(kept: ModelComparison | None, ladder: ModelComparison) -> bool:
+    """Whether a ladder that is kept begins with a model that is not in this one, or says of the same models why it
     ends there: the page would lose where it began, which readings were set aside there, or that reason.
     """
     if kept is None:
         return False
-    hashes = [step.config_hash for step in comparison.steps]
-    same = kept.left_out == comparison.left_out and [step.config_hash for step in kept.steps] == hashes
+    hashes = [step.config_hash for step in ladder.steps]
+    same = kept.left_out == ladder.left_out and [step.config_hash for step in kept.steps] == hashes
     return kept.steps[0].config_hash not in hashes or (same and bool(kept.reason))
 
 
-def _refuse_other_measurements(cases: Sequence[Case]) -> None:
-    """Errors are compared station by station, under the same errors of the data, and kept in a folder for each name;
-    one model may be there twice.
+def refuse_other_measurements(several: Sequence[CaseRun]) -> None:
+    """Raise InputError unless all models have the same measurements, and no two models that differ have one name.
+
+    Errors are compared station by station under the same errors of the data, and kept in a folder for each name; one
+    model may be there twice.
     """
-    if not cases:
+    if not several:
         raise InputError("compare: expected one model or more, got none; give the cases as a list.")
-    first, *others = cases
-    for number, case in enumerate(others, 1):
-        if any(one.name == case.name and case_hash(one) != case_hash(case) for one in cases[:number]):
+    first, *others = several
+    for number, run in enumerate(others, 1):
+        name = run.case.name
+        if any(one.case.name == name and one.config_hash != run.config_hash for one in several[:number]):
+            raise InputError(f"compare: expected models of different names, got two called {name}; name one otherwise.")
+        if not run.observations.table[ALIKE_IN_ALL].equals(first.observations.table[ALIKE_IN_ALL]):
             raise InputError(
-                f"compare: expected models of different names, got two called {case.name}; name one otherwise."
-            )
-        if not _measured(case).equals(_measured(first)):
-            raise InputError(
-                f"compare: expected {case.name} and {first.name} to be fitted to the same measurements, got others; "
+                f"compare: expected {name} and {first.case.name} to be fitted to the same measurements, got others; "
                 "name the same files in both, with the same errors, and a grid that holds the same stations. "
                 "A reading that is off is left out of all models once it is diagnosed."
             )
-    unseen = [(case.name, there.station[ALIKE_IN_ALL]) for case in cases if (there := validation_of(case)) is not None]
+    unseen = [
+        (run.case.name, run.validation.observations.table[ALIKE_IN_ALL])
+        for run in several
+        if run.validation is not None
+    ]
     for name, station in unseen[1:]:
         if not station.equals(unseen[0][1]):
             raise InputError(
@@ -105,71 +110,57 @@ def _refuse_other_measurements(cases: Sequence[Case]) -> None:
             )
 
 
-def _measured(case: Case) -> pd.DataFrame:
-    return read_observations(case).table[ALIKE_IN_ALL]
+def model_score_of(run: CaseRun, aside: pd.DataFrame) -> ModelScore:
+    """The errors of a case where it predicts best, without excluded measurements; kept for the next command."""
+    kept = kept_model_score(run, aside)
+    if kept is None:
+        kept = model_score(calibrated(run, aside), run.validation_model)
+        write_model_score(run.folder, kept, rows_set_aside(aside), run.config_hash)
+    return kept
 
 
-def model_score_of(case: Case, runs: Path | str, aside: pd.DataFrame, watch: Watch) -> ModelScore:
-    """The case where it predicts best, without the measurements set aside; kept for the next command."""
-    kept = kept_model_score(case, runs, aside)
-    if kept is not None:
-        return kept
-    folder, wanted = folder_of(runs, case), case_hash(case)
-    made = model_score(calibrated(case, folder, aside, watch), validation_of(case, folder, watch))
-    write_model_score(folder, made, rows_set_aside(aside), wanted)
-    return made
-
-
-def kept_model_score(case: Case, runs: Path | str, aside: pd.DataFrame) -> ModelScore | None:
-    """What an earlier command found for exactly this case without these measurements, under its title of now."""
-    kept = model_score_that_fits(folder_of(runs, case), rows_set_aside(aside), case_hash(case))
-    return None if kept is None else replace(kept, title=case.title)
+def kept_model_score(run: CaseRun, aside: pd.DataFrame) -> ModelScore | None:
+    """What an earlier command found for exactly this case and these exclusions, under its present title."""
+    kept = model_score_that_fits(run.folder, rows_set_aside(aside), run.config_hash)
+    return None if kept is None else replace(kept, title=run.case.title)
 
 
 def rows_set_aside(aside: pd.DataFrame) -> list[tuple[str | float, ...]]:
-    """Measurements that are set aside, in one order whichever diagnosis named them first."""
+    """Excluded measurements, in one order whichever diagnosis named them first."""
     return sorted(aside.itertuples(index=False, name=None))
 
 
-def draw_ladder_of(found: Comparison, last: Case, runs: Path | str) -> Path:
-    """Draw the comparison in the folder of its last case; returns the picture."""
-    from vegglue.report.ladder_figure import save_ladder_figure
+def draw_ladder_of(found: Comparison, last: CaseRun) -> None:
+    """Draw the comparison in the folder of its last case."""
+    from vegglue.pages.ladder_figure import save_ladder_figure
 
-    picture = folder_of(runs, last) / "ladder.png"
-    save_ladder_figure(found.model_scores, picture)
-    return picture
+    save_ladder_figure(found.model_scores, last.folder / "ladder.png")
 
 
-def keep_comparison(
-    comparison: ModelComparison, cases: Sequence[Case], hashes: Sequence[str], runs: Path | str
-) -> None:
-    """Keep the comparison in the folder of each of its cases, for their pages. Errors: StorageError."""
-    for case, config_hash in zip(cases, hashes, strict=True):
-        write_comparison(folder_of(runs, case), comparison, config_hash)
+def keep_comparison(ladder: ModelComparison, several: Sequence[CaseRun]) -> None:
+    """Keep a comparison in the folder of each of its cases, for their pages. Raises StorageError."""
+    for run in several:
+        write_comparison(run.folder, ladder, run.config_hash)
 
 
 def comparison_of(
-    found: Comparison, cases: Sequence[Case], hashes: Sequence[str], reason: str = "", verdict: str = ""
+    found: Comparison, several: Sequence[CaseRun], reason: str = "", verdict: str = ""
 ) -> ModelComparison:
-    """Models as they are kept; hashes: of the cases as they were read; reason, verdict: see `ModelComparison`."""
-    before: tuple[str, ...] = ()
-    steps = []
-    for case, config_hash, one in zip(cases, hashes, found.model_scores, strict=True):
-        steps.append(_step_of(case, config_hash, one, tuple(name for name in one.effects if name not in before)))
+    """The comparison of models as it is kept; reason, verdict: see `ModelComparison`."""
+    steps, before = [], tuple[str, ...]()
+    for run, one in zip(several, found.model_scores, strict=True):
+        step = ComparedModel(
+            name=run.case.name,
+            config=run.case.source.name,
+            config_hash=run.config_hash,
+            added=tuple(name for name in one.effects if name not in before),
+            parameters=len(one.values),
+            in_sample=one.in_sample.velocity,
+            held_out_sections=held_out_rmse(one),
+            held_out_experiments=held_out_rmse(one, "experiments"),
+            unseen=one.validation,
+            noise_floor=one.in_sample.noise_floor,
+        )
+        steps.append(step)
         before = one.effects
     return ModelComparison(tuple(steps), len(found.left_out), reason, verdict)
-
-
-def _step_of(case: Case, config_hash: str, one: ModelScore, added: tuple[str, ...]) -> ComparedModel:
-    return ComparedModel(
-        name=case.name,
-        config=case.source.name,
-        config_hash=config_hash,
-        added=added,
-        parameters=len(one.values),
-        in_sample=one.in_sample.velocity,
-        held_out_sections=held_out_rmse(one),
-        held_out_experiments=held_out_rmse(one, "experiments"),
-        unseen=one.validation,
-        noise_floor=one.in_sample.noise_floor,
-    )

@@ -20,9 +20,8 @@ from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.wording.numbers import in_short
+from vegglue.workflow.case_run import CaseRun, case_run, excluded_in
 from vegglue.workflow.command_model import refuse_command
-from vegglue.workflow.run_folder import model_in
-from vegglue.workflow.set_aside import set_aside_of
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class DiscoveredCase:
 
 @one_thread()
 def discover(
-    case: Case,
+    case: Case | CaseRun,
     *,
     without: Sequence[str] = (),
     runs: Path | str = "runs",
@@ -62,38 +61,37 @@ def discover(
     found, or it only restates a listed effect. Errors: InputError for an unknown effect, when the model finds no flow,
     a station has no standard error, or a file would be replaced.
     """
+    run = case_run(case, runs, jobs, watch, force)
+    case = run.case
     refuse_command(case, "discover")
     known = library(case.effect_file)
     for name in without:
         if name not in known:
             raise InputError(f"--without: `{name}` is not an effect of the library: {nearest_effect(name, known)}")
-    out = set_aside_of(case, runs)
+    out = excluded_in(run)
     aside = exclusion_in_words(out)
-    with at_most(jobs):
-        found = discover_laws(excluding(model_in(case), out), without, watch)
+    with at_most(run.jobs):
+        found = discover_laws(excluding(run.model, out), without, run.watch)
     laws = found.written
     if not laws:
         return DiscoveredCase(found, None, None, aside)
     name = effect_name(laws[-1])  # of a product, which begins with that of its law
     target = Path(to) if to is not None else case.source.with_name(f"{case.source.stem}+{name}{case.source.suffix}")
     file = target.with_name(f"{target.stem}.py")
-    return DiscoveredCase(found, file, _written(case, laws, target, file, force), aside)
+    return DiscoveredCase(found, file, written(case, laws, target, file, run.force), aside)
 
 
-def _written(parent: Case, laws: Sequence[LawFound], target: Path, file: Path, force: bool) -> Case:
+def written(parent: Case, laws: Sequence[LawFound], target: Path, file: Path, force: bool) -> Case:
     """The child config and the effect file it names, read back as any other."""
     refuse_parent(target, parent.source)
     text, names = effect_text(laws, parent.effect_file), " and ".join(map(effect_name, laws))
-    tree = child_tree(parent, target, [(_candidate(one), {}) for one in laws])
+    added: list[tuple[Candidate, dict[str, float]]] = []
+    for one in laws:  # each as its effect file has it: under that name, with its references in it
+        amplitude = replace(one.law.effect.amplitude, scale=one.scale)
+        added.append((Candidate(replace(one.law.effect, name=effect_name(one), shapes=(), amplitude=amplitude)), {}))
+    tree = child_tree(parent, target, added)
     tree = {"extends": tree.pop("extends"), "effect_file": file.name, **tree}
     equations = "".join(f"# {one.equation}.\n" for one in laws)
     head = f"# Made by `vegglue discover`: {parent.name} with {names}.\n{equations}"
     write_made({file: text, target: head + as_yaml(tree)}, "give another file by --to", force)
     return load_case(target, trust=True)  # the file was written here
-
-
-def _candidate(found: LawFound) -> Candidate:
-    """A law as its effect file has it: by that name, with its references in it."""
-    effect = found.law.effect
-    amplitude = replace(effect.amplitude, scale=found.scale)
-    return Candidate(replace(effect, name=effect_name(found), shapes=(), amplitude=amplitude))

@@ -1,7 +1,7 @@
 """case -> child case: a config that extends its parent by effects, named, or found by the diagnosis."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,24 +22,22 @@ from vegglue.diagnosis.stepwise_choice import Choice, Names
 from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError, shown_path
-from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.json_store import write_model_score
+from vegglue.results.json_store import comparison_that_fits, write_model_score
 from vegglue.results.result_files import diagnosis_that_fits
-from vegglue.wording.numbers import in_digits
-from vegglue.workflow.compare import Comparison, comparison_of, keep_comparison, rows_set_aside
-from vegglue.workflow.diagnose import diagnose
-from vegglue.workflow.run_folder import (
+from vegglue.wording.numbers import in_digits, in_short
+from vegglue.workflow.case_run import (
+    CaseRun,
     best_parameters,
     calibrated,
     calibrated_anew,
-    folder_of,
+    case_run,
     keep_best_fit,
-    validation_of,
 )
-from vegglue.workflow.stepwise_extension import StepwiseExtension, kept_extension
+from vegglue.workflow.compare import Comparison, comparison_of, keep_comparison, kept_model_score, rows_set_aside
+from vegglue.workflow.diagnose import diagnose
 
 # Why nothing is added where the diagnosis names neither an effect nor a place, by its verdict.
 NOTHING_TO_ADD = {
@@ -71,69 +69,127 @@ def extend(
     names = [add] if isinstance(add, str) else list(dict.fromkeys(add))
     if not names:
         raise InputError("--add: expected the name of an effect or more, got none; `vegglue effects` lists them.")
-    added = named_candidates(case, names, shapes or {}, _places_found(case, runs))
+    run = case_run(case, runs)
+    diagnosed = diagnosis_that_fits(run.folder / "diagnosis.h5", run.config_hash)
+    places = [] if diagnosed is None else places_tried(diagnosed)
+    at_places = [(candidate_at(case, place), place.shapes) for place in places]
+    known = {candidate.name: (candidate, where) for candidate, where in at_places}
+    added = named_candidates(run, names, shapes or {}, known)
     target = child_path(case.source, [one for one, _ in added]) if to is None else Path(to)
     return write_child(case, target, added, force)
 
 
+@dataclass(frozen=True)
+class StepwiseExtension:
+    """How a case was extended: the cases from the first to the last, their errors, the sentence of the verdict, and
+    what was added or not, and why; unclear: names of what was added whose fall of held-out errors cannot be told from
+    none.
+    """
+
+    cases: tuple[Case, ...]
+    comparison: Comparison
+    sentence: str
+    reason: str
+    unclear: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        names = " -> ".join(case.name for case in self.cases)
+        return in_short(f"Extension: {names}", [self.sentence, self.reason, *repr(self.comparison).splitlines()])
+
+
 @one_thread()
 def extend_stepwise(
-    case: Case, *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent, force: bool = False
+    case: Case | CaseRun,
+    *,
+    runs: Path | str = "runs",
+    jobs: int = -1,
+    watch: Watch = silent,
+    force: bool = False,
 ) -> StepwiseExtension:
     """Add the effects and the places that the diagnosis found, one or together, while errors of held-out measurements
-    and the misfit with all others fall; see `stepwise_choice`. It is kept in comparison.json of each case, and read
-    there where the case, its diagnosis and its children are as they were.
+    and the misfit with all others fall; see `stepwise_choice`. The ladder is kept in comparison.json of each case, and
+    read there where the case, its diagnosis and its children are as they were.
 
     force: replace a child that was written or edited by hand, too. Errors: InputError when there is one.
     """
-    wanted = case_hash(case)
-    found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
-    kept = kept_extension(case, found, runs)
+    run = case_run(case, runs, jobs, watch, force)
+    wanted = run.config_hash
+    found = diagnose(run)
+    kept = kept_extension(run, found)
     if kept is not None:
         return kept
-    with at_most(jobs):
-        extension = _extended(case, found, runs, watch, force)
-    hashes = [case_hash(one) for one in extension.cases]
-    if hashes[0] != wanted:  # children are of the files as they are now, their numbers of those before
-        source = shown_path(case.source)
+    with at_most(run.jobs):
+        extension = extended(run, found)
+    several = [run, *(run.of(child) for child in extension.cases[1:])]
+    if case_hash(run.case) != wanted:  # children are of the files as they are now, their numbers of those before
+        source = shown_path(run.case.source)
         raise InputError(f"{source}: a file that it names changed while it was extended; run `vegglue extend` again.")
-    for one, errors, config_hash in zip(extension.cases, extension.comparison.model_scores, hashes, strict=True):
-        write_model_score(folder_of(runs, one), errors, rows_set_aside(extension.comparison.left_out), config_hash)
-    comparison = comparison_of(extension.comparison, extension.cases, hashes, extension.reason, extension.sentence)
-    comparison = replace(comparison, unclear=extension.unclear)
-    keep_comparison(comparison, extension.cases, hashes, runs)
+    for one, errors in zip(several, extension.comparison.model_scores, strict=True):
+        write_model_score(one.folder, errors, rows_set_aside(extension.comparison.left_out), one.config_hash)
+    ladder = comparison_of(extension.comparison, several, extension.reason, extension.sentence)
+    keep_comparison(replace(ladder, unclear=extension.unclear), several)
     return extension
 
 
-def _extended(case: Case, found: Diagnosis, runs: Path | str, watch: Watch, force: bool) -> StepwiseExtension:
-    """The parent and its children, each better than the one before; what is only tried leaves no file."""
-    aside = excluded_by(found)
-    watch(Progress(with_compilation(f"calibrating {case.name}")))
-    parent = calibrated(case, folder_of(runs, case), aside, watch)
+def extended(run: CaseRun, found: Diagnosis) -> StepwiseExtension:
+    """The parent and its children, each better than the one before; a model that is only tried leaves no file."""
+    case, aside = run.case, excluded_by(found)
+    run.watch(Progress(with_compilation(f"calibrating {case.name}")))
+    parent = calibrated(run, aside)
     named = {candidate.name: (candidate, shapes) for candidate, shapes in tried_additions(case, found)}
     tried: dict[Names, Baseline | None] = {(): parent}
 
     def base_with(names: Names) -> Baseline | None:
         if names not in tried:
-            watch(Progress(f"trying {' and '.join(names)}"))
-            tried[names] = _calibrated_with(parent.model, [named[name] for name in names], found, aside)
+            run.watch(Progress(f"trying {' and '.join(names)}"))
+            tried[names] = calibrated_with_additions(parent.model, [named[name] for name in names], found, aside)
         return tried[names]
 
     choice = choice_among(case, found, base_with)
-    cases, bases = [case], [parent]
+    several, bases = [run], [parent]
     for names in choice.stages[1:]:
         base = tried[names]
         assert base is not None
         added = [named[name] for name in names]
-        cases.append(write_child(case, child_path(case.source, [one for one, _ in added]), added, force))
-        keep_best_fit(cases[-1], folder_of(runs, cases[-1]), best_parameters(base), case_hash(cases[-1]))
+        child = run.of(write_child(case, child_path(case.source, [one for one, _ in added]), added, run.force))
+        keep_best_fit(child.case, child.folder, best_parameters(base), child.config_hash)
+        several.append(child)
         bases.append(base)
     # Only now are the measurements for validation looked at.
-    bases = [replace(base, model=replace(base.model, case=one)) for one, base in zip(cases, bases, strict=True)]
-    unseen = [validation_of(one, folder_of(runs, one), watch) for one in cases]
-    comparison = in_threads(model_score, list(zip(bases, unseen, strict=True)))
-    words, unclear = in_words(case, found, choice), tuple(choice.unclear)
-    return StepwiseExtension(tuple(cases), Comparison(tuple(comparison), aside), found.verdict.sentence, words, unclear)
+    bases = [replace(base, model=replace(base.model, case=one.case)) for one, base in zip(several, bases, strict=True)]
+    unseen = [one.validation_model for one in several]
+    ladder = Comparison(tuple(in_threads(model_score, list(zip(bases, unseen, strict=True)))), aside)
+    cases = tuple(one.case for one in several)
+    return StepwiseExtension(
+        cases, ladder, found.verdict.sentence, in_words(case, found, choice), tuple(choice.unclear)
+    )
+
+
+def kept_extension(run: CaseRun, found: Diagnosis) -> StepwiseExtension | None:
+    """How exactly this case was extended before, by exactly this diagnosis and with its children unchanged, or None.
+
+    Never that of a case with code or a command of the user, as a child could name another.
+    """
+    kept = comparison_that_fits(run.folder, run.config_hash)
+    if kept is None or run.case.effect_file is not None or run.case.engine is not None:
+        return None
+    first, *others = kept.steps
+    sentence, aside = found.verdict.sentence, excluded_by(found)
+    if (first.config_hash, kept.verdict) != (run.config_hash, sentence):
+        return None
+    several = [run]
+    for step in others:
+        try:
+            child = run.of(load_case(run.case.source.with_name(step.config)))
+            if child.config_hash == step.config_hash:
+                several.append(child)
+        except (InputError, OSError):
+            pass
+    model_scores = [one for each in several if (one := kept_model_score(each, aside)) is not None]
+    if len(model_scores) < len(kept.steps):
+        return None
+    cases = tuple(one.case for one in several)
+    return StepwiseExtension(cases, Comparison(tuple(model_scores), aside), sentence, kept.reason, kept.unclear)
 
 
 def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
@@ -162,24 +218,16 @@ def _unclear_in_words(name: str, fall: str) -> str:
     )
 
 
-def _places_found(case: Case, runs: Path | str) -> dict[str, Addition]:
-    """What the diagnosis of the case as it is found at places, by name, none without such a diagnosis."""
-    found = diagnosis_that_fits(folder_of(runs, case) / "diagnosis.h5", case_hash(case))
-    places = [] if found is None else places_tried(found)
-    at_places = [(candidate_at(case, place), place.shapes) for place in places]
-    return {candidate.name: (candidate, shapes) for candidate, shapes in at_places}
-
-
 def named_candidates(
-    case: Case, names: Sequence[str], shapes: Mapping[str, float], known: Mapping[str, Addition]
+    run: CaseRun, names: Sequence[str], shapes: Mapping[str, float], known: Mapping[str, Addition]
 ) -> list[Addition]:
     """Candidates by name, each with those of the shapes that it has, and with those of what is known under its name;
     InputError for a shape that none has.
     """
-    station = read_observations(case).table
+    station = run.observations.table
     added: list[Addition] = []
     for name in names:
-        candidate, of_known = known[name] if name in known else (candidate_named(case, station, name), {})
+        candidate, of_known = known[name] if name in known else (candidate_named(run.case, station, name), {})
         own = {shape.name for shape in candidate.effect.shapes}
         added.append((candidate, {**of_known, **{key: value for key, value in shapes.items() if key in own}}))
     stray = set(shapes) - {shape.name for candidate, _ in added for shape in candidate.effect.shapes}
@@ -203,7 +251,7 @@ def write_child(parent: Case, target: Path, added: Sequence[Addition], force: bo
     return load_case(target, trust=True)  # what it can run, its parent has run
 
 
-def _calibrated_with(
+def calibrated_with_additions(
     parent: Model, added: Sequence[Addition], found: Diagnosis, aside: pd.DataFrame
 ) -> Baseline | None:
     """The parent with additions, calibrated from the prior and from where the diagnosis ended; None without a flow."""

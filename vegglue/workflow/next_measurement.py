@@ -9,7 +9,6 @@ import numpy as np
 from vegglue.calibration.baseline import Baseline, baseline, for_prediction
 from vegglue.calibration.candidates import Candidate
 from vegglue.case.parameter_space import z_at
-from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.candidate_effects import POWER_QUANTILE
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
@@ -24,8 +23,8 @@ from vegglue.results.causes import CandidateLaw, CandidateLaws
 from vegglue.results.diagnosis import CandidateEffect, Diagnosis, Step
 from vegglue.results.json_store import questions_that_fit, write_questions
 from vegglue.results.open_questions import HIDDEN_BEHIND, ProposedMeasurement, Question
+from vegglue.workflow.case_run import CaseRun, calibrated, case_run
 from vegglue.workflow.diagnose import diagnose
-from vegglue.workflow.run_folder import calibrated, folder_of
 
 # Effects hidden behind calibration that measurements are proposed for.
 HIDDEN = 4
@@ -37,7 +36,12 @@ MOST_LAWS = 3
 
 @one_thread()
 def next_measurement(
-    case: Case, *, between: Sequence[str] = (), runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent
+    case: Case | CaseRun,
+    *,
+    between: Sequence[str] = (),
+    runs: Path | str = "runs",
+    jobs: int = -1,
+    watch: Watch = silent,
 ) -> list[Question]:
     """What to measure next, ranked by gain per hour of field work; empty when nothing is left to be told apart.
 
@@ -46,9 +50,10 @@ def next_measurement(
     strongest of those it could not test, each by itself at a plausible size. Only questions nobody chose are kept, in
     questions.json, and read there for exactly this case. Errors: InputError for a name that is not in the diagnosis.
     """
-    wanted = case_hash(case)
-    found = diagnose(case, runs=runs, jobs=jobs, watch=watch)
-    kept = None if between else questions_that_fit(folder_of(runs, case), wanted)
+    run = case_run(case, runs, jobs, watch)
+    case, wanted = run.case, run.config_hash
+    found = diagnose(run)
+    kept = None if between else questions_that_fit(run.folder, wanted)
     if kept is not None:
         return [*kept]
     by_name = [one.name for one in found.candidate_effects]
@@ -59,16 +64,16 @@ def next_measurement(
     asked = _asked(case, found, list(dict.fromkeys(between))) if between else _questions(case, found)
     questions: list[Question] = []
     if asked:
-        with at_most(jobs):
-            watch(Progress(with_compilation(f"calibrating {case.name}")))
-            base = with_places(calibrated(case, folder_of(runs, case), excluded_by(found), watch), found)
-            watch(Progress("weighing what could be measured"))
+        with at_most(run.jobs):
+            run.watch(Progress(with_compilation(f"calibrating {case.name}")))
+            base = with_places(calibrated(run, excluded_by(found)), found)
+            run.watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
         answered = zip(asked, worths, strict=True)
         questions = [one for (what, rivals), worth in answered for one in _answers(what, rivals, worth)]
         questions = [replace(one, seen_from=_seen_from(found)) if one.of_one else one for one in questions]
     if not between:
-        write_questions(folder_of(runs, case), questions, wanted)
+        write_questions(run.folder, questions, wanted)
     return questions
 
 

@@ -12,18 +12,17 @@ from vegglue.errors import InputError, StorageError, shown_path
 from vegglue.flow.status import FAILED
 from vegglue.inference.command_ensemble import run_ensemble
 from vegglue.inference.solve_ensemble import solve_ensemble
-from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.result_files import read_ensemble, stored_hash
 from vegglue.results.resume import remove_left_over_fields
-from vegglue.workflow.run_folder import folder_of, of_size, other_size
+from vegglue.workflow.case_run import CaseRun, case_run, other_size
 
 
 @one_thread()
 def simulate(
-    case: Case,
+    case: Case | CaseRun,
     *,
     runs: Path | str = "runs",
     members: int | None = None,
@@ -43,77 +42,76 @@ def simulate(
     Errors: InputError for a case without parameters, fields beyond their budget, or a larger ensemble there;
     StorageError when another run holds the folder or the disk is full.
     """
-    case = of_size(case, members)
-    path = folder_of(runs, case) / "ensemble.h5"
-    refuse_to_shrink(case, runs, force)
-    if not is_simulated(case, runs):
-        _share_one_beside(case, path)
-    if not is_up_to_date(case, runs, force):
-        if case.engine is None:
-            solve_ensemble(case, read_observations(case), path, jobs, watch)
+    run = case_run(case, runs, jobs, watch, force).sized(members)
+    path = run.folder / "ensemble.h5"
+    refuse_to_shrink(run)
+    if not is_simulated(run):
+        share_one_beside(run)
+    if not is_up_to_date(run):
+        if run.case.engine is None:
+            solve_ensemble(run.case, run.observations, path, run.jobs, run.watch, run.site)
         else:
-            with at_most(jobs):
-                run_ensemble(case, read_observations(case), path, command_runs(case, path.parent), jobs, watch)
+            with at_most(run.jobs):
+                commands = command_runs(run.case, run.folder)
+                run_ensemble(run.case, run.observations, path, commands, run.jobs, run.watch)
     remove_left_over_fields(path)
     return read_ensemble(path)
 
 
-def is_simulated(case: Case, runs: Path | str) -> bool:
+def is_simulated(run: CaseRun) -> bool:
     """Whether a readable ensemble of exactly this case is there, with its fields if the case keeps any."""
-    path, wanted = Path(runs) / case.name / "ensemble.h5", simulation_hash(case)
+    path, wanted = run.runs / run.case.name / "ensemble.h5", simulation_hash(run.case)
     try:
         read_ensemble(path, wanted)
     except (InputError, StorageError):
         return False
-    return case.simulate.fields is None or stored_hash(path.with_name("fields.h5")) == wanted
+    return run.case.simulate.fields is None or stored_hash(path.with_name("fields.h5")) == wanted
 
 
-def is_up_to_date(case: Case, runs: Path | str, force: bool) -> bool:
+def is_up_to_date(run: CaseRun) -> bool:
     """Whether nothing is left to do: the ensemble is there, and no failed run of a command is to be tried again."""
-    if not is_simulated(case, runs):
+    if not is_simulated(run):
         return False
-    if not force or case.engine is None:
+    if not run.force or run.case.engine is None:
         return True
-    return not (read_ensemble(Path(runs) / case.name / "ensemble.h5").status == FAILED).any()
+    return not (read_ensemble(run.folder / "ensemble.h5").status == FAILED).any()
 
 
-def refuse_to_shrink(case: Case, runs: Path | str, force: bool) -> None:
-    """Errors: InputError when a finished ensemble of the case with more members would be replaced, unless forced."""
-    folder = Path(runs) / case.name
-    members = None if force else other_size(case, folder)
-    if members is not None and members > case.simulate.members:
+def refuse_to_shrink(run: CaseRun) -> None:
+    """Raise InputError if a finished ensemble of the case with more members would be replaced, unless forced."""
+    folder, wanted = run.runs / run.case.name, run.case.simulate.members
+    members = None if run.force else other_size(run.case, folder)
+    if members is not None and members > wanted:
         raise InputError(
-            f"{folder / 'ensemble.h5'}: holds {members:,} members of this case, which {case.simulate.members:,} would "
+            f"{folder / 'ensemble.h5'}: holds {members:,} members of this case, which {wanted:,} would "
             f"replace; ask for --members {members}, give another folder by --runs, or add --force."
         )
 
 
-def _share_one_beside(case: Case, path: Path) -> None:
-    """Share the ensemble of a run in the same folder of runs that solved the very same members, if there is one."""
-    wanted = simulation_hash(case)
-    names = ("ensemble.h5",) if case.simulate.fields is None else ("fields.h5", "ensemble.h5")
-    for folder in sorted(path.parent.parent.iterdir()):
-        if folder != path.parent and all(stored_hash(folder / name) == wanted for name in names):
-            for name in names:
-                _share(folder / name, path.with_name(name))
-            return
+def share_one_beside(run: CaseRun) -> None:
+    """Link the ensemble of another case in the folder of runs that solved the very same members, if there is one.
 
-
-def _share(there: Path, here: Path) -> None:
-    """One file under two names, or a copy where the disk knows no links. Finished results are never changed in place.
-
-    Errors: StorageError when the disk is full.
+    The files are copied if the disk knows no links. Raises StorageError when the disk is full.
     """
-    new = here.with_name(f"{here.name}.new")
-    try:
-        new.unlink(missing_ok=True)
-        try:
-            os.link(there, new)
-        except OSError:
-            shutil.copyfile(there, new)
-        os.replace(new, here)
-    except OSError as error:
-        raise StorageError(f"{here}: cannot be shared with {there} ({error}); make room and run it again.") from error
+    wanted = simulation_hash(run.case)
+    names = ("ensemble.h5",) if run.case.simulate.fields is None else ("fields.h5", "ensemble.h5")
+    for folder in sorted(run.folder.parent.iterdir()):
+        if folder == run.folder or any(stored_hash(folder / name) != wanted for name in names):
+            continue
+        for name in names:
+            here, new = run.folder / name, run.folder / f"{name}.new"
+            try:
+                new.unlink(missing_ok=True)
+                try:
+                    os.link(folder / name, new)
+                except OSError:
+                    shutil.copyfile(folder / name, new)
+                os.replace(new, here)
+            except OSError as error:
+                raise StorageError(
+                    f"{here}: cannot be shared with {folder / name} ({error}); make room and run it again."
+                ) from error
+        return
 
 
 def refuse_all_failed(case: Case, ensemble: Ensemble) -> None:

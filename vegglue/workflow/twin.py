@@ -10,9 +10,9 @@ from vegglue.case.schema import Case
 from vegglue.errors import shown_command
 from vegglue.parallel import one_thread
 from vegglue.results.result_files import diagnosis_that_fits
+from vegglue.workflow.case_run import case_run
 from vegglue.workflow.command_model import refuse_command
 from vegglue.workflow.reveal import guess_in_words
-from vegglue.workflow.run_folder import model_in
 from vegglue.workflow.sealed_answer import opened_answer, sealed_answer
 from vegglue.workflow.twin_files import SEAL, config_in, in_rows_of_twin, write_twin
 from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
@@ -37,7 +37,7 @@ def make_twin(
     files there that vegglue did not write, too. Errors: InputError.
     """
     refuse_command(case, "twin")
-    model = model_in(case)
+    model = case_run(case, "runs").model
     refuse_without_parameters(case)
     station, answer = measured_twin(twin_base(model, true_place(len(model.names), seed)), hide, snr, noise, seed)
     seal = sealed_answer(in_rows_of_twin(answer, station))

@@ -1,0 +1,153 @@
+"""What one report is about: everything known of a run, and where in its channel things stand."""
+
+import html
+import re
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from vegglue.case.channel_geometry import patches_present
+from vegglue.case.gridded_site import Site, cells_at
+from vegglue.case.schema import Case
+from vegglue.flow.problem import VegetatedCells
+from vegglue.flow.problem_setup import build_problem
+from vegglue.flow.sensor import FlowFields
+from vegglue.measurements.kinds import kind_of
+from vegglue.measurements.observations import Observations
+from vegglue.measurements.plant_survey import RigidCylinder
+from vegglue.pages.style import Picture, publish, publish_text
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.ensemble import Ensemble
+from vegglue.results.model_comparison import ModelComparison
+from vegglue.results.open_questions import Question
+from vegglue.results.posterior import Posterior
+from vegglue.whole_files import folder_within
+
+SYNTHETIC = "synthetic record"  # stamped on every figure of one
+LONGEST_FILE_NAME = 120  # letters: encrypted disks take 143, with the ending
+
+
+@dataclass(frozen=True)
+class LoopResults:
+    """What the loop from misfit to missing effect left beside a case; None for what was not made.
+
+    behind: the diagnosis that names what is missing, of the case itself or of the model it extends; ladder: the error
+    ladder with the case in it; questions: what that diagnosis leaves open; pages: where the reports of models of the
+    ladder lie, seen from the page that is made, by their names.
+    """
+
+    behind: Diagnosis | None = None
+    ladder: ModelComparison | None = None
+    questions: tuple[Question, ...] | None = None
+    pages: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Everything a report may show. ensemble: None where the posterior needed none; flow: the flow of the median
+    parameters, by experiment; cylinder: if surveyed; diagnosis: if there is one of this case; loop: what else is known
+    of what it lacks; set_aside_since: readings of the posterior that the diagnosis has set aside after it was made.
+    """
+
+    folder: Path
+    case: Case
+    site: Site
+    observations: Observations
+    ensemble: Ensemble | None
+    posterior: Posterior
+    flow: dict[str, FlowFields]
+    cylinder: RigidCylinder | None
+    diagnosis: Diagnosis | None
+    loop: LoopResults = LoopResults()
+    set_aside_since: int = 0
+
+    @property
+    def behind(self) -> Diagnosis | None:
+        """The diagnosis whose two models are drawn: of the case; of the model it extends where the case has none, or
+        has found nothing more that could be drawn.
+        """
+        own, first = self.diagnosis, self.loop.behind
+        if own is None or first is None:
+            return own or first
+        return first if _names_something(first) and not _has_calibrated(own) else own
+
+    @property
+    def before(self) -> Diagnosis | None:
+        """The diagnosis of the model that the case extends, where that named something; None for a case of its own."""
+        own, first = self.diagnosis, self.loop.behind
+        other = first is not None and (own is None or own.name != first.name)
+        return first if first is not None and other and _names_something(first) else None
+
+
+def _has_calibrated(found: Diagnosis) -> bool:
+    """Whether something was calibrated in; laws are only suspected, to first order."""
+    return bool(found.steps or found.places or found.instruments or found.field)
+
+
+def _names_something(found: Diagnosis) -> bool:
+    return _has_calibrated(found) or bool(found.laws)
+
+
+def is_synthetic(case: Case) -> bool:
+    """Whether a record was computed: an observation says so, or the case knows what it was made with."""
+    made_with = case.reference is not None and bool(case.reference.made_with)
+    return made_with or any(observation.synthetic for observation in case.observations)
+
+
+def command_about(run: Run, verb: str, *options: str) -> str:
+    """`vegglue VERB CONFIG` of the case of a run, to be copied (HTML)."""
+    return f"<code>vegglue {html.escape(shlex.join([verb, run.case.source.name, *options]))}</code>"
+
+
+def published_picture(run: Run, figure: Figure, name: str, caption: str, alt: str) -> Picture:
+    """The figure as a file of the run and as a part of its page."""
+    return publish(figure, folder_within(run.folder, "figures"), file_name(name), caption, alt, stamp(run.case))
+
+
+def published_svg(run: Run, svg: str, name: str, caption: str, alt: str) -> Picture:
+    """A picture that is SVG text already, as a file of the run and as a part of its page."""
+    return publish_text(svg, folder_within(run.folder, "figures"), file_name(name), caption, alt)
+
+
+def file_name(words: str) -> str:
+    """Words as the name of a file, of a length that every disk takes: a user names experiments and sections. With a
+    checksum where letters are lost that may be all that tells it from another.
+    """
+    plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", words)
+    if words.isascii() and len(plain) <= LONGEST_FILE_NAME:
+        return plain
+    return f"{plain[: LONGEST_FILE_NAME - 9]}-{crc32(words.encode(errors='replace')):08x}"
+
+
+def stamp(case: Case) -> str:
+    """What stands on every figure of a synthetic record, '' on others."""
+    return SYNTHETIC if is_synthetic(case) else ""
+
+
+def median_plants(run: Run, experiment: str) -> VegetatedCells:
+    """The plants present in an experiment, at the medians of the parameters."""
+    medians = {name: np.array([value]) for name, value in run.posterior.marginals.median.items()}
+    return build_problem(run.case, run.site, experiment, medians).plants
+
+
+def planted_cells(run: Run, experiment: str) -> np.ndarray:
+    """Whether each cell (nx, ny) bears plants in an experiment."""
+    return np.isin(run.site.main_patch, patches_present(run.case, experiment))
+
+
+def station_zones(run: Run) -> list[str]:
+    """Where each station stands: 'plants' in a patch that is present, else its friction class; 'section' where a whole
+    cross-section is measured.
+    """
+    table = run.observations.table
+    column, row = cells_at(run.site, table["x"].to_numpy(float), table["y"].to_numpy(float))
+    names = np.array(run.site.class_names)[run.site.friction_class[column, row]]
+    cells = {experiment: planted_cells(run, experiment) for experiment in table["experiment"].unique()}
+    among = [cells[experiment][i, j] for experiment, i, j in zip(table["experiment"], column, row, strict=True)]
+    whole = [not kind_of(name).at_point for name in table["kind"]]
+    return [str(name) for name in np.where(whole, "section", np.where(among, "plants", names))]
