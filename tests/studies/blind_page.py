@@ -171,7 +171,7 @@ def _data_limits(
 
 PAGE = """# How often the diagnosis is right
 
-Causes were hidden in synthetic measurements, and each set was diagnosed once by a program that does not know them. The
+Causes were hidden in synthetic measurements, and each set was diagnosed once without that knowledge. The
 rates below hold under the conditions below and under no others.
 
 ## Protocol
