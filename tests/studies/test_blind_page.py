@@ -20,10 +20,17 @@ from blind_lines import (
     made,
     targets_met,
 )
-from blind_page import wanted_of, write_page
+from blind_page import percent, wanted_of, write_page
 from scipy import stats
 
 DOCS = Path(__file__).parents[2] / "docs"
+# Lines whose shares README.md states.
+IN_README = {
+    "Nothing hidden, exact site: something named", "Nothing hidden, imperfect site: something named",
+    "Listed effect, 3 s.e.: in the set", "Listed effect, 6 s.e.: in the set",
+    "Unlisted object, not inspected: none of these", "Unlisted object, not inspected: a place within 1.5 m",
+    "Held-out error fell with what `extend --auto` kept",
+}  # fmt: skip
 
 
 def listed(name: str = "eddies") -> dict[str, Any]:
@@ -321,3 +328,10 @@ def test_the_shipped_page_is_made_of_the_shipped_records() -> None:
     told = chances_told(made(records, "second"))
     assert f"Of {lines + 1} targets {met + (distance(told) <= DISTANCE)} are met." in page
     assert len(page.splitlines()) <= 120
+    readme = " ".join((DOCS.parent / "README.md").read_text(encoding="utf-8").split())
+    for line in LINES:
+        if line.label in IN_README:
+            good, size = counts(made(records, "second"), line)
+            low, high = interval(good, size)
+            assert f"{percent(good / size)} ({100 * low:.0f} to {100 * high:.0f}" in readme, line.label
+            assert f" {size}" in readme, line.label
