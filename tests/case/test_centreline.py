@@ -14,7 +14,7 @@ from vegglue.case.site_schema import CentrelineShape, Stretch
 from vegglue.diagnosis.case_check import check_case
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
-from vegglue.workflow.twin_files import write_twin
+from vegglue.workflow.twin import write_twin
 
 BEND = CentrelineShape(parts=(Stretch(length=20.0), Stretch(radius=25.0, angle=90.0), Stretch(length=20.0)))
 AROUND = 25.0 * np.pi / 2.0

@@ -17,8 +17,7 @@ from vegglue.calibration.candidates import candidates_of
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import Model
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.workflow.hidden_effect import TwinBase, VisibilityError
-from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
+from vegglue.workflow.hidden_effect import TwinBase, VisibilityError, measured_twin, true_place, twin_base
 
 pytestmark = pytest.mark.slow
 

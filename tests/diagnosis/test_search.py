@@ -23,8 +23,7 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.progress import silent
 from vegglue.workflow.case_run import CaseRun
-from vegglue.workflow.hidden_effect import TwinBase
-from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
+from vegglue.workflow.hidden_effect import TwinBase, measured_twin, true_place, twin_base
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 

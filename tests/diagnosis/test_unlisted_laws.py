@@ -20,7 +20,7 @@ from vegglue.effects.grammar import LAWS
 from vegglue.results.causes import CandidateLaws
 from vegglue.results.diagnosis import Step
 from vegglue.workflow.case_run import CaseRun
-from vegglue.workflow.twin_measurements import measured_twin, true_place, twin_base
+from vegglue.workflow.hidden_effect import measured_twin, true_place, twin_base
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 NAMES = ("law_bank_speed_step", "law_bank_speed_ramp", "law_floor_along_trend")

@@ -36,7 +36,7 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.results.result_files import read_ensemble, read_posterior, write_posterior
-from vegglue.workflow.twin_files import write_twin
+from vegglue.workflow.twin import write_twin
 
 pytestmark = pytest.mark.slow
 

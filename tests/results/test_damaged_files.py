@@ -14,7 +14,7 @@ from vegglue.errors import InputError, StorageError
 from vegglue.results.json_store import questions_that_fit
 from vegglue.results.result_files import read_ensemble, stored_hash
 from vegglue.results.resume import EnsembleWriter, ensemble_writer, part_file, remove_left_over_fields
-from vegglue.workflow.sealed_answer import opened_answer
+from vegglue.workflow.twin import opened_answer
 
 pytestmark = pytest.mark.slow
 

@@ -40,8 +40,7 @@ from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.errors import InputError
 from vegglue.parallel import as_finished, at_most
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.workflow.hidden_effect import VisibilityError
-from vegglue.workflow.sealed_answer import UNLISTED
+from vegglue.workflow.hidden_effect import UNLISTED, VisibilityError
 
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs" / "blind"

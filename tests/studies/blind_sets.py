@@ -27,15 +27,18 @@ from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import (
     BAD_PROBE_EXCESS,
     LARGEST_SIZE,
+    UNLISTED,
+    Hidden,
     TwinBase,
     VisibilityError,
     candidate_of,
     case_hiding,
     chosen_effect,
+    errors_named,
+    finer,
+    true_place,
     visible_length,
 )
-from vegglue.workflow.sealed_answer import UNLISTED, Hidden
-from vegglue.workflow.twin_measurements import errors_named, finer, true_place
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 # True places of the prior, each seen by the model once.

@@ -28,8 +28,7 @@ from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import velocity_rows
-from vegglue.workflow.hidden_effect import TwinBase, VisibilityError, chosen_effect
-from vegglue.workflow.sealed_answer import Hidden
+from vegglue.workflow.hidden_effect import Hidden, TwinBase, VisibilityError, chosen_effect
 
 STUDY = "twin"
 # Standard errors that are left of what is hidden after calibration; a listed effect that cannot be as visible is hidden

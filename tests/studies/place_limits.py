@@ -28,8 +28,7 @@ from vegglue.calibration.candidates import cause_of
 from vegglue.calibration.noise import noise_of
 from vegglue.engine.interface import responses
 from vegglue.parallel import as_finished, at_most
-from vegglue.workflow.hidden_effect import candidate_of, with_unlisted_objects
-from vegglue.workflow.sealed_answer import Hidden
+from vegglue.workflow.hidden_effect import Hidden, candidate_of, with_unlisted_objects
 
 # Places that are tried lie so far apart along and across [m]: a third of what counts as near, and two rows of cells.
 STEP = (0.5, 0.375)

@@ -10,9 +10,7 @@ from blind_truth import perfect_site, true_values
 from vegglue.calibration.candidates import candidates_of
 from vegglue.case.parameter_space import theta_at
 from vegglue.engine.interface import linearise
-from vegglue.workflow.hidden_effect import candidate_of, case_hiding
-from vegglue.workflow.sealed_answer import Hidden
-from vegglue.workflow.twin_measurements import true_place
+from vegglue.workflow.hidden_effect import Hidden, candidate_of, case_hiding, true_place
 
 # One of each kind: bed, inflow, plants, drag, mixing, momentum flux, force, instrument, and something in no list.
 SOME = (

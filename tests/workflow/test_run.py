@@ -8,11 +8,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from diagnoses import a_diagnosis, laws_suspected_of
-from reach import here
+from diagnoses import a_diagnosis, candidate_laws_of
+from kills import WITH_ERRORS
+from reach import COARSE, here, write_reach
 
 from vegglue.case.config import load_case
-from vegglue.results.causes import LawsSuspected
+from vegglue.results.causes import CandidateLaws
+from vegglue.workflow import case_run
 from vegglue.workflow import run as whole_way
 from vegglue.workflow.case_run import CaseRun
 
@@ -79,7 +81,7 @@ def gone(
     error_with_law: float,
     patched: pytest.MonkeyPatch,
     folder: Path,
-    laws: LawsSuspected | None = None,
+    laws: CandidateLaws | None = None,
 ) -> tuple[list[str], list[str]]:
     """Cases whose ensembles `run` makes, and the kinds of results it shows, where nothing is solved."""
     found = a_diagnosis(verdict={"kind": kind, "tells_laws": laws is not None})
@@ -97,9 +99,9 @@ def gone(
         "diagnose": lambda *_: found,
         "extend_stepwise": lambda *_: SimpleNamespace(cases=(TWIN,), comparison=alone),
         "discover": lambda *_: SimpleNamespace(child=WITH_LAW, law=True),
-        "rung_of": lambda run, *_: run.case.name,
-        "ladder_of": lambda *_: None,
-        "keep_ladder": lambda _, several: kept.append(several[-1].case.name),
+        "model_score_of": lambda run, *_: run.case.name,
+        "comparison_of": lambda *_: None,
+        "keep_comparison": lambda _, several: kept.append(several[-1].case.name),
         "held_out_rmse": lambda model_score: model_scores[model_score],
         "next_measurement": lambda *_: [],
         "draw_ladder_of": lambda *_: None,
@@ -124,7 +126,7 @@ def test_a_law_is_searched_where_no_known_effect_explains_what_acts_all_over(
 def test_a_law_that_stands_out_is_searched(
     kind: str, places: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    laws = laws_suspected_of("law_bank_speed_step")
+    laws = candidate_laws_of("law_bank_speed_step")
     assert gone(kind, places, 0.01, monkeypatch, tmp_path, laws) == (["twin-law"], ["law"])
 
 
@@ -139,3 +141,24 @@ def test_no_law_is_searched_for_a_place_or_in_silence(
     kind: str, places: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert gone(kind, places, 0.01, monkeypatch, tmp_path) == (["twin"], [])
+
+
+@pytest.mark.slow
+def test_measurements_are_read_once_and_the_site_is_built_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the case and of all its children; sites of coarser cells are others."""
+    case = load_case(write_reach(tmp_path, COARSE, WITH_ERRORS))
+    counted = {"read": 0, "built": 0}
+
+    def counting(name: str, real: Any) -> Any:
+        def called(*arguments: Any) -> Any:
+            counted[name] += 1
+            return real(*arguments)
+
+        return called
+
+    monkeypatch.setattr(case_run, "read_observations", counting("read", case_run.read_observations))
+    monkeypatch.setattr(case_run, "build_site", counting("built", case_run.build_site))
+    whole_way.run(case, runs=tmp_path / "runs", members=8, jobs=1)
+    assert counted == {"read": 1, "built": 1}

@@ -21,11 +21,16 @@ from vegglue.measurements.observations import read_observations
 from vegglue.results.diagnosis import Step
 from vegglue.results.result_files import write_diagnosis
 from vegglue.workflow.case_run import CaseRun
-from vegglue.workflow.hidden_effect import TwinBase
-from vegglue.workflow.reveal import guess_in_words, marks
-from vegglue.workflow.sealed_answer import Answer, Hidden, opened_answer, sealed_answer
-from vegglue.workflow.twin_files import config_in, in_rows_of_twin, write_twin
-from vegglue.workflow.twin_measurements import errors_named, measured_twin, true_place, twin_base
+from vegglue.workflow.hidden_effect import Answer, Hidden, TwinBase, errors_named, measured_twin, true_place, twin_base
+from vegglue.workflow.twin import (
+    config_in,
+    guess_in_words,
+    in_rows_of_twin,
+    marks,
+    opened_answer,
+    sealed_answer,
+    write_twin,
+)
 
 pytestmark = pytest.mark.slow
 

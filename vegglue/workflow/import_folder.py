@@ -3,25 +3,29 @@
 A further layout of folders is a file in `importers/` that makes the keys and values of a config, and a line here.
 """
 
+import os
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
-from vegglue.case.config import load_case
+from vegglue.case.config import PATHS, load_case
 from vegglue.case.gridded_site import build_site
 from vegglue.case.made_files import refuse_not_made, write_made
 from vegglue.case.resolved_config import Tree, as_yaml
 from vegglue.case.schema import Case
+from vegglue.case.text_files import write_text
 from vegglue.diagnosis.channel_and_plants import remarks_on_unnamed_banks
 from vegglue.diagnosis.ensemble_and_priors import refused_for_errors
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.importers.confluence import NOT_STATED, case_from_confluence, flat_bed, holds_confluence
 from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.importers.site_file import left_open, site_file
 from vegglue.measurements.observations import read_observations
-from vegglue.workflow.import_trial import refuse_unreadable_import
 
 ANOTHER_FILE = "give another file by --to"
+NO_ROOM = "free some room in the folder for temporary files"
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
@@ -33,16 +37,18 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
     nothing was written.
     """
     folder = Path(folder)
-    target = _default_target(folder) if to is None else Path(to)
+    name = f"{folder.resolve().name}.yaml"
+    target = Path(to) if to is not None else Path("configs") / name if Path("configs").is_dir() else Path(name)
     if holds_confluence(folder) or mat_folder(folder) is not None:
-        tree, texts, flat = _of_confluence(folder, target)
+        tree, texts, flat = confluence_case(folder, target)
     else:
         made = case_from_folder(folder, target)
         tree, texts, flat = made.tree, dict(made.texts), None
     refuse_unreadable_import(tree, texts, target, folder)
-    configs = [{**texts, target: _config_text(folder, tree)}]
+    made_by = f"# Made by `vegglue import` from {folder.name}.\n"
+    configs = [{**texts, target: f"{made_by}{as_yaml(tree)}"}]
     if flat is not None:
-        configs.append({target.with_stem(f"{target.stem}-flat"): _config_text(folder, flat)})
+        configs.append({target.with_stem(f"{target.stem}-flat"): f"{made_by}{as_yaml(flat)}"})
     for files in configs:
         refuse_not_made(files, ANOTHER_FILE, force)
     for files in configs:
@@ -71,11 +77,7 @@ def unnamed_banks(case: Case) -> list[str]:
         return []
 
 
-def _config_text(folder: Path, tree: Tree) -> str:
-    return f"# Made by `vegglue import` from {folder.name}.\n" + as_yaml(tree)
-
-
-def _of_confluence(folder: Path, target: Path) -> tuple[Tree, dict[Path, str], Tree]:
+def confluence_case(folder: Path, target: Path) -> tuple[Tree, dict[Path, str], Tree]:
     """The config of the confluence set, its tables as text, to be written when it is known that they may be, and the
     config with a plane for the bed.
     """
@@ -89,6 +91,38 @@ def _of_confluence(folder: Path, target: Path) -> tuple[Tree, dict[Path, str], T
         return tree, texts, flat_bed(folder, target)
 
 
-def _default_target(folder: Path) -> Path:
-    name = f"{folder.resolve().name}.yaml"
-    return Path("configs") / name if Path("configs").is_dir() else Path(name)
+def refuse_unreadable_import(tree: Tree, texts: Mapping[Path, str], target: Path, folder: Path) -> None:
+    """Raise InputError if the config of `tree` and the texts beside it could not be read, before they are written.
+
+    target: path of the config to write, of the measurements in `folder`.
+    """
+    made = {path.relative_to(target.parent): text for path, text in texts.items()}
+    with TemporaryDirectory() as name:
+        elsewhere = Path(os.path.realpath(name))
+        for path, text in made.items():
+            write_text(elsewhere / path, text, NO_ROOM)
+        home = Path(os.path.realpath(target)).parent
+        write_text(elsewhere / target.name, as_yaml(with_full_paths(tree, home, made)), NO_ROOM)
+        try:
+            read_observations(load_case(elsewhere / target.name))
+        except InputError as error:
+            # The refusal names files by the paths that they would have had.
+            here = shown_path(target.parent / target.name).removesuffix(target.name)
+            refusal = str(error).replace(f"{shown_path(elsewhere)}{os.sep}", here)
+            names = [f"{here}{path}" for path in made if f"{here}{path}" in refusal]
+            would = f"; {' and '.join(names)} would be made of {shown_path(folder)}" if names else ""
+            raise InputError(f"{refusal} Nothing was written{would}.") from None
+
+
+def with_full_paths(tree: Any, home: Path, made: Mapping[Path, str]) -> Any:
+    """The tree with full paths of files that are there; what is to be made is named as it will be."""
+    if isinstance(tree, list):
+        return [with_full_paths(one, home, made) for one in tree]
+    if not isinstance(tree, dict):
+        return tree
+    full = {
+        key: os.path.realpath(home / value)
+        for key, value in tree.items()
+        if key in PATHS and isinstance(value, str) and Path(value) not in made
+    }
+    return {key: with_full_paths(value, home, made) for key, value in tree.items()} | full
