@@ -10,11 +10,10 @@ from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
 from vegglue.effects.plant_laws import PLANT_LAWS
 from vegglue.effects.surroundings import ChannelGeometry
-from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
 from vegglue.flow.newton import newton
 from vegglue.flow.problem import LEVEL, BedFriction, Boundaries, InflowSegment, Problem, VegetatedCells, take
-from vegglue.flow.prolongation import on_grid
+from vegglue.flow.starts import backwater, on_grid
 
 GRAVITY = 9.81
 

@@ -31,7 +31,7 @@ def chezy(folder: Path, **environment: str) -> tuple[float, int]:
 
 def copied(copy: Path) -> None:
     """What loops of resistance need of the package, in a folder."""
-    for part in ("__init__.py", "version.py", "compilation.py", "resistance"):
+    for part in ("__init__.py", "version.py", "compilation.py", "effects"):
         source = PACKAGE / part
         copy.mkdir(exist_ok=True)
         if source.is_dir():
@@ -46,12 +46,12 @@ def test_a_constant_changed_in_another_file_is_compiled_anew(tmp_path: Path, whe
     copy = tmp_path / "vegglue"
     copied(copy)
     if where == "in a read-only folder":  # no folder for a cache can be made there
-        (copy / "resistance" / "__pycache__").write_text("")
+        (copy / "effects" / "__pycache__").write_text("")
     elsewhere = {"NUMBA_CACHE_DIR": str(tmp_path / "own")} if where == "where the user says" else {}
     first, again = chezy(tmp_path, **elsewhere), chezy(tmp_path, **elsewhere)
     assert first[0] == again[0]
     assert (first[1], again[1]) == (0, 1)
-    constants = copy / "resistance" / "physical_constants.py"
+    constants = copy / "effects" / "physical_constants.py"
     constants.write_text(constants.read_text().replace("KARMAN = 0.41", "KARMAN = 0.40"))
     other = chezy(tmp_path, **elsewhere)
     assert other[0] > first[0]
@@ -62,7 +62,7 @@ def test_a_constant_changed_in_another_file_is_compiled_anew(tmp_path: Path, whe
 def test_without_a_folder_to_write_to_loops_are_compiled_each_time_and_it_is_said_once(tmp_path: Path) -> None:
     """As in a container with a read-only install and no home: a file stands where each folder would be."""
     copied(tmp_path / "vegglue")
-    (tmp_path / "vegglue" / "resistance" / "__pycache__").write_text("")
+    (tmp_path / "vegglue" / "effects" / "__pycache__").write_text("")
     (tmp_path / "home").write_text("")
     nowhere = {"PYTHONPATH": str(tmp_path), "HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home")}
     done = subprocess.run(
@@ -91,7 +91,7 @@ def test_loops_use_nothing_of_the_package_but_loops_and_shared_constants() -> No
 
 def test_a_file_depends_on_those_below_it_only(tmp_path: Path) -> None:
     assert {path.name for path in FILES if path.name in SHARED} == set(SHARED)
-    stamps = {name: _stamp(PACKAGE / name) for name in ("flow/kernels.py", "flow/wet_and_dry.py", "solver/batch.py")}
+    stamps = {name: _stamp(PACKAGE / name) for name in ("flow/kernels.py", "flow/wet_and_dry.py", "flow/batch.py")}
     assert len(set(stamps.values())) == len(stamps)
     assert _stamp(tmp_path / "nothing.py") == ""
 
@@ -99,7 +99,7 @@ def test_a_file_depends_on_those_below_it_only(tmp_path: Path) -> None:
 FIRST_USE = """
 import numpy as np
 from vegglue.flow.block_elimination import solve
-from vegglue.engine.first_use import with_compilation
+from vegglue.engine.model import with_compilation
 print(with_compilation("calibrating"))
 solve(np.zeros((2, 3, 2, 2)), np.zeros((2, 2)), np.zeros((2, 2, 1)))
 print(with_compilation("calibrating"))

@@ -12,11 +12,11 @@ from vegglue.diagnosis.effect_contract import breaches
 from vegglue.diagnosis.trial_channel import AMPLITUDE, CHANNEL, sizes
 from vegglue.effects.definition import STAGES, Amplitude, Effect, Shape
 from vegglue.effects.library import SHIPPED, library
-from vegglue.flow.backwater import backwater
 from vegglue.flow.march import march
 from vegglue.flow.newton import newton
 from vegglue.flow.problem import ALONG, take
 from vegglue.flow.problem_setup import build_problem
+from vegglue.flow.starts import backwater
 
 
 @pytest.mark.parametrize("effect", SHIPPED, ids=lambda effect: effect.name)

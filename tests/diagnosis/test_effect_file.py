@@ -13,8 +13,7 @@ from vegglue.case.schema import Experiment
 from vegglue.diagnosis.discovered import Discovery, LawFound, ProductFound
 from vegglue.diagnosis.effect_file import effect_name, effect_text
 from vegglue.diagnosis.excluded_stations import MEASUREMENT
-from vegglue.effects.grammar import LAWS, PRODUCTS
-from vegglue.effects.law import Law
+from vegglue.effects.grammar import LAWS, PRODUCTS, Law
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vegglue.effects.elementary import cube_root, logarithm
+from vegglue.effects.bed_laws import cube_root, logarithm
 
 
 def test_logarithm_and_cube_root_are_right_to_four_units():

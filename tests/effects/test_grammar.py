@@ -10,8 +10,7 @@ from vegglue.case.config import load_case
 from vegglue.diagnosis.effect_contract import breaches
 from vegglue.diagnosis.trial_channel import moving_water, trial
 from vegglue.effects.definition import Effect
-from vegglue.effects.grammar import EFFECTS, LAWS, PRODUCTS, SAME_AS
-from vegglue.effects.law import Law
+from vegglue.effects.grammar import EFFECTS, LAWS, PRODUCTS, SAME_AS, Law
 from vegglue.effects.library import SHIPPED, library
 from vegglue.effects.surroundings import Cells, ChannelGeometry
 from vegglue.flow.closures import closures

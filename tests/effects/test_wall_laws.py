@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vegglue.effects.bed_laws import CHEZY, KEULEGAN, MANNING
-from vegglue.effects.wall_laws import wall_coefficient
+from vegglue.effects.bed_laws import CHEZY, KEULEGAN, MANNING, wall_coefficient
 
 FLOOR = 1.3
 

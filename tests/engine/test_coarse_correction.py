@@ -13,7 +13,7 @@ from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse
 from vegglue.engine.marching import marching
 from vegglue.engine.model import coarser
-from vegglue.flow.prolongation import on_grid
+from vegglue.flow.starts import on_grid
 from vegglue.flow.wet_band import widen
 from vegglue.workflow.case_run import CaseRun
 

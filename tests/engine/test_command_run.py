@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 from commands import commanded
 
-from vegglue.engine import command_run
-from vegglue.engine.command_files import (
+from vegglue.engine import command
+from vegglue.engine.command import (
     BadPredictionsError,
+    CommandEnd,
     parameters_text,
     read_predictions,
+    run_command_once,
     stations_text,
 )
-from vegglue.engine.command_run import CommandEnd, run_command_once
 from vegglue.measurements.observations import read_observations
 
 GOOD = "open('predictions.csv', 'w').write('station,prediction\\n1,0.5\\n0,0.25\\n')"
@@ -108,7 +109,7 @@ def test_a_run_that_takes_too_long_is_ended_with_all_it_has_started(tmp_path: Pa
 
 
 def test_a_run_that_prints_without_end_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(command_run, "LONGEST_LOG", 10_000_000)
+    monkeypatch.setattr(command, "LONGEST_LOG", 10_000_000)
     end = ended(tmp_path, "while True: print('no end', flush=True)")
     assert end.reason == "the command printed more than 0.01 GB and was stopped"
     assert not (tmp_path / "run" / "command.log").exists()

@@ -10,7 +10,7 @@ import pytest
 from commands import SMOOTH, commanded
 
 from vegglue.case.schema import Case
-from vegglue.engine.command_runs import CommandRuns, command_predictions, command_runs, ended_runs, own_parameters
+from vegglue.engine.command import CommandRuns, command_predictions, command_runs, ended_runs, own_parameters
 from vegglue.errors import InputError, StorageError
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, taken

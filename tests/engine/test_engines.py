@@ -116,7 +116,7 @@ def test_responses_to_a_term_in_each_cell_agree(
     """Adjoints in single precision against a member for every cell; land, which carries no water, left out.
 
     The bed beside the inflow, which changes how water is spread over all of it, is left out as well: see
-    `newton_fields`.
+    `newton.responses_by_adjoints`.
     """
     exact, marched = (
         responses_to_cells(model, point, "high", [term])[term] for model, point in zip(models, points, strict=True)

@@ -9,11 +9,10 @@ from vegglue.calibration.candidates import candidates_of, cause_of
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
 from vegglue.case.prior import sample_prior
-from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import residual
-from vegglue.flow.joined_problems import joined
-from vegglue.flow.problem import Problem
+from vegglue.flow.problem import Problem, joined
 from vegglue.flow.problem_setup import build_problem
+from vegglue.flow.starts import backwater
 from vegglue.measurements.observations import read_observations
 
 

@@ -8,11 +8,11 @@ from channels import even_geometry, make_problem, sloping
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.library import library
 from vegglue.flow import kernels
-from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import faces
+from vegglue.flow.kernels import Bend
 from vegglue.flow.newton import newton
 from vegglue.flow.problem import InflowSegment
-from vegglue.flow.stretch import Bend
+from vegglue.flow.starts import backwater
 
 NONE = np.zeros((0, 0, 0))
 SIZE = (6, 5, 2)

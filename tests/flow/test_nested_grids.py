@@ -19,7 +19,7 @@ from vegglue.flow.nested_grids import GridProblem, solve_nested
 from vegglue.flow.parameter_metric import metric_of_flows
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem
 from vegglue.flow.problem_setup import build_problem
-from vegglue.flow.prolongation import lifted_flows, on_grid
+from vegglue.flow.starts import lifted_flows, on_grid
 from vegglue.flow.status import SOLVED_BY_NEWTON
 
 TOLERANCE = 1e-7

@@ -14,8 +14,7 @@ from vegglue.errors import InputError
 from vegglue.flow.closures import bent_plants, closures
 from vegglue.flow.equations import faces
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem, take
-from vegglue.flow.readers import nearest_face
-from vegglue.flow.sensor import read_sensors, reading_weights
+from vegglue.flow.sensor import nearest_face, read_sensors, reading_weights
 from vegglue.measurements.kinds import KINDS
 
 CELLS = (30, 24)

@@ -8,13 +8,13 @@ import pytest
 from channels import centres, changed, make_problem, river, sloping
 
 from vegglue.case.grid import Grid
-from vegglue.flow.backwater import backwater
 from vegglue.flow.equations import residual
 from vegglue.flow.jacobian import factors
+from vegglue.flow.kernels import Bend
 from vegglue.flow.newton import FROM_AFAR, newton
 from vegglue.flow.problem import ALONG, LEVEL, InflowSegment
 from vegglue.flow.sensor import read_sensors, reading_weights
-from vegglue.flow.stretch import Bend
+from vegglue.flow.starts import backwater
 from vegglue.flow.tangent import adjoints, jacobian_times, tangents
 
 FROM_THE_ROOT = replace(FROM_AFAR, time_step=1e4)  # s, as a start at the root of a flow hardly changed allows

@@ -4,9 +4,9 @@ import numpy as np
 from channels import river, solved
 
 from vegglue.flow import thin_water
-from vegglue.flow.chord_equations import eased, slope_of_friction
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import ACROSS, ALONG
+from vegglue.flow.thin_water import eased, slope_of_friction
 
 
 def test_easing_moves_no_root_and_leaves_deep_water():

@@ -9,7 +9,7 @@ from reach import said_to, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.errors import InputError
-from vegglue.flow.readers import READERS
+from vegglue.flow.sensor import READERS
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, kind_of, unstated_errors, velocity_rows
 from vegglue.measurements.observations import Observations, read_observations
 

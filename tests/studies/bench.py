@@ -19,9 +19,7 @@ from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import parameters_at, sobol_sample
 from vegglue.case.prior import sample_prior, sobol_points
-from vegglue.flow.backwater import backwater
 from vegglue.flow.batch import MEMBER_LANES, solve_members
-from vegglue.flow.chord_equations import eased
 from vegglue.flow.equations import faces
 from vegglue.flow.march import advance, march
 from vegglue.flow.parameter_metric import clusters, parameter_metric
@@ -29,7 +27,9 @@ from vegglue.flow.problem import crop, take
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.reference_member import settled
 from vegglue.flow.sensor import read_sensors
+from vegglue.flow.starts import backwater
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON, members_with
+from vegglue.flow.thin_water import eased
 from vegglue.flow.wet_band import rows_inside, widen
 from vegglue.inference.solve_ensemble import linearised_medians, solve_chunk, solve_ensemble, starts_and_chunks
 from vegglue.measurements.observations import read_observations
@@ -37,7 +37,7 @@ from vegglue.results.result_files import read_ensemble
 
 CONFIG = Path(__file__).parents[2] / "configs" / "d3a.yaml"
 PHASES = {
-    "chord_equations.eased": "residual of chord steps",
+    "thin_water.eased": "residual of chord steps",
     "jacobian.jacobian": "Jacobian, its residuals included",
     "block_elimination.factor": "factorisation",
     "block_elimination.solve": "back-substitution",

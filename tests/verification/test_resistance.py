@@ -7,10 +7,10 @@ import pytest
 from channels import GRAVITY, discharge, make_problem, planted, sloping, solved
 
 from vegglue.effects import bed_laws
-from vegglue.flow.backwater import backwater
 from vegglue.flow.closures import drag
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.problem import ALONG, LEVEL
+from vegglue.flow.starts import backwater
 
 SLOPE, LENGTH, COLUMNS, ROWS = 0.002, 40.0, 20, 3
 # The law's speed is rounded at 1 mm/s so that its slope exists at rest.

@@ -12,7 +12,6 @@ from scipy.sparse.linalg import spsolve
 from vegglue.case.grid import Grid
 from vegglue.diagnosis.trial_channel import mirrored
 from vegglue.effects import bed_laws
-from vegglue.flow.backwater import backwater
 from vegglue.flow.batch import solve_members
 from vegglue.flow.chord import chord
 from vegglue.flow.equations import faces, residual
@@ -20,6 +19,7 @@ from vegglue.flow.jacobian import factors, jacobian
 from vegglue.flow.march import USUAL_FALL_BACK, march, march_to_rest
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, InflowSegment, take
 from vegglue.flow.sensor import read_sensors
+from vegglue.flow.starts import backwater
 from vegglue.flow.status import SOLVED_BY_NEWTON
 
 pytestmark = pytest.mark.slow

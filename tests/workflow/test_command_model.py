@@ -15,7 +15,7 @@ from vegglue.calibration.command_place import command_place
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.engine.command_runs import command_runs
+from vegglue.engine.command import command_runs
 from vegglue.engine.corrected import corrected, correction_at
 from vegglue.engine.interface import Model, Point, linearise, predict, responses
 from vegglue.engine.model import coarser, model_of
@@ -145,7 +145,7 @@ def test_the_place_is_kept_for_the_next_verb(case: Case, tmp_path: Path, monkeyp
     own = model_of(case, read_observations(case))
     first = linearise(with_command(own, tmp_path, watch=silent), HERE)
     monkeypatch.setattr("vegglue.workflow.command_model.command_place", None)
-    monkeypatch.setattr("vegglue.engine.command_runs.run_command_once", None)
+    monkeypatch.setattr("vegglue.engine.command.run_command_once", None)
     again = linearise(with_command(own, tmp_path, watch=silent), HERE)
     assert first is not None
     assert again is not None

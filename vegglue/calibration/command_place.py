@@ -12,7 +12,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline, places_of_prior
 from vegglue.calibration.fit import NEGLIGIBLE_DECREASE, objective
 from vegglue.calibration.noise import Noise
-from vegglue.engine.command_runs import CommandRuns
+from vegglue.engine.command import CommandRuns
 from vegglue.engine.corrected import Correction, DeafCommandError, corrected, correction_at
 from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError

@@ -26,8 +26,7 @@ from vegglue.calibration.model_error import CellResponses, cell_responses
 from vegglue.case.case_effects import effect_of
 from vegglue.case.channel_geometry import channel_geometry
 from vegglue.effects.definition import Effect, SeenRange, Shape
-from vegglue.effects.grammar import LAWS, PRODUCTS, SAME_AS
-from vegglue.effects.law import PLAUSIBLE_STRENGTH, Law
+from vegglue.effects.grammar import LAWS, PLAUSIBLE_STRENGTH, PRODUCTS, SAME_AS, Law
 from vegglue.effects.surroundings import Cells
 from vegglue.engine.interface import Model, Point, by_itself, flow_at_centres
 from vegglue.flow.local_changes import Term

@@ -42,8 +42,8 @@ from vegglue.diagnosis.rivals import (
 from vegglue.diagnosis.rivals_again import refitted, with_rivals_again
 from vegglue.diagnosis.search_state import PriorWeight, SearchState, Undecided
 from vegglue.diagnosis.unlisted_laws import laws_beside
-from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
+from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.measurements.plausibility import implausible_values
 from vegglue.parallel import begun, in_threads

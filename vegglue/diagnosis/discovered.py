@@ -8,7 +8,7 @@ import numpy as np
 from vegglue.calibration.laws_in_case import VALUES_SEEN
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.refits import Refit
-from vegglue.effects.law import Law
+from vegglue.effects.grammar import Law
 from vegglue.wording.numbers import in_short
 
 MOST_ALIKE = 4  # told by name

@@ -26,11 +26,11 @@ from vegglue.effects.active_effect import applied
 from vegglue.effects.definition import Effect
 from vegglue.effects.surroundings import PlantCells
 from vegglue.errors import InputError
-from vegglue.flow.backwater import backwater
 from vegglue.flow.closures import closures
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.newton import newton
 from vegglue.flow.problem import ALONG, Problem, crop, take
+from vegglue.flow.starts import backwater
 
 # Column of cells from which on water is made faster, and how many upstream of it may feel that.
 CHANGED, FELT_AFAR = 20, 4

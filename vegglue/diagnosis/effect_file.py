@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vegglue.diagnosis.discovered import LawFound
-from vegglue.effects.law import Law, signed
+from vegglue.effects.grammar import Law, signed
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 

@@ -21,10 +21,9 @@ from vegglue.diagnosis.discovered import Discovery, LawFound, ProductFound
 from vegglue.diagnosis.product import product_beside
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.diagnosis.tempered_probabilities import tempering
-from vegglue.effects.grammar import SAME_AS
-from vegglue.effects.law import Law
-from vegglue.engine.first_use import with_compilation
+from vegglue.effects.grammar import SAME_AS, Law
 from vegglue.engine.interface import Model
+from vegglue.engine.model import with_compilation
 from vegglue.progress import Progress, Watch
 
 # Quantities of terms of which a law is calibrated at most; as many as listed effects in a diagnosis. Of the first two,

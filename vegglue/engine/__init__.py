@@ -1,5 +1,5 @@
 """What inference and diagnosis ask of a flow model, and the engines that answer: `newton`, the
-command of a user (`command_run`, `corrected`), and `marching` for tests.
+command of a user (`command`, `corrected`), and `marching` for tests.
 
 May import: case, effects, flow, measurements, results.
 Open first: interface.py, corrected.py.

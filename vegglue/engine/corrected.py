@@ -19,7 +19,7 @@ import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import FURTHEST, theta_at
-from vegglue.engine.command_runs import CommandRuns, command_predictions, own_parameters
+from vegglue.engine.command import CommandRuns, command_predictions, own_parameters
 from vegglue.engine.interface import Cause, Engine, Model, Point, Wanted, linearise
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError

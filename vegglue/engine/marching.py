@@ -12,16 +12,15 @@ import numpy as np
 from vegglue.arrays import Array, Single
 from vegglue.case.channel_geometry import channel_geometry
 from vegglue.case.parameter_space import theta_at
-from vegglue.engine.flow_problem import problem_at
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
-from vegglue.flow.backwater import backwater
+from vegglue.engine.newton import problem_at
 from vegglue.flow.equations import faces
-from vegglue.flow.joined_problems import joined
 from vegglue.flow.local_changes import Term, with_changed_term
 from vegglue.flow.march import march
-from vegglue.flow.problem import Problem
+from vegglue.flow.problem import Problem, joined
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import predictions_at_sensors
+from vegglue.flow.starts import backwater
 
 # A flow rests when no level or velocity changes faster than this [m/s, m/s2]: chosen, not measured, a smaller rate
 # marches for longer. It is checked every so many steps: every 100 take a quarter more time than every 30, and answers

@@ -1,4 +1,4 @@
-"""Models of a case: on its own grid, and on a coarser one."""
+"""Models of a case, on its own grid and on a coarser one; and the phase of a command that compiles first."""
 
 from dataclasses import replace
 
@@ -6,9 +6,22 @@ from vegglue.case.grid import filter_width_of
 from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.schema import Case
 from vegglue.case.zones import ranges_without_cells
+from vegglue.compilation import is_kept
 from vegglue.engine.interface import Engine, Model
 from vegglue.engine.newton import NEWTON
+from vegglue.flow.block_elimination import solve
 from vegglue.measurements.observations import Observations
+
+
+def with_compilation(phase: str) -> str:
+    """The phase of a command that solves flows, and that it compiles first where no earlier process did.
+
+    25 s of a core for a diagnosis were measured, 64 s on a busy machine; then nothing seems to move.
+    """
+    if solve.signatures or is_kept(solve):
+        return phase
+    return f"{phase} (compiling the solver for this machine first, once: up to a minute)"
+
 
 # Least number of cells of a coarser grid, along and across. Chosen, not measured: fewer hardly resolve a section.
 FEWEST_CELLS = 6

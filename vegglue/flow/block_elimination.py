@@ -3,7 +3,7 @@ channel.
 
 Row block i couples to the columns i - 2 (diagonally: upwinding along x), i - 1, i and i + 1. Levels are held from
 downstream, so eliminating from upstream downwards leaves, at each column, the well-posed problem of the channel above
-it under a given level: no exchange of rows between blocks is needed. Also the loops of `anderson` over such states.
+it under a given level: no exchange of rows between blocks is needed.
 """
 
 import numpy as np
@@ -14,9 +14,6 @@ from vegglue.compilation import compiled_exactly
 # unknowns this far apart may be disturbed together.
 ALONG_PERIOD, ROWS_REACH = 4, 2
 ACROSS_PERIOD = 2 * ROWS_REACH + 1
-# Of so many columns [-] one tells Anderson's mixing how steps change. With one of four it takes 1 to 4 % more steps
-# than with all, each of which reads a third less memory (DECISIONS).
-SPARSE = 4
 
 
 @compiled_exactly
@@ -100,70 +97,6 @@ def solve(blocks, far, right):
     for i in range(nx - 2, -1, -1):
         np.dot(blocks[i, 2], right[i + 1], product)
         take_away(right[i], product)
-
-
-@compiled_exactly
-def remember(turns, sums, slot, moved, step, last_step):
-    """Slot of the memory: t = f - f_last, s = t + (x - x_last), member by member; t of every SPARSE-th column only.
-
-    Returned: inner products per member of that turn with every turn, and of every turn with f, two arrays (depth, m).
-    """
-    depth, m = turns.shape[0], turns.shape[4]
-    _, nx, _, ny, _ = sums.shape
-    gram, right = np.zeros((depth, m)), np.zeros((depth, m))
-    for i in range(nx):
-        for e in range(3):
-            for j in range(ny):
-                for k in range(m):
-                    sums[slot, i, e, j, k] = step[i, e, j, k] - last_step[i, e, j, k] + moved[i, e, j, k]
-                if i % SPARSE:
-                    continue
-                c = i // SPARSE
-                for k in range(m):
-                    turns[slot, c, e, j, k] = step[i, e, j, k] - last_step[i, e, j, k]
-                for d in range(depth):
-                    for k in range(m):
-                        gram[d, k] += turns[slot, c, e, j, k] * turns[d, c, e, j, k]
-                        right[d, k] += turns[d, c, e, j, k] * step[i, e, j, k]
-    return gram, right
-
-
-@compiled_exactly
-def mix(state, step, sums, weights):
-    """Anderson's next state x + f - sum_d g_d s_d, in place; returned: by how much that differs (nx, 3, ny, m)."""
-    depth, nx, _, ny, m = sums.shape
-    moved = np.empty_like(step)
-    for i in range(nx):
-        for e in range(3):
-            for j in range(ny):
-                for k in range(m):
-                    moved[i, e, j, k] = step[i, e, j, k]
-                for d in range(depth):
-                    for k in range(m):
-                        moved[i, e, j, k] -= weights[d, k] * sums[d, i, e, j, k]
-                for k in range(m):
-                    state[i, e, j, k] += moved[i, e, j, k]
-    return moved
-
-
-@compiled_exactly
-def minimise(gram, right):
-    """g (depth, m) with gram g = right, gram (depth, depth, m): the least squares of Anderson's mixing; 0 for a lane
-    that has run away, whose numbers are none.
-    """
-    depth, _, m = gram.shape
-    weights = np.empty((depth, m))
-    for k in range(m):
-        matrix = np.empty((depth, depth))
-        for a in range(depth):
-            for b in range(depth):
-                matrix[a, b] = gram[a, b, k]
-            matrix[a, a] = matrix[a, a] * (1.0 + 1e-10) + 1e-300
-        if not (np.isfinite(matrix).all() and np.isfinite(right[:, k]).all()):
-            weights[:, k] = 0.0
-            continue
-        put(weights[:, k : k + 1], np.linalg.solve(matrix, np.ascontiguousarray(right[:, k : k + 1])))
-    return weights
 
 
 @compiled_exactly

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
 from vegglue.flow.anderson import Memory, kept
-from vegglue.flow.chord_equations import carry_thin, eased, largest_correction, weigh_thin, where_thin
 from vegglue.flow.jacobian import Factors
 from vegglue.flow.problem import Problem, take
+from vegglue.flow.thin_water import carry_thin, eased, largest_correction, weigh_thin, where_thin
 
 # So many lanes are free before other members enter them [-]: chosen, not measured. One would rebuild the problem of all
 # lanes for each member, more leave lanes idle.

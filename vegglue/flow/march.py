@@ -11,12 +11,86 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.flow import sweeps
+from vegglue.compilation import compiled_exactly
+from vegglue.effects.physical_constants import GRAVITY
 from vegglue.flow.closures import Closures, closures, wall_rates
 from vegglue.flow.equations import Faces, faces, residual_of, side_fluxes, storage
 from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.newton import FROM_A_MARCH, newton
 from vegglue.flow.problem import LEVEL, Problem, stretch_of_cells
+
+
+@compiled_exactly
+def sweep_x(change, face_x, stored, weight, outlet, time_step, theta, dx):
+    """Thomas sweeps along x in place: level and u of `change`; weight (nx, ny, m) of the east face of each cell."""
+    nx, _, ny, m = change.shape
+    upper, right = np.empty((nx, m)), np.empty((nx, m))
+    for j in range(ny):
+        for i in range(nx):
+            last = i == nx - 1
+            for k in range(m):
+                east = face_x[i + 1, j, k] / weight[i, j, k]
+                pull_e = theta * theta * GRAVITY / (dx * dx) * east * (2.0 if last else 1.0)
+                if last and not outlet[j]:
+                    east, pull_e = 0.0, 0.0
+                value = change[i, 0, j, k] - theta / dx * east * change[i, 2, j, k]
+                diagonal = stored[i, j, k] / time_step + pull_e
+                if i > 0:
+                    west = face_x[i, j, k] / weight[i - 1, j, k]
+                    pull_w = theta * theta * GRAVITY / (dx * dx) * west
+                    value += theta / dx * west * change[i - 1, 2, j, k]
+                    diagonal += pull_w - pull_w * upper[i - 1, k]
+                    value += pull_w * right[i - 1, k]
+                upper[i, k] = (0.0 if last else pull_e) / diagonal
+                right[i, k] = value / diagonal
+        for i in range(nx - 1, -1, -1):
+            for k in range(m):
+                level = right[i, k]
+                if i < nx - 1:
+                    level += upper[i, k] * change[i + 1, 0, j, k]
+                    gap = change[i + 1, 0, j, k] - level
+                else:
+                    gap = -2.0 * level
+                change[i, 0, j, k] = level
+                if i < nx - 1 or outlet[j]:
+                    u = (change[i, 2, j, k] - theta * GRAVITY * gap / dx) / weight[i, j, k]
+                    change[i, 2, j, k] = u
+
+
+@compiled_exactly
+def sweep_y(change, face_y, stored, weight, time_step, theta, dy):
+    """Thomas sweeps along y in place: level and v of `change`; weight (nx, ny, m) of the south face of each cell."""
+    nx, _, ny, m = change.shape
+    upper, right = np.empty((ny, m)), np.empty((ny, m))
+    scale = theta * theta * GRAVITY / (dy * dy)
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(m):
+                mass = stored[i, j, k] / time_step
+                value, diagonal, pull_n = mass * change[i, 0, j, k], mass, 0.0
+                if j < ny - 1:
+                    north = face_y[i, j + 1, k] / weight[i, j + 1, k]
+                    pull_n = scale * north
+                    diagonal += pull_n
+                    value -= theta / dy * north * change[i, 1, j + 1, k]
+                if j > 0:
+                    south = face_y[i, j, k] / weight[i, j, k]
+                    value += theta / dy * south * change[i, 1, j, k]
+                    diagonal += scale * south * (1.0 - upper[j - 1, k])
+                    value += scale * south * right[j - 1, k]
+                upper[j, k] = pull_n / diagonal
+                right[j, k] = value / diagonal
+        for j in range(ny - 1, -1, -1):
+            for k in range(m):
+                level = right[j, k] + (upper[j, k] * change[i, 0, j + 1, k] if j < ny - 1 else 0.0)
+                change[i, 0, j, k] = level
+        for j in range(1, ny):
+            for k in range(m):
+                gap = change[i, 0, j, k] - change[i, 0, j - 1, k]
+                change[i, 1, j, k] = (change[i, 1, j, k] - theta * GRAVITY * gap / dy) / weight[i, j, k]
+        for k in range(m):
+            change[i, 1, 0, k] = 0.0
+
 
 # Newton tries to finish a march after each of so many equal parts [-]: chosen, not measured. More tries end sooner
 # where one succeeds, and cost up to 25 factorisations each where none does.
@@ -39,8 +113,8 @@ def advance(problem: Problem, state: Array, time_step: float, theta: float) -> A
     length = _shortest(problem)
     along, across = _damping(problem, now, closed, length)
     change = -residual_of(problem, state, now.cell, side_fluxes(problem, now.cell), closed)
-    sweeps.sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, length)
-    sweeps.sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
+    sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, length)
+    sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
     return change
 
 

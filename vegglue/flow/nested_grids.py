@@ -2,7 +2,7 @@
 
     x = P x_c + d
 
-P x_c is the flow on coarser cells put on finer ones (`prolongation`), and d what finer cells change: it varies little
+P x_c is the flow on coarser cells put on finer ones (`lifted_flows`), and d what finer cells change: it varies little
 from member to member and is drawn from those solved before. A nested iteration as in Briggs, Henson and McCormick
 (2000), A Multigrid Tutorial, doi:10.1137/1.9780898719505; not checked against it.
 """
@@ -28,8 +28,8 @@ from vegglue.flow.march import FallBack
 from vegglue.flow.newton import CLOSE
 from vegglue.flow.parameter_metric import metric_of_flows, nearest_members, spline_weights, squared_distances
 from vegglue.flow.problem import Problem, crop, take
-from vegglue.flow.prolongation import lifted_flows
 from vegglue.flow.reference_member import ProblemOf, solve_alone
+from vegglue.flow.starts import lifted_flows
 from vegglue.flow.status import FAILED, SOLVED_BY_NEWTON
 from vegglue.flow.wet_band import overflows, rows_inside, widen
 

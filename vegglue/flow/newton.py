@@ -11,10 +11,10 @@ import numpy as np
 
 from vegglue.arrays import Array, Single
 from vegglue.flow.chord import LONGEST_CORRECTION, ChordSolution, chord
-from vegglue.flow.chord_equations import eased, slope_of_friction
 from vegglue.flow.equations import storage
 from vegglue.flow.jacobian import Factors, eliminate, factors, jacobian, solved
 from vegglue.flow.problem import LEVEL, Problem
+from vegglue.flow.thin_water import eased, slope_of_friction
 
 # Near enough [m, m/s] for chord steps to do the rest, and for neighbours to lean on factors made there: chosen, not
 # measured. Factors made 0.3 m/s away from the root led 60 of 63 members of one cluster astray (DECISIONS).

@@ -18,6 +18,7 @@ A state of m members is one array (nx, 3, ny, m): level at cell centres, v on th
 walls and side inflows set it), u on the east face of each cell.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -29,7 +30,7 @@ from vegglue.arrays import Array
 from vegglue.case.channel_geometry import rows_of
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.surroundings import ChannelGeometry
-from vegglue.flow.stretch import Bend
+from vegglue.flow.kernels import Bend
 
 LEVEL, ACROSS, ALONG = 0, 1, 2
 # An array (nx, ny, m) of something that is not there.
@@ -72,8 +73,8 @@ class VegetatedCells:
 @dataclass(frozen=True)
 class SideWalls:
     """Rough vertical walls along the south and the north side of the grid: length of the wall over that of the cell
-    beside it, 1 on a straight grid, 0 where none stands, (nx,) [-], and c_w / dy of each member, see `wall_laws`, (m,)
-    [1/m]; all empty without such walls.
+    beside it, 1 on a straight grid, 0 where none stands, (nx,) [-], and c_w / dy of each member (m,), see
+    `wall_coefficient` [1/m]; all empty without such walls.
     """
 
     south: Array
@@ -263,3 +264,69 @@ def _plants_between(plants: VegetatedCells, south: int, north: int) -> Vegetated
     names = ("column", "row", "law", "share", "phi", "canopy_height", "bare_chezy")
     kept = replace(plants, **{name: getattr(plants, name)[inside] for name in names})
     return replace(kept, row=kept.row - south)
+
+
+def joined(problems: Sequence[Problem]) -> Problem:
+    """One problem with all members: what is alike, as the grid and its classes, is taken from the first."""
+    first = problems[0]
+    plants: dict[str, Any] = {
+        name: _side_by_side([getattr(one.plants, name) for one in problems])
+        for name in ("phi", "canopy_height", "bare_chezy")
+    }
+    return replace(
+        first,
+        friction=replace(first.friction, coefficient=_side_by_side([one.friction.coefficient for one in problems])),
+        plants=replace(first.plants, **plants),
+        viscosity=_side_by_side([one.viscosity for one in problems]),
+        boundaries=_boundaries([one.boundaries for one in problems], [one.members for one in problems]),
+        bed_rise=_where_any([one.bed_rise for one in problems], [one.members for one in problems]),
+        walls=replace(first.walls, rate=_side_by_side([one.walls.rate for one in problems])),
+        effects=_effects(problems),
+        geometry=next((one.geometry for one in problems if one.geometry is not None), None),
+    )
+
+
+def _boundaries(parts: Sequence[Boundaries], members: Sequence[int]) -> Boundaries:
+    inflows = zip(*(one.inflows for one in parts), strict=True)
+    return replace(
+        parts[0],
+        inflows=tuple(_inflow(alike, members) for alike in inflows),
+        outlet_level=_side_by_side([one.outlet_level for one in parts]),
+        lateral_inflow=_where_any([one.lateral_inflow for one in parts], members),
+    )
+
+
+def _inflow(parts: Sequence[InflowSegment], members: Sequence[int]) -> InflowSegment:
+    cells = max(len(one.spread) for one in parts)
+    spread = [np.broadcast_to(one.spread, (cells, count)) for one, count in zip(parts, members, strict=True)]
+    return replace(parts[0], discharge=_side_by_side([one.discharge for one in parts]), spread=_side_by_side(spread))
+
+
+def _effects(problems: Sequence[Problem]) -> tuple[ActiveEffect, ...]:
+    """Effects of each problem, off in the members of all others."""
+    found, start, total = list[ActiveEffect](), 0, sum(one.members for one in problems)
+    for one in problems:
+        own = slice(start, start + one.members)
+        for active in one.effects:
+            amplitude = active.effect.amplitude
+            values = {name: np.full(total, value[0]) for name, value in active.values.items()}
+            values[amplitude.name][:] = amplitude.off
+            for name, value in active.values.items():
+                values[name][own] = value
+            found.append(replace(active, values=values))
+        start += one.members
+    return tuple(found)
+
+
+def _where_any(parts: Sequence[Array], members: Sequence[int]) -> Array:
+    """Arrays (nx, ny, m), 0 of a problem without one; empty where none has one."""
+    shape = next((one.shape[:2] for one in parts if one.size), None)
+    if shape is None:
+        return EMPTY
+    return _side_by_side(
+        [one if one.size else np.zeros((*shape, count)) for one, count in zip(parts, members, strict=True)]
+    )
+
+
+def _side_by_side(parts: Sequence[Array]) -> Array:
+    return np.concatenate(parts, axis=-1)

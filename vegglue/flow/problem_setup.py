@@ -18,9 +18,10 @@ from vegglue.case.site_schema import Inflow, Stand, StandOverride
 from vegglue.case.zones import centres_within, inflow_cells, refuse_ranges_without_cells
 from vegglue.effects import bed_laws, plant_laws
 from vegglue.effects.active_effect import ActiveEffect, applied
+from vegglue.effects.bed_laws import wall_coefficient
 from vegglue.effects.definition import REPLACED
 from vegglue.effects.surroundings import BoundaryValues, ChannelGeometry
-from vegglue.effects.wall_laws import wall_coefficient
+from vegglue.flow.kernels import Bend
 from vegglue.flow.problem import (
     EMPTY,
     SMOOTH_WALLS,
@@ -31,7 +32,6 @@ from vegglue.flow.problem import (
     SideWalls,
     VegetatedCells,
 )
-from vegglue.flow.stretch import Bend
 
 # Depth [m] from which on all of what enters somewhere does so; less of it where it is shallower. Chosen, not measured.
 WHERE_WATER_ENTERS = 0.2

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.flow.backwater import backwater
 from vegglue.flow.chord import ChordSolution
 from vegglue.flow.equations import residual
 from vegglue.flow.jacobian import Factors, factors
 from vegglue.flow.march import FallBack, march_to_rest
 from vegglue.flow.newton import CLOSE, FROM_AFAR, FROM_NEARBY, Beginning, finish, newton
 from vegglue.flow.problem import Problem, crop
+from vegglue.flow.starts import backwater
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 from vegglue.flow.wet_band import chord_in_band, overflows, rows_inside, wet_band, widen
 

@@ -16,9 +16,8 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.flow import block_elimination
 from vegglue.flow.equations import residual
-from vegglue.flow.jacobian import Factors, column_held
+from vegglue.flow.jacobian import Factors, Sharing, column_held, shared_inflows, sharing_at
 from vegglue.flow.problem import LEVEL, Problem, take
-from vegglue.flow.shared_inflow import Sharing, shared_inflows, sharing_at
 
 # Step [m, m/s] of the central difference along a direction scaled to one: chosen, not measured. Tangents agree with
 # differences of solved states to 1e-4 (test_tangent).

@@ -11,8 +11,7 @@ import numpy as np
 from vegglue.case.parameter_space import PriorSample, sample_of, sobol_sample
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
-from vegglue.engine.command_run import CommandEnd
-from vegglue.engine.command_runs import CommandRuns, ended_runs, own_parameters
+from vegglue.engine.command import CommandEnd, CommandRuns, ended_runs, own_parameters
 from vegglue.flow.status import FAILED, RUN_BY_COMMAND
 from vegglue.inference.solve_ensemble import (
     Rows,

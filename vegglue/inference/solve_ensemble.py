@@ -20,8 +20,7 @@ from vegglue.case.resolved_config import resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_PREDICTIONS
 from vegglue.case.zones import refuse_ranges_without_cells
-from vegglue.engine.first_use import with_compilation
-from vegglue.engine.model import ever_coarser
+from vegglue.engine.model import ever_coarser, with_compilation
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.batch import CLUSTER_SIZE, SolvedMembers, solve_members
 from vegglue.flow.march import FallBack, fall_back

@@ -10,7 +10,7 @@ from vegglue.arrays import Array, Single
 from vegglue.case.grid import Grid
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
-from vegglue.flow.readers import between
+from vegglue.flow.sensor import between
 from vegglue.results.fitting import fitting, names_of
 from vegglue.results.layout import Group, Stored, Variable, stored_fields
 

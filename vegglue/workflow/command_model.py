@@ -15,7 +15,7 @@ from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
-from vegglue.engine.command_runs import command_predictions, command_runs, ended_runs
+from vegglue.engine.command import command_predictions, command_runs, ended_runs
 from vegglue.engine.corrected import corrected, correction_at, without_effects
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.errors import InputError, shown_path

@@ -9,7 +9,7 @@ import pandas as pd
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import held_out_rmse, model_score, model_score_in_short
 from vegglue.diagnosis.excluded_stations import MEASUREMENT, exclusion_in_words
-from vegglue.engine.first_use import with_compilation
+from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent

@@ -7,8 +7,8 @@ from vegglue.case.resolved_config import resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.effects.definition import Effect
-from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import responses
+from vegglue.engine.model import with_compilation
 from vegglue.parallel import at_most, import_beside, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis

@@ -14,7 +14,7 @@ from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import names_in_files
 from vegglue.diagnosis.excluded_stations import without_stations
-from vegglue.engine.first_use import with_compilation
+from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
 from vegglue.inference.solve_ensemble import solve_flow

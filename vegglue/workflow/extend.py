@@ -19,8 +19,8 @@ from vegglue.diagnosis.comparison import model_score
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.nominations import Addition, choice_among, places_tried, tried_additions, values_tried
 from vegglue.diagnosis.stepwise_choice import Choice, Names
-from vegglue.engine.first_use import with_compilation
 from vegglue.engine.interface import Model
+from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError, shown_path
 from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent

@@ -15,7 +15,7 @@ from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_a
 from vegglue.diagnosis.excluded_stations import excluded_by
 from vegglue.diagnosis.next_measurement import MeasurementWorth, Rival, worth_of_measurements
 from vegglue.effects.grammar import LAWS
-from vegglue.engine.first_use import with_compilation
+from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
-from vegglue.engine.command_runs import command_runs
+from vegglue.engine.command import command_runs
 from vegglue.errors import InputError, StorageError, shown_path
 from vegglue.flow.status import FAILED
 from vegglue.inference.command_ensemble import run_ensemble

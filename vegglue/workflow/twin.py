@@ -20,8 +20,7 @@ from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.case.resolved_config import as_yaml, case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, case_name, read_text
-from vegglue.effects.grammar import LAWS
-from vegglue.effects.law import Law
+from vegglue.effects.grammar import LAWS, Law
 from vegglue.errors import InputError, shown_command, shown_path
 from vegglue.measurements.kinds import KINDS, Kind, kind_of
 from vegglue.parallel import one_thread

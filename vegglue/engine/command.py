@@ -1,0 +1,408 @@
+"""Runs of a user's command: the files between both, one run, and many at once. docs/own_engine.md describes them.
+
+    parameters.json   values and units of the parameters, and the flow of each experiment
+    stations.csv      station, experiment, kind, section, x, y, depth, unit
+    predictions.csv   station, prediction, left by the command
+
+    runs/<name>/engine/<key>.json   predictions of a finished run, which is not run again
+    runs/<name>/engine/<key>/       the folder of a run that is under way or has failed; of all with `keep: all`
+
+The key is a hash of the command, of its files and of all that the run was given. This is the only file of the package
+that starts a program which a config names.
+"""
+
+import hashlib
+import json
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Generator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from vegglue.arrays import Array
+from vegglue.case.case_effects import value_of
+from vegglue.case.channel_geometry import patches_present
+from vegglue.case.consistency import values
+from vegglue.case.engine_schema import CommandEngine
+from vegglue.case.resolved_config import digest_of, last_changes
+from vegglue.case.schema import Case, Experiment
+from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
+from vegglue.errors import InputError, shown_path
+from vegglue.measurements.kinds import kind_of
+from vegglue.measurements.observations import LARGEST_READING
+from vegglue.parallel import cores_allowed, is_taken
+from vegglue.progress import Progress, Watch, silent
+from vegglue.results.lock import hold_lock
+from vegglue.whole_files import MAKE_ROOM, failed_writes_told
+
+PARAMETERS_FILE, STATIONS_FILE, PREDICTIONS_FILE = "parameters.json", "stations.csv", "predictions.csv"
+COLUMNS_LEFT = ("station", "prediction")
+# Most that predictions.csv may take [bytes]: the most stations of a case, with fifty signs each.
+LARGEST_PREDICTIONS = 1_000_000
+
+
+class BadPredictionsError(ValueError):
+    """What a command left is not what was asked for: says where, what was expected and what came."""
+
+
+def parameters_text(case: Case, theta: Mapping[str, float]) -> str:
+    """parameters.json: theta in the units of the case, and discharge [m3/s], level [m] and plants of experiments."""
+    parameters = {name: {"value": value, "unit": case.parameters[name].unit} for name, value in theta.items()}
+    experiments = {name: _flow_of(case, name, one, theta) for name, one in case.experiments.items()}
+    return json.dumps({"case": case.name, "parameters": parameters, "experiments": experiments}, indent=1) + "\n"
+
+
+def _flow_of(case: Case, name: str, one: Experiment, theta: Mapping[str, float]) -> dict[str, Any]:
+    values = {parameter: np.array([value]) for parameter, value in theta.items()}
+    discharge = {inflow: float(value_of(value, values, 1)[0]) for inflow, value in one.discharge.items()}
+    plants = [case.plants.patches[index].name for index in patches_present(case, name)]
+    return {"discharge": discharge, "level": float(value_of(one.level, values, 1)[0]), "plants": plants}
+
+
+def stations_text(station: pd.DataFrame) -> str:
+    """stations.csv: places in the coordinates of the grid [m], depth as measured [m], empty where it was not."""
+    columns = ["experiment", "kind", "section", "x", "y", "depth"]
+    units = [kind_of(str(kind)).unit for kind in station["kind"]]
+    table = station[columns].reset_index(drop=True).assign(unit=units)
+    table.insert(0, "station", range(len(table)))
+    return str(table.to_csv(index=False, lineterminator="\n"))
+
+
+def read_predictions(path: Path, stations: int) -> Array:
+    """Predictions (station,) [m/s, m or m3/s] of predictions.csv, in any order. Errors: BadPredictionsError."""
+    if not path.is_file():
+        raise BadPredictionsError(f"the command ended well and left no {PREDICTIONS_FILE}")
+    try:
+        lines = read_text(path, LARGEST_PREDICTIONS).splitlines()
+    except InputError as error:
+        raise BadPredictionsError(f"{PREDICTIONS_FILE} cannot be read: {error}") from None
+    heading = tuple(word.strip() for word in lines[0].split(",")) if lines else ()
+    if heading != COLUMNS_LEFT:
+        raise BadPredictionsError(
+            f"{PREDICTIONS_FILE}, row 1: expected {','.join(COLUMNS_LEFT)}, got {','.join(heading)[:40]!r}"
+        )
+    found = np.full(stations, np.nan)
+    for row, line in enumerate(lines[1:], 2):
+        if line.strip():
+            number, value = _row(row, line, stations)
+            if np.isfinite(found[number]):
+                raise BadPredictionsError(f"{PREDICTIONS_FILE}, row {row}: station {number} stands there twice")
+            found[number] = value
+    missing = np.flatnonzero(np.isnan(found))
+    if missing.size:
+        more = f" and {missing.size - 1} more" if missing.size > 1 else ""
+        raise BadPredictionsError(f"{PREDICTIONS_FILE}: no prediction of station {missing[0]}{more}")
+    return found
+
+
+def _row(row: int, line: str, stations: int) -> tuple[int, float]:
+    """The station and the prediction of one line."""
+    words = [word.strip() for word in line.split(",")]
+    try:
+        number, value = int(words[0]), float(words[1])
+        sound = len(words) == len(COLUMNS_LEFT) and math.isfinite(value)
+    except (ValueError, IndexError):
+        sound = False
+    if not sound:
+        raise BadPredictionsError(
+            f"{PREDICTIONS_FILE}, row {row}: expected a station and a finite number, got {line[:40]!r}"
+        )
+    if abs(value) > LARGEST_READING:
+        raise BadPredictionsError(
+            f"{PREDICTIONS_FILE}, row {row}: expected a prediction of at most {LARGEST_READING:g}, got {value:g}"
+        )
+    if not 0 <= number < stations:
+        raise BadPredictionsError(
+            f"{PREDICTIONS_FILE}, row {row}: expected a station from 0 to {stations - 1}, got {number}"
+        )
+    return number, value
+
+
+LOG_FILE = "command.log"
+# Most that a command may say [bytes]. Chosen: more than any model prints, and no disk is full before it is noticed.
+LONGEST_LOG = 1_000_000_000
+# How often a running command is looked at [s]. Chosen: short against any run of a flow model, and hardly any work.
+LOOK_EVERY = 0.05
+# Signs of the last line of the log that a reason quotes: enough for a path; a reason of an ensemble has room for 240.
+QUOTED = 160
+
+
+@dataclass(frozen=True)
+class CommandEnd:
+    """How a run ended: its predictions (station,), or None and the reason; seconds: how long it took."""
+
+    prediction: Array | None
+    reason: str
+    seconds: float
+
+
+def run_command_once(
+    words: tuple[str, ...], folder: Path, given: Mapping[str, str], stations: int, timeout: float, stop: Event
+) -> CommandEnd:
+    """Start a command in an empty folder with the files it is given, wait for it, and read what it leaves.
+
+    given: text of each file by its name; timeout [s]; stop: is set when nobody waits any more, which ends the run.
+    Errors: StorageError when the folder cannot be written.
+    """
+    with failed_writes_told(folder, MAKE_ROOM):
+        if folder.exists():
+            _clear_away(folder)
+        folder.mkdir(parents=True)
+        for name, text in given.items():
+            (folder / name).write_text(text, encoding="utf-8")
+    began = time.monotonic()
+    reason = _outcome(words, folder, timeout, stop)
+    if not reason:
+        try:
+            return CommandEnd(read_predictions(folder / PREDICTIONS_FILE, stations), "", time.monotonic() - began)
+        except BadPredictionsError as error:
+            reason = str(error)
+    return CommandEnd(None, reason, time.monotonic() - began)
+
+
+def _clear_away(folder: Path) -> None:
+    """Remove what a killed run has left. One that still writes there then writes beside, until it ends by itself."""
+    aside = Path(tempfile.mkdtemp(prefix="left-", dir=folder.parent))
+    folder.rename(aside / folder.name)
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) -> str:
+    """Why a command did not end well, '' when it did."""
+    with (folder / LOG_FILE).open("wb") as log:
+        try:
+            process = subprocess.Popen(
+                words,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # so that all it has started can be ended with it
+            )
+        except OSError as error:
+            return f"the command cannot be started: {error.strerror} ({words[0]})"
+        try:
+            code = _waited_for(process, time.monotonic() + timeout, stop, log.fileno())
+        finally:
+            _end_all(process)
+    if stop.is_set():
+        return "the command was stopped"
+    if code is None and (folder / LOG_FILE).stat().st_size > LONGEST_LOG:
+        (folder / LOG_FILE).unlink()
+        return f"the command printed more than {LONGEST_LOG / 1e9:g} GB and was stopped"
+    if code is None:
+        return f"the command did not end within {timeout:g} s and was stopped"
+    if code:
+        how = f"exit code {code}" if code > 0 else f"signal {-code}"
+        return f"the command ended with {how}{_last_said(folder / LOG_FILE)}"
+    return ""
+
+
+def _waited_for(process: "subprocess.Popen[bytes]", until: float, stop: Event, log: int) -> int | None:
+    """The exit code; None when it was not there in time, or its log grew too long."""
+    while not stop.is_set() and os.fstat(log).st_size <= LONGEST_LOG:
+        left = until - time.monotonic()
+        if left <= 0.0:
+            return None
+        with suppress(subprocess.TimeoutExpired):
+            return process.wait(min(LOOK_EVERY, left))
+    return None
+
+
+def _end_all(process: "subprocess.Popen[bytes]") -> None:
+    """End the command, if it still runs, and whatever it has started and left behind."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _last_said(log: Path) -> str:
+    """The last line of the output of a command, for a reason; '' when it said nothing."""
+    with log.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        file.seek(max(file.tell() - 4096, 0))
+        lines = [line.strip() for line in file.read().decode(errors="replace").splitlines()]
+    said = next((line for line in reversed(lines) if line), "")
+    return f", and said: {said[:QUOTED]}" if said else f", and said nothing; see {LOG_FILE}"
+
+
+OneTheta = Mapping[str, float]
+Changes = Mapping[str, tuple[tuple[str, int, int], ...]]
+
+
+@dataclass(frozen=True)
+class CommandRuns:
+    """A command that is ready to run: its words, a digest of it and of its files, when each of these was changed, and
+    where its runs are kept.
+    """
+
+    settings: CommandEngine
+    words: tuple[str, ...]
+    digest: str
+    changed: Changes
+    folder: Path
+
+
+def command_runs(case: Case, folder: Path) -> CommandRuns:
+    """The command of a case, with its runs kept in `engine` below the folder of the case's results.
+
+    Errors: InputError when its program is not there, when it is given no parameter, or on a cluster, whose machines
+    need not have it.
+    """
+    settings = case.engine
+    assert settings is not None
+    if is_taken():
+        raise InputError(
+            f"--cluster: {case.name} runs the command of its `engine`, on this machine only; leave --cluster out, or "
+            "let the command itself hand its work to the cluster."
+        )
+    if not own_parameters(case):
+        raise InputError(
+            f"{shown_path(case.source)}: `engine` expected a parameter that the command is given, got none: those of "
+            "`effects` act in the built-in engine alone. Calibrate something that the command knows, or take `engine` "
+            "out of the config."
+        )
+    words = settings.words(sys.executable)
+    from_here = os.sep in words[0] and not os.path.isabs(words[0])  # but it is started in a folder of its own
+    if from_here or shutil.which(words[0]) is None:
+        raise InputError(
+            f"{shown_path(case.source)}: `engine.command` expected a program that can be run, got {words[0]!r}; "
+            "install it, give its full path, or name it in `engine.files` and make it executable."
+        )
+    changed = _changes(settings)  # first: what changes while it is read is noticed
+    content = [settings.command, {name: digest_of(path) for name, path in settings.files.items()}]
+    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
+    return CommandRuns(settings, words, digest, changed, folder.resolve() / "engine")
+
+
+def _changes(settings: CommandEngine) -> Changes:
+    return {name: last_changes(path) for name, path in settings.files.items()}
+
+
+def _refuse_changed(runs: CommandRuns) -> None:
+    """Errors: InputError when a file of the command is another than when its digest was made."""
+    now = _changes(runs.settings)
+    for name, path in runs.settings.files.items():
+        if now[name] != runs.changed[name]:
+            raise InputError(
+                f"engine.files: expected `{name}` ({shown_path(path)}) to stay while vegglue runs, but it was changed; "
+                "what ran before is kept with what it was then. Run the same command again."
+            )
+
+
+def own_parameters(case: Case) -> tuple[str, ...]:
+    """Names of the parameters that a command is given: all but those that only stand in `effects`, which the built-in
+    engine adds.
+    """
+    of_effects = {value for place, value, _ in values(case) if place[0] == "effects"}
+    elsewhere = {value for place, value, _ in values(case) if place[0] != "effects"}
+    return tuple(name for name in case.parameters if name in elsewhere or name not in of_effects)
+
+
+def ended_runs(
+    runs: CommandRuns, case: Case, station: pd.DataFrame, thetas: Sequence[OneTheta]
+) -> Generator[tuple[int, CommandEnd], None, None]:
+    """The position of each theta and how its run ended, in the order in which they end; those kept come first.
+
+    What is closed early, or stopped by Ctrl-C, stops the runs under way. Errors: StorageError.
+    """
+    stations = stations_text(station)
+    given = [{PARAMETERS_FILE: parameters_text(case, theta), STATIONS_FILE: stations} for theta in thetas]
+    keys = [hashlib.sha256("\n".join([runs.digest, *one.values()]).encode()).hexdigest()[:32] for one in given]
+    first: dict[str, int] = {}
+    for position, key in enumerate(keys):
+        kept = _kept(runs, key, len(station))
+        if kept is not None:
+            yield position, kept
+        elif key in first:  # two of the same wait for one run
+            continue
+        else:
+            first[key] = position
+    with closing(_new_runs(runs, {key: given[at] for key, at in first.items()}, len(station))) as ends:
+        for key, end in ends:
+            yield from ((position, end) for position, same in enumerate(keys) if same == key)
+
+
+def _new_runs(
+    runs: CommandRuns, given: Mapping[str, Mapping[str, str]], stations: int
+) -> Generator[tuple[str, CommandEnd], None, None]:
+    """The key of each run and how it ended; given: its files by key. Of two vegglue in one folder one is refused."""
+    if not given:
+        return
+    with failed_writes_told(runs.folder, MAKE_ROOM):
+        runs.folder.mkdir(parents=True, exist_ok=True)
+    stop = Event()
+    with hold_lock(runs.folder):
+        pool = ThreadPoolExecutor(cores_allowed())
+        try:
+            waiting = {pool.submit(_run, runs, key, files, stations, stop): key for key, files in given.items()}
+            while waiting:
+                ended, _ = wait(waiting, return_when=FIRST_COMPLETED)
+                for one in ended:
+                    yield waiting.pop(one), one.result()
+        finally:
+            stop.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def command_predictions(
+    runs: CommandRuns,
+    case: Case,
+    station: pd.DataFrame,
+    thetas: Sequence[OneTheta],
+    watch: Watch = silent,
+    why: str = "",
+) -> tuple[Array, list[str]]:
+    """Predictions (m, station), NaN where a run failed, and the reason of each, '' where it did not; why: what the runs
+    are for, in the words of a progress line.
+    """
+    found, reasons, failed = np.full((len(thetas), len(station)), np.nan), [""] * len(thetas), 0
+    watch(Progress(why, 0, len(thetas), "runs"))
+    with closing(ended_runs(runs, case, station, thetas)) as ends:
+        for done, (position, end) in enumerate(ends, 1):
+            reasons[position] = end.reason
+            if end.prediction is None:
+                failed += 1
+            else:
+                found[position] = end.prediction
+            watch(Progress(why, done, len(thetas), "runs", failed))
+    return found, reasons
+
+
+def _kept(runs: CommandRuns, key: str, stations: int) -> CommandEnd | None:
+    """What is kept of a finished run; None where nothing is, or nothing sound."""
+    try:
+        found = json.loads(read_text(runs.folder / f"{key}.json", LARGEST_JSON))
+        prediction, seconds = np.array(found["prediction"], dtype=float), float(found["seconds"])
+    except (InputError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    sound = prediction.shape == (stations,) and bool(np.isfinite(prediction).all())
+    return CommandEnd(prediction, "", seconds) if sound else None
+
+
+def _run(runs: CommandRuns, key: str, given: Mapping[str, str], stations: int, stop: Event) -> CommandEnd:
+    if stop.is_set():
+        return CommandEnd(None, "the command was not started", 0.0)
+    folder, settings = runs.folder / key, runs.settings
+    end = run_command_once(runs.words, folder, given, stations, settings.timeout, stop)
+    if end.prediction is None:
+        return end
+    _refuse_changed(runs)
+    text = json.dumps({"prediction": end.prediction.tolist(), "seconds": round(end.seconds, 3)})
+    write_text(runs.folder / f"{key}.json", text, MAKE_ROOM)
+    if settings.keep == "failed":
+        shutil.rmtree(folder, ignore_errors=True)
+    return end

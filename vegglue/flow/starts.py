@@ -1,0 +1,94 @@
+"""States to begin from: a backwater curve, and a state from a coarser grid."""
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.effects import physical_constants
+from vegglue.flow.closures import bed_drag, drag
+from vegglue.flow.equations import cell_depths
+from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem
+
+# Largest slope of the energy line [-]: above it the estimate in one dimension would run away from the bed. Chosen, not
+# measured, twenty times that of a bed of 1 in 1,000; it decides where Newton starts, not where it ends.
+STEEPEST = 0.02
+
+
+def backwater(problem: Problem) -> Array:
+    """dz_s/dx = -(Q / K)^2 from the outlet upstream, K = sum C h^(3/2) dy, u = C sqrt(h S): a state (nx, 3, ny, m).
+
+    Chow (1959), Open-Channel Hydraulics, ch. 9; Q is what has entered upstream of each section, C that of the bed alone
+    (patches of plants rarely fill a section). Only a start.
+    """
+    (nx, ny), m = problem.shape, problem.members
+    state = np.zeros((nx, 3, ny, m))
+    discharge = _discharge(problem)
+    level, bed = problem.boundaries.outlet_level.copy(), problem.bed[:, :, None]
+    bed = bed + problem.bed_rise if problem.bed_rise.size else bed
+    for i in range(nx - 1, -1, -1):
+        depth = np.maximum(level - bed[i], 0.0) + 0.01 * problem.film
+        chezy = np.sqrt(physical_constants.GRAVITY / (bed_drag(problem, depth[None], slice(i, i + 1))[0] * depth))
+        wet = np.where(depth > problem.film, depth, 0.0)
+        conveyance = (chezy * wet**1.5).sum(axis=0) * problem.dy + 1e-9
+        slope = np.minimum((discharge[i] / conveyance) ** 2, STEEPEST)
+        state[i, LEVEL], state[i, ALONG] = level, chezy * np.sqrt(wet * slope)
+        level = np.maximum(level + slope * problem.dx, bed[i].min(axis=0) + 10.0 * problem.film)
+    return state
+
+
+def _discharge(problem: Problem) -> Array:
+    """Discharge through every cross-section (nx, m) [m3/s]: what enters at or above it."""
+    discharge = np.zeros((problem.shape[0], problem.members))
+    for inflow in problem.boundaries.inflows:
+        if inflow.side == "west":
+            discharge += inflow.discharge
+            continue
+        share = np.clip((np.arange(problem.shape[0]) - inflow.start + 1) / (inflow.stop - inflow.start), 0.0, 1.0)
+        discharge += share[:, None] * inflow.discharge
+    return discharge
+
+
+# How u goes with friction from cells to finer ones, u ~ k^-SHARE [-]. Where friction alone balances the slope it is a
+# half; water that mixes with what flows beside changes by less. On a channel with banks, 9,600 cells, lifted flows are
+# off by 0.019 m/s with 0 (median of 32 members, root of the mean square), 0.009 with 0.25 and 0.3, 0.012 with a half.
+SHARE = 0.3
+
+
+def on_grid(state: Array, shape: tuple[int, int]) -> Array:
+    """A state (nx, 3, ny, m) on a grid of `shape` (nx, ny), along each axis its own or twice as many cells.
+
+    Levels are those of the cell around; velocities on new faces are the mean of both neighbours.
+    """
+    if shape[0] == 2 * state.shape[0]:
+        state = _shorter(state)
+    return _narrower(state) if shape[1] == 2 * state.shape[2] else state
+
+
+def lifted_flows(coarse: Problem, state: Array, fine: Problem) -> Array:
+    """As `on_grid`, but u times (k_coarse / k_fine)^SHARE, k the friction rate [1/m] of the laws of bed and plants:
+    finer cells have another beside a waterline and at the edges of plants. State (nx, 3, ny, m), of the same members.
+    """
+    lifted = on_grid(state, fine.shape)
+    before, after = drag(coarse, cell_depths(coarse, state)), drag(fine, cell_depths(fine, lifted))
+    faster = (_in_each_cell(before, fine.shape) / after) ** SHARE
+    lifted[:-1, ALONG] *= 0.5 * (faster[:-1] + faster[1:])
+    lifted[-1, ALONG] *= faster[-1]
+    return lifted
+
+
+def _in_each_cell(values: Array, shape: tuple[int, int]) -> Array:
+    """Values of cells (nx, ny, m) in the finer ones that they hold."""
+    return values.repeat(shape[0] // values.shape[0], axis=0).repeat(shape[1] // values.shape[1], axis=1)
+
+
+def _shorter(coarse: Array) -> Array:
+    """On cells of half the length."""
+    fine = np.repeat(coarse, 2, axis=0)
+    fine[2::2, ALONG] = 0.5 * (fine[1:-1:2, ALONG] + fine[3::2, ALONG])
+    return fine
+
+
+def _narrower(coarse: Array) -> Array:
+    """On cells of half the width."""
+    fine = np.repeat(coarse, 2, axis=2)
+    fine[:, ACROSS, 1:-1:2] = 0.5 * (fine[:, ACROSS, :-2:2] + fine[:, ACROSS, 2::2])
+    return fine
