@@ -3,12 +3,21 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from vegglue.case.config import load_case
 from vegglue.errors import InputError
 from vegglue.measurements import observations
-from vegglue.measurements.observations import STATION_COLUMNS, fitted_curve, read_observations
+from vegglue.measurements.observations import (
+    POINT_TYPES,
+    PROFILE_TYPES,
+    STATION_COLUMNS,
+    STATION_TYPES,
+    fitted_curve,
+    read_observations,
+    station_table,
+)
 
 ROOT = Path(__file__).parents[2]
 CASES = {name: load_case(ROOT / "configs" / f"{name}.yaml") for name in ("d0", "d3a", "d3b")}
@@ -41,6 +50,30 @@ def test_every_vertical_is_a_station_and_only_the_dead_probe_is_not_used(name, v
     assert table["used"].sum() == used
     assert (table["used"] == (table["reason"] == "")).all()
     assert table["standard_error"].between(0.01, 0.05).all()
+
+
+def types_of(table):
+    """Text, or the type of numpy, of each column."""
+    return {name: str if pd.api.types.is_string_dtype(one) else one.type for name, one in table.dtypes.items()}
+
+
+@pytest.mark.parametrize("case", [*CASES.values(), CASES["d0"].model_copy(update={"observations": ()})])
+def test_tables_have_the_types_that_all_code_relies_on(case):
+    """Nothing measured included: `~table["used"]` of a column of objects would be no mask."""
+    read = read_observations(case)
+    for table, wanted in ((read.table, STATION_TYPES), (read.points, POINT_TYPES), (read.profiles, PROFILE_TYPES)):
+        found = types_of(table)
+        assert {name: np.dtype(one).type if one is not str else str for name, one in wanted.items()}.items() <= (
+            found.items()
+        )
+        assert not table[[name for name, one in wanted.items() if one is str]].isna().any(axis=None)
+
+
+def test_a_table_of_stations_is_made_of_rows_of_any_type():
+    rows = READ["d0"].table.astype(object).assign(more=1)
+    assert station_table(rows, rows.iloc[:0]).equals(READ["d0"].table)
+    with pytest.raises(KeyError, match="device"):
+        station_table(rows.drop(columns="device"))
 
 
 def test_dead_probe_is_flagged_and_kept_with_all_its_points():

@@ -127,7 +127,7 @@ def acting_in(effect: Effect, kind: str, names: tuple[str, ...]) -> Candidate:
 
 def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
     """Experiments, sections with used velocities, used devices, and patches: an effect may act in one of them alone."""
-    used = station[station["used"].to_numpy(bool)]
+    used = station[station["used"]]
     velocity = used[velocity_rows(used)]
     return {
         "experiment": list(case.experiments),

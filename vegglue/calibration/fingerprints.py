@@ -205,7 +205,7 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
     every = [(one, shapes) for one, settings in zip(candidates, tried, strict=True) for shapes in settings]
     causes = [cause_of(model.case, one, shapes) for one, shapes in every]
     values = responses(model, point, causes)
-    for column in np.flatnonzero(~np.isfinite(values[model.station["used"].to_numpy(bool)]).all(axis=0)):
+    for column in np.flatnonzero(~np.isfinite(values[model.station["used"].to_numpy()]).all(axis=0)):
         raise InputError(f"The effect `{every[column][0].name}` gives what is no finite number; mend it.")
     return Fingerprints(
         point=point,

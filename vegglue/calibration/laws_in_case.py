@@ -162,7 +162,7 @@ def centre_cells(model: Model, point: Point, experiment: str) -> Cells:
 def at_sections(model: Model, cells: Cells, experiment: str) -> Cells:
     """The same, dry but for the columns in which velocities were measured."""
     station, grid = model.station_of(experiment), model.site.grid
-    x = station["x"].to_numpy(float)[velocity_rows(station) & station["used"].to_numpy(bool)]
+    x = station["x"].to_numpy(float)[velocity_rows(station) & station["used"].to_numpy()]
     measured = np.zeros((grid.x.size, 1, 1), dtype=bool)
     measured[np.abs(grid.x[:, None] - x).argmin(axis=0)] = True
     return replace(cells, depth=np.where(measured, cells.depth, 0.0))

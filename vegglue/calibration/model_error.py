@@ -319,7 +319,7 @@ def _areas(grid: Grid, over: Bumps) -> Array:
 
 def _weights_of(model: Model) -> Array:
     """1 / s^2 of each station in use [per its unit squared], 0 of others and where no standard error s is told."""
-    error = model.station["standard_error"].where(model.station["used"].astype(bool))
+    error = model.station["standard_error"].where(model.station["used"])
     return np.nan_to_num(error.to_numpy(float) ** -2.0)
 
 

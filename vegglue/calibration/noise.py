@@ -82,7 +82,7 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
 
     Errors: InputError when a used station has neither.
     """
-    used = station[station["used"].to_numpy(bool)]
+    used = station[station["used"]]
     if used.empty:
         raise InputError("observations: no station is used, nothing can be inferred; `vegglue check` says why.")
     error = used["standard_error"].to_numpy(float).copy()
@@ -91,7 +91,7 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
     if not (error > 0).all():
         raise InputError(f"observations: {unstated_errors(used.assign(standard_error=error))}")
     zero = np.zeros(len(used))
-    rows = np.flatnonzero(station["used"].to_numpy(bool))
+    rows = np.flatnonzero(station["used"].to_numpy())
     value = used["value"].to_numpy(float)
     certain = np.array([[0.0], [1.0]])
     return _with_cholesky(
@@ -189,7 +189,7 @@ def _separation(used: pd.DataFrame) -> Array:
     separation = np.full((len(used), len(used)), np.inf)
     np.fill_diagonal(separation, 0.0)
     correlated = np.array([kind_of(str(name)).correlated for name in used["kind"]], dtype=bool)
-    keys = used[["experiment", "section", "kind"]].astype(str).agg("\n".join, axis=1).to_numpy()
+    keys = used[["experiment", "section", "kind"]].agg("\n".join, axis=1).to_numpy()
     own = used[["x", "y"]].to_numpy(float)
     in_line = np.column_stack([section_places(used).to_numpy(float), own[:, 1]])
     for key in np.unique(keys[correlated]):

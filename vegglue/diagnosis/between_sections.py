@@ -22,6 +22,7 @@ from vegglue.decision_constants import constants
 from vegglue.diagnosis.field_scan import free_of_prior
 from vegglue.engine.interface import linearise, predict
 from vegglue.measurements.kinds import leading_velocities
+from vegglue.measurements.observations import station_table
 from vegglue.measurements.sections import section_places
 
 # Share of the cases in which the errors are to be smaller than what is told, and draws of them: the 95 % point of 2,000
@@ -92,7 +93,7 @@ def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
 def _errors_between(where: SearchModel) -> tuple[Array, Array] | None:
     """Mean (m,) and covariance (m, m) of e [m/s], None where no flow is found."""
     model, noise = where.model, where.noise
-    both = pd.concat([model.station, halfway(model.station, model.case.grid.x[1])], ignore_index=True)
+    both = station_table(model.station, halfway(model.station, model.case.grid.x[1]))
     wide, count = replace(model, station=both), len(model.station)
     point = linearise(wide, where.point.z, where.point)
     if point is None or len(both) == count:

@@ -74,12 +74,12 @@ def _with_possible_levels(case: Case, site: Site, observations: Observations) ->
     """Without levels that are told as absurd: that water rises from such a gauge to the next follows from it."""
     table = observations.table
     absurd = implausible_levels(case, site, table).to_numpy(bool)
-    return replace(observations, table=table.assign(used=table["used"].astype(bool) & ~absurd))
+    return replace(observations, table=table.assign(used=table["used"] & ~absurd))
 
 
 def _doubted_levels(case: Case, observations: Observations, possible: Observations) -> set[str]:
     """Experiments with an absurd level, or whose levels rise downstream. possible: without the former."""
-    absurd = observations.table["used"].astype(bool) & ~possible.table["used"].astype(bool)
+    absurd = observations.table["used"] & ~possible.table["used"]
     return {*observations.table.loc[absurd, "experiment"].astype(str), *rising_levels(case, possible)}
 
 

@@ -35,8 +35,8 @@ def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
     model, noise, point = base.model, base.noise, base.fitted.point
     used = model.station.iloc[noise.rows]
     velocity = leading_velocities(used)
-    section, spread = _held_out(base, used["section"].astype(str).to_numpy())
-    experiment, _ = _held_out(base, used["experiment"].astype(str).to_numpy())
+    section, spread = _held_out(base, used["section"].to_numpy())
+    experiment, _ = _held_out(base, used["experiment"].to_numpy())
     clusters = tuple((str(e), str(s)) for e, s in zip(used["experiment"], used["section"], strict=True))
     return ModelScore(
         name=model.case.name,

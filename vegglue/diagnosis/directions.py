@@ -65,7 +65,7 @@ def misdirected(case: Case, observations: Observations) -> tuple[str, ...]:
 
 
 def _by_experiment(case: Case, observations: Observations) -> dict[str, pd.DataFrame]:
-    used = observations.table[observations.table["used"].astype(bool)]
+    used = observations.table[observations.table["used"]]
     return {name: used[used["experiment"] == name] for name in case.experiments}
 
 

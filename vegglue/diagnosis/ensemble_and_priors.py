@@ -33,14 +33,14 @@ def remarks_on_ensemble(case: Case, observations: Observations) -> Iterator[str]
     if not len(table):
         yield "There are no observations: an ensemble can be simulated, but nothing inferred from it."
         return
-    used = table[table["used"].astype(bool)]
+    used = table[table["used"]]
     if len(used) < len(case.parameters):
         yield f"{len(used)} used observations cannot settle {len(case.parameters)} parameters."
     yield from refused_for_errors(case, table)
     for name in case.experiments:
         if not (used["experiment"] == name).any():
             yield f"Experiment {name} has no used observation: it is simulated, and tells nothing about the parameters."
-    for row in table[~table["used"].astype(bool) & (table["reason"] != OUTSIDE)].to_dict("records"):
+    for row in table[~table["used"] & (table["reason"] != OUTSIDE)].to_dict("records"):
         yield f"The {station_in_words(row)} is not used: {row['reason']}."
 
 

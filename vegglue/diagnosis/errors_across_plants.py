@@ -44,8 +44,8 @@ def remarks_on_errors_across_plants(case: Case, observations: Observations) -> I
 def _widened(observations: Observations, one: Observation) -> _Widened | None:
     key, profiles = (str(one.experiment), str(one.section)), observations.profiles
     own = profiles[(profiles["experiment"] == key[0]) & (profiles["section"] == key[1])]
-    own = own[own["used"].astype(bool)].sort_values("y")
-    plants = own["plants"].astype(bool)
+    own = own[own["used"]].sort_values("y")
+    plants = own["plants"]
     if plants.nunique() < 2:
         return None
     error, points = observations.neighbour_error[key], float(average_of(own, str(one.average))[1].median())

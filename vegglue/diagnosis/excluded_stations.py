@@ -30,7 +30,7 @@ def without_stations(station: pd.DataFrame, aside: pd.DataFrame) -> pd.DataFrame
     """A table of stations, with these measurements not used."""
     known = set(aside.itertuples(index=False, name=None))
     there = np.array([row in known for row in station[MEASUREMENT].itertuples(index=False, name=None)], dtype=bool)
-    there &= station["used"].to_numpy(bool)
+    there &= station["used"].to_numpy()
     return station.assign(used=station["used"].mask(there, False), reason=station["reason"].mask(there, SET_ASIDE))
 
 

@@ -23,7 +23,7 @@ def stretch_in_words(case: Case, station: pd.DataFrame) -> str:
     effects = [effect_of(case, name) for name in case.effects]
     law = [one for one in effects if one.stage in ALONG_THE_CHANNEL and "search" not in one.tags]
     along = [*dict.fromkeys(one.name for one in law)]
-    used = station["x"][velocity_rows(station) & station["used"].to_numpy(bool)]
+    used = station["x"][velocity_rows(station) & station["used"].to_numpy()]
     whole = case.grid.x[1] - case.grid.x[0]
     if not along or used.empty or used.max() - used.min() >= SMALL_PART * whole:
         return ""

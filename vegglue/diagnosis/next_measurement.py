@@ -27,6 +27,7 @@ from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
+from vegglue.measurements.observations import station_table
 from vegglue.measurements.sections import section_places
 from vegglue.wording.numbers import in_digits
 
@@ -86,7 +87,7 @@ def worth_of_measurements(
     covariance = np.diag(_errors(wide.station, noise) ** 2) + own_error @ own_error.T
     traces = responses(wide, point, changed) * np.array([gain for _, _, gain in every])
     known = np.zeros(len(wide.station), dtype=bool)
-    known[: len(model.station)] = model.station["used"].to_numpy(bool)
+    known[: len(model.station)] = model.station["used"].to_numpy()
     ends = np.cumsum([len(question) for question in questions])
     own = [traces[:, end - len(question) : end] for end, question in zip(ends, questions, strict=True)]
     return [_worths(plans, known, covariance, point.slope, part) for part in own]
@@ -122,7 +123,7 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
         plans.append(MeasurementPlan(plan_name, rows, table, hours, x, experiment))
         tables.append(table)
         count += len(table)
-    return replace(wide, station=pd.concat(tables, ignore_index=True)), plans
+    return replace(wide, station=station_table(*tables)), plans
 
 
 def _with_beds(model: Model, case: Case) -> Site:

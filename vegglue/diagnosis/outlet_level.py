@@ -47,7 +47,7 @@ def remarks_on_outlet_levels(case: Case, site: Site, observations: Observations)
 
 def _low(case: Case, site: Site, table: pd.DataFrame, experiment: str) -> _Low | None:
     """Of the last gauge, if its velocity head, RISE_BY_CHANCE and its errors do not explain how low it stands."""
-    here = table["used"].astype(bool) & (table["experiment"] == experiment) & (table["kind"] == WATER_LEVEL)
+    here = table["used"] & (table["experiment"] == experiment) & (table["kind"] == WATER_LEVEL)
     gauges = table[here]
     if gauges.empty:
         return None

@@ -25,7 +25,7 @@ ON_THE_EDGE = 0.02
 def remarks_on_stations(case: Case, site: Site, observations: Observations) -> Iterator[str]:
     """Stations outside the grid or above the expected water; of each experiment in one sentence."""
     table = observations.table
-    outside = (table["reason"] == OUTSIDE).to_numpy(bool)
+    outside = (table["reason"] == OUTSIDE).to_numpy()
     for experiment, rows in table[outside].groupby("experiment", sort=False):
         yield f"{_places_in_words(rows, str(experiment))} outside the grid, and not used."
     yield from (_land_in_words(*one) for one in _on_land(case, site, table))
@@ -33,7 +33,7 @@ def remarks_on_stations(case: Case, site: Site, observations: Observations) -> I
 
 def remarks_on_shared_places(observations: Observations) -> Iterator[str]:
     """Stations in use where another of their kind and experiment stands: a file may be a copy, or a place wrong."""
-    table = observations.table[observations.table["used"].astype(bool)]
+    table = observations.table[observations.table["used"]]
     table = table[np.array([kind_of(str(kind)).at_point for kind in table["kind"]], dtype=bool)]
     shared = table[table.duplicated(["experiment", "kind", "x", "y"], keep=False)]
     for (experiment, kind), rows in shared.groupby(["experiment", "kind"], sort=False):
@@ -58,7 +58,7 @@ def _on_land(case: Case, site: Site, table: pd.DataFrame) -> Iterator[tuple[str,
     """
     dry_ones = dry_outlets(case, site)
     at_point = np.array([kind_of(str(kind)).at_point for kind in table["kind"]], dtype=bool)
-    inside = table[(table["reason"] != OUTSIDE).to_numpy(bool) & at_point]
+    inside = table[(table["reason"] != OUTSIDE).to_numpy() & at_point]
     for experiment, rows in inside[~inside["experiment"].isin(list(dry_ones))].groupby("experiment", sort=False):
         now = in_experiment(site, str(experiment))
         depth = expected_depth(case, now, case.experiments[str(experiment)])
@@ -79,7 +79,7 @@ def _land_in_words(experiment: str, dry: pd.DataFrame, most: bool) -> str:
 def remarks_on_exchanged_axes(case: Case, observations: Observations) -> Iterator[str]:
     """Velocities of which most are outside the grid, and would all lie inside, were x and y exchanged."""
     table = observations.table[velocity_rows(observations.table)]
-    lost = table[(table["reason"] == OUTSIDE).to_numpy(bool)]
+    lost = table[(table["reason"] == OUTSIDE).to_numpy()]
     (west, east), (south, north) = case.grid.x, case.grid.y
     turned = lost["y"].between(west, east) & lost["x"].between(south, north)
     if 2 * len(lost) > len(table) and turned.all():
@@ -126,7 +126,7 @@ def remarks_on_absurd_values(case: Case, site: Site, observations: Observations)
     """
     table, exchanged = observations.table, exchanged_components(case, observations)
     told = velocity_rows(table) & table["experiment"].isin(exchanged).to_numpy(bool)
-    yield from map(sentence, implausible_values(case, site, table.assign(used=table["used"].astype(bool) & ~told)))
+    yield from map(sentence, implausible_values(case, site, table.assign(used=table["used"] & ~told)))
 
 
 def station_in_words(row: Mapping[Hashable, Any]) -> str:

@@ -38,7 +38,7 @@ class _Turned:
 def remarks_on_turned_velocities(case: Case, observations: Observations) -> Iterator[str]:
     """Experiments whose velocities are turned to one side at nearly all sections; none with odd directions besides."""
     table, odd = observations.table, misdirected(case, observations)
-    used = table[table["used"].astype(bool)]
+    used = table[table["used"]]
     angles = {name: _angles(used[used["experiment"] == name]) for name in case.experiments if name not in odd}
     turned = {name: one for name, one in angles.items() if _to_one_side(one.angles)}
     straight = {name: one for name, one in angles.items() if name not in turned}

@@ -23,7 +23,7 @@ def remarks_on_units_of_places(case: Case, observations: Observations) -> Iterat
     table = observations.table[velocity_rows(observations.table)]
     if case.frame is not None or case.grid.centreline is not None or not len(table):
         return
-    lost = table[(table["reason"] == OUTSIDE).to_numpy(bool)]
+    lost = table[(table["reason"] == OUTSIDE).to_numpy()]
     unit = fitting_unit(case, table)
     if 2 * len(lost) > len(table) and unit is not None:
         yield (

@@ -22,7 +22,7 @@ def remarks_on_heights(observations: Observations) -> Iterator[str]:
     points = observations.points
     if points.empty:
         return
-    open_ones = points[points["used"].astype(bool) & ~points["plants"].astype(bool)]
+    open_ones = points[points["used"] & ~points["plants"]]
     falling = [
         (x, y, float(np.polyfit(some["height"], some["u"], 1)[0]) < 0.0)
         for (_, _, x, y), some in open_ones.groupby(["experiment", "section", "x", "y"], sort=False)
@@ -64,7 +64,7 @@ def remarks_on_exchanged_heights(case: Case, observations: Observations) -> Iter
 
 def _as_if_exchanged(points: pd.DataFrame) -> Iterator[tuple[float, float, bool]]:
     """Of each vertical outside plants: x, y [m], and whether u/u_top < z/z_top at all points but the top one."""
-    open_ones = points[points["used"].astype(bool) & ~points["plants"].astype(bool)]
+    open_ones = points[points["used"] & ~points["plants"]]
     for (x, y), some in open_ones.groupby(["x", "y"], sort=False):
         if some["height"].nunique() > 1:
             upward = some.sort_values("height")[["height", "u"]].to_numpy(float)

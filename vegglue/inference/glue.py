@@ -75,7 +75,7 @@ def fit_members(prediction: Array, station: pd.DataFrame, rule: str) -> MemberFi
         sigma=sigma if errors is None else {kind: root_mean_square(errors[rows]) for kind, rows in kinds.items()},
         noise=noise,
         efficiency=efficiency(residual, station),
-        log_likelihood=_log_likelihood(residual, noise, station["used"].to_numpy(bool)),
+        log_likelihood=_log_likelihood(residual, noise, station["used"].to_numpy()),
     )
 
 

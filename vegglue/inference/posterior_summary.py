@@ -251,7 +251,7 @@ def goodness_of_fit(
     noise, and best, the predictions of the best member: (station,); model_band: (level, station).
     """
     value, errors = station["value"].to_numpy(float), station["standard_error"].to_numpy(float)
-    used, kinds = station["used"].to_numpy(bool), stations_by_kind(station)
+    used, kinds = station["used"].to_numpy(), stations_by_kind(station)
     residual, best_residual = value - model_band[LEVELS.index(0.5)], value - best
     return GoodnessOfFit(
         used=int(used.sum()),

@@ -131,9 +131,9 @@ def _groups_left_out(left: Array, precision: Array, weights: Array, used: pd.Dat
 
 def groups_left_out(used: pd.DataFrame) -> dict[str, np.ndarray]:
     """Rows of each section of each experiment, then of each experiment; none where there is only one of them."""
-    names = used["experiment"].astype(str).to_numpy()
-    sections = used["section"].astype(str).to_numpy()
-    sections = np.where(sections == "", used["kind"].astype(str) + "s", sections)
+    names = used["experiment"].to_numpy()
+    sections = used["section"].to_numpy()
+    sections = np.where(sections == "", used["kind"] + "s", sections)
     named = np.array([f"{a} {b}" for a, b in zip(names, sections, strict=True)])
     found: dict[str, np.ndarray] = {}
     for labels, word in ((named, ""), (names, "experiment ")):

@@ -169,5 +169,5 @@ def root_mean_square(values: Array) -> float:
 
 def stations_by_kind(station: pd.DataFrame) -> dict[str, NDArray[np.intp]]:
     """Rows of the used stations by kind of measurement."""
-    used = station["used"].to_numpy(bool)
+    used = station["used"].to_numpy()
     return {str(kind): np.flatnonzero(used & (station["kind"] == kind)) for kind in station["kind"][used].unique()}

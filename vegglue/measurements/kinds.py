@@ -86,7 +86,7 @@ def leading_velocities(station: pd.DataFrame) -> NDArray[np.bool_]:
 
     Errors: InputError for an unknown kind.
     """
-    used = station["used"].to_numpy(bool)
+    used = station["used"].to_numpy()
     along = used & (station["kind"] == STREAMWISE).to_numpy()
     return along if along.any() else used & velocity_rows(station)
 
@@ -99,14 +99,14 @@ def errors_in_short(by_kind: Mapping[str, float]) -> str:
 
 def stations_in_short(station: pd.DataFrame) -> str:
     """`18 stations, in use 15 of velocity, 2 of level`."""
-    used = station[station["used"].to_numpy(bool)]
+    used = station[station["used"]]
     counts = [f"{(used['kind'] == name).sum()} of {kind_of(name).words}" for name in dict.fromkeys(station["kind"])]
     return f"{so_many(len(station), 'station')}, in use {', '.join(counts) or 'none'}"
 
 
 def unstated_errors(station: pd.DataFrame) -> str | None:
     """Which of the used stations state no standard error, and what to write where; None where all do."""
-    used = station[station["used"].to_numpy(bool)]
+    used = station[station["used"]]
     bare = used[~(used["standard_error"].to_numpy(float) > 0)]
     if bare.empty:
         return None

@@ -1,5 +1,6 @@
 """What was measured: ADV points, and stations of every kind that can be read as they are, as one table."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,19 +19,22 @@ from vegglue.measurements.kinds import KINDS, STREAMWISE, TRANSVERSE, WATER_LEVE
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
 
-STATION_COLUMNS = (
-    "experiment",
-    "kind",
-    "section",
-    "x",
-    "y",
-    "value",
-    "standard_error",
-    "used",
-    "reason",
-    "depth",
-    "device",
-)
+# Columns of every table of stations, of ADV points and of verticals, with their types; points may have more, as in
+# their file (v, u_se, ...).
+STATION_TYPES: dict[str, type] = {
+    "experiment": str, "kind": str, "section": str, "x": float, "y": float, "value": float, "standard_error": float,
+    "used": bool, "reason": str, "depth": float, "device": str,
+}  # fmt: skip
+STATION_COLUMNS = tuple(STATION_TYPES)
+POINT_TYPES: dict[str, type] = {
+    "experiment": str, "section": str, "device": str, "x": float, "y": float, "z": float, "bed": float, "depth": float,
+    "height": float, "plants": bool, "u": float, "u_std": float, "standard_error": float, "used": bool, "reason": str,
+}  # fmt: skip
+PROFILE_TYPES: dict[str, type] = {
+    "experiment": str, "section": str, "x": float, "y": float, "bed": float, "depth": float, "plants": bool,
+    "device": str, "points": int, "used": bool, "reason": str, "law": str, "linear": float, "linear_error": float,
+    "fitted": float, "fitted_error": float, "within": float, "slope": float, "top": float, "scatter": float,
+}  # fmt: skip
 OUTSIDE = "it is outside the grid"
 SET_ASIDE = "the diagnosis set it aside"
 # Readings and their errors, in the SI unit of whatever kind: beyond them lies nothing that is measured in a stream, and
@@ -43,14 +47,15 @@ Key = tuple[str, str]  # names of experiment and section
 class Observations:
     """All measurements of a case. x, y in the coordinates of the model grid [m]; SI throughout.
 
-    table: one row for each station, columns STATION_COLUMNS; value and standard_error in the unit of their kind (see
+    table: one row for each station, columns STATION_COLUMNS with their STATION_TYPES, see `station_table`: code that
+    reads it needs no conversion of types; value and standard_error in the unit of their kind (see
     kinds.py), standard_error and depth NaN when unknown; a discharge has no y of its own, and is drawn at the one
     given; a station with used = False is not calibrated to, says why in `reason`, and may have the value NaN.
-    points: every ADV point: experiment, section, device, x, y, z and bed (datum of the file), depth, height above the
-    bed, plants (inside a patch), u, u_std (NaN when unknown), standard_error, used, reason.
-    profiles: every vertical: experiment, section, x, y, bed (datum of the file), depth, plants, device, points, linear
-    and linear_error (the rule `paper`), fitted and fitted_error (profile fit), law of the fit, within, slope, top and
-    scatter (see vertical_profile.ProfileFit; NaN without a fit), used, reason.
+    points: every ADV point, POINT_TYPES: z and bed in the datum of the file, height above the bed, plants (inside a
+    patch), u_std NaN when unknown.
+    profiles: every vertical, PROFILE_TYPES: points (how many), linear and linear_error (the rule `paper`), fitted and
+    fitted_error (profile fit), law of the fit, within, slope, top and scatter (see vertical_profile.ProfileFit; NaN
+    without a fit).
     discharge: by (experiment, section), then by rule, `paper` and `profile`.
     neighbour_error: by (experiment, section), the error of one vertical estimated from its neighbours [m/s]. Where it
     is larger than the error from the points of the vertical, it contains what these do not show (position, stems). It
@@ -66,6 +71,34 @@ class Observations:
     canopy_height: dict[Key, CanopyHeight]
 
 
+def station_table(*parts: pd.DataFrame) -> pd.DataFrame:
+    """One table of stations of several: the only maker of tables that are calibrated to, predicted or read from a file.
+
+    Parameters
+    ----------
+    *parts : DataFrame
+        Rows with the columns STATION_COLUMNS; none for an empty table.
+
+    Returns
+    -------
+    DataFrame
+        Columns STATION_COLUMNS in their order, with the dtypes STATION_TYPES: text is str and never missing, `used` is
+        bool, numbers are float64 and NaN if unknown. Rows are numbered from 0.
+
+    Raises
+    ------
+    KeyError
+        If a column is missing.
+    """
+    return _typed(parts, STATION_TYPES)[list(STATION_COLUMNS)]
+
+
+def _typed(parts: Sequence[pd.DataFrame], types: Mapping[str, type]) -> pd.DataFrame:
+    if not parts:
+        return pd.DataFrame({name: pd.Series(dtype=one) for name, one in types.items()})
+    return pd.concat(parts, ignore_index=True).astype(types)
+
+
 def read_observations(case: Case) -> Observations:
     """Read every file of measurements that the case names, judge their quality, and average verticals over the depth.
 
@@ -75,9 +108,8 @@ def read_observations(case: Case) -> Observations:
     """
     sections: dict[Key, Section] = {}
     stations = []
-    gauges = _joined(
-        [_read_stations(case, one, kind_of(WATER_LEVEL)) for one in case.observations if one.kind == WATER_LEVEL]
-    )
+    levels = [one for one in case.observations if one.kind == WATER_LEVEL]
+    gauges = station_table(*(_read_stations(case, one, kind_of(WATER_LEVEL)) for one in levels))
     for observation in case.observations:
         if observation.kind == "adv":
             key = (str(observation.experiment), str(observation.section))
@@ -97,13 +129,13 @@ def read_observations(case: Case) -> Observations:
             f"{shown_path(case.source)}: expected at most {MOST_STATIONS:,} stations, got {number:,}: average "
             "those that lie close together, or leave some out."
         )
-    table = _within_the_grid(case, _joined(stations))
+    table = _within_the_grid(case, station_table(*stations))
     _refuse_measured_twice(case, table)
     refuse_unknown_limits(case, table)
     return Observations(
         table=table,
-        points=_joined([section.points for section in sections.values()]),
-        profiles=_joined([section.profiles for section in sections.values()]),
+        points=_typed([section.points for section in sections.values()], POINT_TYPES),
+        profiles=_typed([section.profiles for section in sections.values()], PROFILE_TYPES),
         discharge={key: section.discharge for key, section in sections.items()},
         neighbour_error={key: section.neighbour_error for key, section in sections.items()},
         canopy_height={key: section.canopy_height for key, section in sections.items() if section.canopy_height},
@@ -112,13 +144,11 @@ def read_observations(case: Case) -> Observations:
 
 def _within_the_grid(case: Case, table: pd.DataFrame) -> pd.DataFrame:
     """Stations with those outside the grid not used: the model knows nothing there. A discharge has no y of its own."""
-    if not len(table):
-        return table
     (west, east), (south, north) = case.grid.x, case.grid.y
-    at_point = np.array([kind_of(name).at_point for name in table["kind"]])
+    at_point = np.array([kind_of(name).at_point for name in table["kind"]], dtype=bool)
     inside = table["x"].between(west, east) & (table["y"].between(south, north) | ~at_point)
-    lost = table["used"].astype(bool) & ~inside
-    return table.assign(used=table["used"].astype(bool) & inside, reason=table["reason"].mask(lost, OUTSIDE))
+    lost = table["used"] & ~inside
+    return table.assign(used=table["used"] & inside, reason=table["reason"].mask(lost, OUTSIDE))
 
 
 def _refuse_measured_twice(case: Case, table: pd.DataFrame) -> None:
@@ -154,10 +184,6 @@ def fitted_curve(profile: "pd.Series[float]") -> ProfileFit | None:
     return ProfileFit(profile["within"], profile["slope"], profile["top"], np.full((3, 3), np.nan), profile["scatter"])
 
 
-def _joined(frames: list[pd.DataFrame]) -> pd.DataFrame:
-    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(STATION_COLUMNS))
-
-
 def _averaged(section: Section, observation: Observation) -> pd.DataFrame:
     """Stations from the verticals of a section, by the rule the case has chosen.
 
@@ -186,7 +212,7 @@ def _averaged_across(section: Section, observation: Observation) -> pd.DataFrame
     averages = across_averages(section.points)
     profiles = section.profiles.reset_index(drop=True).assign(kind=TRANSVERSE, value=averages["value"])
     error = averages["standard_error"] if observation.standard_error is None else observation.standard_error
-    known = profiles["value"].notna() | ~profiles["used"].astype(bool)
+    known = profiles["value"].notna() | ~profiles["used"]
     return profiles.assign(standard_error=error).loc[known, list(STATION_COLUMNS)]
 
 

@@ -175,7 +175,7 @@ def implausible_values(case: Case, site: Site, station: pd.DataFrame) -> list[Im
     |u| against U = Q / A, levels against the outlet's, the bed and the thickest growth, errors against both; see
     `plausible_flow`. station: as Observations.table [SI].
     """
-    used = station[station["used"].astype(bool)]
+    used = station[station["used"]]
     outlets, wrong = _judged(case, site, used)
     found: list[ImplausibleOutlet | ImplausibleValues] = [*outlets]
     for (name, problem, unit), rows in wrong.groupby(["kind", "problem", "unit"], sort=False):
@@ -204,7 +204,7 @@ def implausible_values(case: Case, site: Site, station: pd.DataFrame) -> list[Im
 
 def implausible_levels(case: Case, site: Site, station: pd.DataFrame) -> pd.Series:
     """Whether each row is a level that its experiment cannot have, whatever its error."""
-    _, wrong = _judged(case, site, station[station["used"].astype(bool)])
+    _, wrong = _judged(case, site, station[station["used"]])
     of_errors = wrong["problem"].isin([Symptom.SMALL_ERROR, Symptom.LARGE_ERROR])
     return station.index.to_series().isin(wrong.index[(wrong["kind"] == WATER_LEVEL) & ~of_errors])
 

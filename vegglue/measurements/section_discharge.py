@@ -233,8 +233,8 @@ def carried_discharges(case: Case, site: Site, station: pd.DataFrame) -> list[Ca
 
     station: as Observations.table [SI].
     """
-    used = station[station["used"].astype(bool)]
-    velocity = used[(used["kind"] == STREAMWISE) & (used["section"].astype(str) != "")]
+    used = station[station["used"]]
+    velocity = used[(used["kind"] == STREAMWISE) & (used["section"] != "")]
     found = []
     for (experiment, section), rows in velocity.groupby(["experiment", "section"], sort=False):
         if np.ptp(rows["x"]) <= np.ptp(rows["y"]):

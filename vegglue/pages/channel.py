@@ -150,7 +150,7 @@ def _draw_patches(axes: Axes, case: Case, site: Site) -> None:
 
 def _draw_stations(axes: Axes, observations: Observations) -> None:
     table = observations.table
-    used = table["used"].astype(bool)
+    used = table["used"]
     axes.plot(table["x"][used], table["y"][used], "o", markersize=2.6, color=COLOUR["measured"])
     axes.plot(table["x"][~used], table["y"][~used], "x", markersize=4.5, color=COLOUR["ink"])
 
@@ -195,7 +195,7 @@ def _legend(case: Case, site: Site, observations: Observations) -> list[Line2D |
     shown.append(Line2D([], [], color=COLOUR["model"], linewidth=0.8, label="about the waterline"))
     if len(observations.table):
         shown.append(Line2D([], [], linestyle="", marker="o", markersize=3, color=COLOUR["measured"], label="station"))
-    if not observations.table["used"].astype(bool).all():
+    if not observations.table["used"].all():
         shown.append(Line2D([], [], linestyle="", marker="x", markersize=5, color=COLOUR["ink"], label="not used"))
     return shown
 

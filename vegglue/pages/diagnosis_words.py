@@ -124,7 +124,7 @@ def standard_errors(diagnosis: Diagnosis) -> str:
 def rms_residual(diagnosis: Diagnosis, prediction: Array, kind: str = STREAMWISE) -> float:
     """Root mean square of measured minus predicted over the stations that count [unit of the kind], NaN without."""
     station = diagnosis.predictions.station
-    counted = station["used"].to_numpy(bool) & (station["kind"] == kind).to_numpy()
+    counted = station["used"].to_numpy() & (station["kind"] == kind).to_numpy()
     counted[list(diagnosis.errors.flagged)] = False
     return root_mean_square((station["value"].to_numpy(float) - prediction)[counted])
 

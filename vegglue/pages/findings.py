@@ -157,7 +157,7 @@ def _residual(posterior: Posterior, kind: str) -> Finding:
 
 
 def _fit(posterior: Posterior, notation: Notation) -> Finding:
-    used = posterior.station["used"].to_numpy(bool)
+    used = posterior.station["used"].to_numpy()
     value = posterior.station["value"].to_numpy(float)[used]
     low, high = posterior.predicted.model_band[0][used], posterior.predicted.model_band[-1][used]
     inside = int(np.sum((value >= low) & (value <= high)))
@@ -194,7 +194,7 @@ def _set_aside_since(run: Run) -> Iterator[Finding]:
 
 
 def _flagged(observations: Observations) -> Iterator[Finding]:
-    for _, row in observations.table[~observations.table["used"].astype(bool)].iterrows():
+    for _, row in observations.table[~observations.table["used"]].iterrows():
         yield Finding(
             "flagged",
             f"Not used: {html.escape(str(row['experiment']))} at x = {row['x']:g} m, y = {row['y']:g} m, "

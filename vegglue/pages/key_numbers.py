@@ -189,7 +189,7 @@ def unexplained_error(posterior: Posterior, kind: str, miss: float) -> bool:
     miss > error sqrt(chi2_n^-1(0.999) / n), n used stations of the kind; a refined posterior that knows the correlation
     of its errors adds its own p-value of the misfit. False where the measurement error is not known.
     """
-    used = posterior.station["used"].astype(bool) & (posterior.station["kind"] == kind)
+    used = posterior.station["used"] & (posterior.station["kind"] == kind)
     count = max(int(used.sum()), 1)
     error, doubted = measurement_error(posterior, kind), _misfit_below(posterior, UNBELIEVED)
     return miss > error * float(np.sqrt(scipy.special.chdtri(count, UNBELIEVED) / count)) or (doubted and miss > error)

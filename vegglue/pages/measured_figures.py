@@ -174,7 +174,7 @@ def draw_discharge(rows: Sequence[tuple[str, float, float]], spread: tuple[float
 def residuals(run: Run) -> Iterator[Picture]:
     """Residuals of each kind by zone, velocities across and others along the channel, and against normal quantiles."""
     table, posterior = run.observations.table, run.posterior
-    used = table["used"].to_numpy(bool)
+    used = table["used"].to_numpy()
     zone = np.array(station_zones(run))
     for kind in map(kind_of, posterior.fit.sigma):
         rows = np.flatnonzero(used & (table["kind"] == kind.name).to_numpy())
@@ -269,7 +269,7 @@ def _vertical(profile: pd.Series, points: pd.DataFrame) -> Vertical:
     height = points["height"].to_numpy()
     curve = np.linspace(0.0, profile["depth"], 60) if fit is not None else height
     velocity = fit.velocity(curve) if fit is not None else points["u"].to_numpy()
-    used = points["used"].to_numpy(bool)
+    used = points["used"].to_numpy()
     return Vertical(
         profile["y"],
         profile["bed"],

@@ -65,7 +65,7 @@ def errors_by_kind(errors: Mapping[str, float], preposition: str, notation: Nota
 def measurement_error(posterior: Posterior, kind: str) -> float:
     """Root mean square standard error of the used stations of a kind [SI]; NaN when one is unknown."""
     station = posterior.station
-    error = station.loc[station["used"].astype(bool) & (station["kind"] == kind), "standard_error"].to_numpy(float)
+    error = station.loc[station["used"] & (station["kind"] == kind), "standard_error"].to_numpy(float)
     return root_mean_square(error)
 
 
@@ -145,7 +145,7 @@ def correlations_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT)
 def fit_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[str]:
     """Misfit of the median prediction and stations outside the total band; chi2 where the errors are known."""
     fit = posterior.fit
-    used = posterior.station["used"].to_numpy(bool)
+    used = posterior.station["used"].to_numpy()
     value = posterior.station["value"].to_numpy(float)
     outside = (value < posterior.predicted.total_band[0]) | (value > posterior.predicted.total_band[-1])
     sentences = [
@@ -153,7 +153,7 @@ def fit_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[
         f"{int(np.sum(outside & used))} of {fit.used} measurements lie outside the total 95 % band, "
         f"{0.05 * fit.used:.1f} are expected to."
     ]
-    if aside := int((posterior.station["reason"].astype(str) == SET_ASIDE).sum()):
+    if aside := int((posterior.station["reason"] == SET_ASIDE).sum()):
         sentences.append(
             f"{so_many(aside, 'measurement')} of {len(posterior.station)} "
             f"{'is' if aside == 1 else 'are'} left out, as the diagnosis set {'it' if aside == 1 else 'them'} aside."

@@ -297,9 +297,9 @@ def _stations(run: Run) -> pd.DataFrame:
     levels = {"low": band[0], "low50": band[1], "middle": band[2], "high50": band[3], "high": band[4]}
     own = run.observations.table.assign(**levels, total_low=total[0], total_high=total[-1])
     if run.behind is None:
-        return own.assign(before=own["middle"], after=own["middle"], aside=~own["used"].astype(bool))
+        return own.assign(before=own["middle"], after=own["middle"], aside=~own["used"])
     told = run.behind.predictions.table.rename(columns={"prediction_first": "before", "prediction": "after"})
-    aside = ~told["used"].astype(bool)
+    aside = ~told["used"]
     aside.iloc[list(run.behind.errors.flagged)] = True
     edges = own.drop_duplicates(STATION_KEY)[[*STATION_KEY, *EDGES]]
     return told.assign(aside=aside).merge(edges, on=STATION_KEY, how="left")
@@ -323,7 +323,7 @@ def _drawn(
         taken.add(name)
         drawn = draw_panel(panel, values, f"{kind.column} [{kind.unit}]", stamp(run.case))
         alt = f"{kind.words.capitalize()} across {panel.title}, experiment {experiment}: {panel_words(panel)}."
-        reasons = rows[rows["section"] == section].sort_values("y")["reason"].astype(str).tolist()
+        reasons = rows[rows["section"] == section].sort_values("y")["reason"].tolist()
         picture = published_svg(run, drawn.svg, name, panel_words(panel), alt)
         yield picture, _numbers(picture.name, kind, panel, drawn) | {"reason": reasons}
 
@@ -341,7 +341,7 @@ def _panel(run: Run, experiment: str, rows: pd.DataFrame, added: bool) -> Sectio
         y=values["y"],
         measured=values["value"],
         error=NORMAL95 * rows["standard_error"].to_numpy(float),
-        aside=rows["aside"].to_numpy(bool),
+        aside=rows["aside"].to_numpy(),
         before=values["before"] if added else None,
         after=values["after"],
         band=band,

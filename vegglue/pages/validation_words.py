@@ -75,7 +75,7 @@ def _scores_in_errors(posterior: Posterior, groups: GroupsLeftOut) -> np.ndarray
     That of y_i itself is the higher the smaller its unit and errors: of levels and velocities, velocities told alike
     would be told worst.
     """
-    used = posterior.station["used"].to_numpy(bool)
+    used = posterior.station["used"].to_numpy()
     size, rows = np.log(posterior.fit.noise[used]), groups_left_out(posterior.station[used])
     sizes = [size[rows[name]].mean() if name in rows else size.mean() for name in groups.left_out]
     return np.asarray(groups.left_out_score / groups.left_out_stations + sizes)

@@ -161,7 +161,7 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
             first=_parsed(dict[str, float], attributes["first_parameters"]),
             last=_parsed(dict[str, tuple[float, float, float]], attributes["parameters"]),
         ),
-        predictions=Predictions(stations_from(stations, *AT_STATIONS), *(stations[name] for name in AT_STATIONS)),
+        predictions=Predictions(stations_from(stations), *(stations[name] for name in AT_STATIONS)),
         place_map=PlaceMap(stated_as(str, attributes, "mapped_term"), places["x"], places["y"], places["score"]),
         places=_parsed(tuple[LocalAnomaly, ...], attributes["locations"]),
         instruments=_instruments_from(attributes["instruments"]),

@@ -11,13 +11,11 @@ import numpy as np
 import pandas as pd
 
 from vegglue.measurements.kinds import KINDS
-from vegglue.measurements.observations import STATION_COLUMNS
+from vegglue.measurements.observations import STATION_TYPES, station_table
 from vegglue.results.layout import Stored
 
 ReadGroup = Mapping[str, np.ndarray]
 IN_WORDS, WHOLE_NUMBERS, YES_OR_NO = object, np.int64, bool  # types of what is no floating-point number
-# Columns of a table of stations that are no floating-point numbers.
-STATION_TYPES = dict.fromkeys(("experiment", "kind", "section", "reason", "device"), IN_WORDS) | {"used": YES_OR_NO}
 # Kinds of numpy's types that hold values of a type.
 _KINDS = {"O": "O", "S": "O", "f": "fiu", "i": "iu", "b": "b"}
 
@@ -73,11 +71,12 @@ def names_of(group: ReadGroup, dim: str) -> tuple[str, ...]:
     return names
 
 
-def stations_from(group: ReadGroup, *others: str) -> pd.DataFrame:
-    """The table of stations of a group; others: what else stands there. Errors: KeyError, ValueError."""
-    columns = {name: Stored(("station",), type=STATION_TYPES.get(name, float)) for name in STATION_COLUMNS}
-    table = pd.DataFrame({name: values for name, values in fitting(group, columns).items() if name not in others})
+def stations_from(group: ReadGroup) -> pd.DataFrame:
+    """The table of stations of a group, without what else stands there. Errors: KeyError, ValueError."""
+    types = {name: IN_WORDS if kind is str else kind for name, kind in STATION_TYPES.items()}
+    found = fitting(group, {name: Stored(("station",), type=kind) for name, kind in types.items()})
+    table = station_table(pd.DataFrame({name: found[name] for name in STATION_TYPES}))
     unknown = set(table["kind"]) - set(KINDS)
     if unknown:
         raise ValueError(f"{sorted(unknown)[0]!r} is no kind of observation")
-    return table.drop(columns="station", errors="ignore")
+    return table

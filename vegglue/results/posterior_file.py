@@ -149,7 +149,7 @@ def _named_coordinates(posterior: Posterior) -> dict[str, np.ndarray]:
 def _arviz_groups(posterior: Posterior) -> dict[str, Group]:
     """Equal-weight draws and used stations only, so that no NaN reaches ArviZ."""
     sample, refined = posterior.sample, posterior.refinement
-    used = np.flatnonzero(posterior.station["used"].to_numpy(bool))
+    used = np.flatnonzero(posterior.station["used"].to_numpy())
     draw = {"chain": np.arange(CHAINS), "draw": np.arange(DRAWS_PER_CHAIN)}
     prior = {"chain": np.arange(1), "draw": np.arange(sample.members)}
     station, at_draws = {"station": used}, ("chain", "draw")

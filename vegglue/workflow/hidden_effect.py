@@ -195,7 +195,7 @@ def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.
             for shape in candidate.effect.shapes
         }
         return drawn | dict(candidate.fixed)
-    used = model.station[model.station["used"].to_numpy(bool)]
+    used = model.station[model.station["used"]]
     low, high = model.case.grid.x
     first, last = (low + share * (high - low) for share in PLACED_ALONG)
     x = random.uniform(first, last)

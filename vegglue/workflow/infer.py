@@ -78,7 +78,7 @@ def is_inferred(run: CaseRun) -> bool:
     if stored_hash(path) != case_hash(run.case):
         return False
     now = without_stations(run.observations.table, excluded_in(run))
-    return bool(np.array_equal(read_posterior(path).station["used"].astype(bool), now["used"].astype(bool)))
+    return bool(np.array_equal(read_posterior(path).station["used"], now["used"]))
 
 
 def own_ensemble(run: CaseRun, given: Ensemble | None, needed: bool) -> Ensemble | None:

@@ -82,7 +82,7 @@ def results_of(sized: CaseRun, run: CaseRun, above: str = "../") -> Run:
     # The page shows what the posterior used, and how much of it has been excluded since.
     kept = posterior.station[["used", "reason"]].set_axis(observations.table.index)
     table = observations.table.assign(**kept)
-    since = table["used"].astype(bool) & ~without_stations(table, excluded_in(run))["used"].astype(bool)
+    since = table["used"] & ~without_stations(table, excluded_in(run))["used"]
     observations = replace(observations, table=table)
     if ensemble is None and posterior.settings.ensemble_hash:
         read_ensemble(path, config=case.source)  # raises, as it is gone

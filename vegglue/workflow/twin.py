@@ -59,7 +59,7 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
     Errors: InputError when such files are there; StorageError when the folder cannot be written.
     """
     name = case_name(folder.resolve().name, "twin")
-    used = _on_the_map(case, station[station["used"].to_numpy(bool)])
+    used = _on_the_map(case, station[station["used"]])
     kinds = [kind for kind in KINDS.values() if (used["kind"] == kind.name).any()]
     tree = {
         "extends": Path(os.path.relpath(case.source, folder.resolve())).as_posix(),
@@ -83,7 +83,7 @@ def in_rows_of_twin(answer: Answer, station: pd.DataFrame) -> Answer:
 
     station: that of the case, in which they were chosen.
     """
-    used, kinds = station["used"].to_numpy(bool), station["kind"].to_numpy()
+    used, kinds = station["used"].to_numpy(), station["kind"].to_numpy()
     order = [int(row) for kind in KINDS.values() for row in np.flatnonzero(used & (kinds == kind.name))]
     hidden = [replace(one, station=order.index(one.station)) if one.station >= 0 else one for one in answer.hidden]
     return replace(answer, hidden=tuple(hidden))
