@@ -18,7 +18,7 @@ from vegglue import cluster
 from vegglue.cli.main import main
 from vegglue.cluster import on_cluster
 from vegglue.errors import InputError
-from vegglue.parallel import as_finished, side_by_side
+from vegglue.parallel import as_finished, parallel_map
 from vegglue.progress import Progress
 
 MEMBERS, CHUNKS = 512, 8
@@ -149,14 +149,14 @@ def test_a_task_that_ends_its_workers_is_told(tmp_path: Path) -> None:
     with workers_in(tmp_path, 4) as workers, on_cluster(workers.address):
         expected = "--cluster: expected workers to live, got a task that ended several, .* what was finished is kept"
         with pytest.raises(InputError, match=expected):
-            side_by_side(os._exit, [(1,)])
+            parallel_map(os._exit, [(1,)])
 
 
 @pytest.mark.slow
 def test_results_stream_back_and_stand_in_order(two: Workers) -> None:
     with on_cluster(two.address):
         ended = list[int]()
-        assert side_by_side(abs, [(-number,) for number in range(40)], ended.append) == list(range(40))
+        assert parallel_map(abs, [(-number,) for number in range(40)], ended.append) == list(range(40))
         assert ended == list(range(1, 41))
         assert set(as_finished(abs, ((-number,) for number in range(3)), 1)) == {0, 1, 2}
         assert list(as_finished(abs, (), 1)) == []
@@ -165,7 +165,7 @@ def test_results_stream_back_and_stand_in_order(two: Workers) -> None:
 @pytest.mark.slow
 def test_what_a_task_raises_is_raised_here(two: Workers) -> None:
     with on_cluster(two.address), pytest.raises(ZeroDivisionError):
-        side_by_side(divmod, [(1, 1), (1, 0)])
+        parallel_map(divmod, [(1, 1), (1, 0)])
 
 
 @pytest.mark.slow
@@ -177,7 +177,7 @@ def test_what_is_left_alone_half_way_is_taken_back(two: Workers) -> None:
     with pytest.raises(KeyError), on_cluster(two.address):
         begun()
     with on_cluster(two.address):
-        assert side_by_side(abs, [(-1,)]) == [1]
+        assert parallel_map(abs, [(-1,)]) == [1]
 
 
 def is_left_alone(task: int) -> bool:
@@ -191,8 +191,8 @@ def is_left_alone(task: int) -> bool:
 @pytest.mark.slow
 def test_processes_of_this_machine_need_no_scheduler() -> None:
     with on_cluster("local:2"):
-        assert side_by_side(abs, [(-1,), (-2,)]) == [1, 2]
-        assert side_by_side(is_left_alone, [(1,), (2,)]) == [True, True]
+        assert parallel_map(abs, [(-1,), (-2,)]) == [1, 2]
+        assert parallel_map(is_left_alone, [(1,), (2,)]) == [True, True]
 
 
 @pytest.mark.slow
@@ -212,7 +212,7 @@ def test_a_worker_of_another_version_that_comes_later_is_refused(tmp_path: Path)
     with workers_in(tmp_path, 0) as workers, on_cluster(workers.address):
         workers.begin("import vegglue.version; vegglue.version.VERSION = '0.0'; ")
         with pytest.raises(InputError, match=r"expected vegglue .* on every worker, as here, got 0\.0 at tcp://127"):
-            side_by_side(abs, [(1,)])
+            parallel_map(abs, [(1,)])
 
 
 @pytest.mark.parametrize(

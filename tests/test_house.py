@@ -21,6 +21,7 @@ HOMES = {
     "pandas": {
         "calibration", "diagnosis", "engine", "flow", "inference", "measurements", "pages", "results", "workflow",
     },
+    "psutil": {"engine", "parallel"},
     "pydantic": {"case", "importers", "results"},
     "rich": {"cli"},
     "threadpoolctl": {"parallel"},

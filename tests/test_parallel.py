@@ -7,7 +7,7 @@ import time
 import pytest
 
 from vegglue.errors import InputError
-from vegglue.parallel import as_finished, at_most, begun, in_threads
+from vegglue.parallel import as_finished, at_most, in_threads, submit
 
 
 def most_at_once(jobs: int) -> int:
@@ -89,21 +89,21 @@ def test_tasks_that_are_left_are_left_without_a_word(recwarn: pytest.WarningsRec
 @pytest.mark.parametrize(("jobs", "beside"), [(1, False), (2, True)])
 def test_what_is_begun_is_done_beside_where_a_thread_is_spare(jobs: int, beside: bool) -> None:
     with at_most(jobs):
-        assert (begun(threading.get_ident)() != threading.get_ident()) == beside
+        assert (submit(threading.get_ident)() != threading.get_ident()) == beside
 
 
 def test_what_was_begun_takes_one_of_the_threads_until_it_ends() -> None:
     release = threading.Event()
     with at_most(2):
-        waiting = begun(release.wait)
-        assert begun(threading.get_ident)() == threading.get_ident()
+        waiting = submit(release.wait)
+        assert submit(threading.get_ident)() == threading.get_ident()
         release.set()
         waiting()
-        assert begun(threading.get_ident)() != threading.get_ident()
+        assert submit(threading.get_ident)() != threading.get_ident()
 
 
 def test_what_was_begun_raises_where_it_is_asked_for() -> None:
     with at_most(2):
-        found = begun(lambda: 1 / 0)
+        found = submit(lambda: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             found()

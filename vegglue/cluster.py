@@ -17,7 +17,14 @@ from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from vegglue.errors import InputError
-from vegglue.parallel import at_most, cores_allowed, keep_folder_out, no_ctrl_c_for_children, one_thread_for_good, taken
+from vegglue.parallel import (
+    at_most,
+    cores_allowed,
+    keep_folder_out,
+    no_ctrl_c_for_children,
+    one_thread_for_good,
+    task_backend,
+)
 from vegglue.version import VERSION
 
 if TYPE_CHECKING:
@@ -60,7 +67,7 @@ def on_cluster(where: str | None) -> Iterator[None]:
     with ExitStack() as stack:
         client = stack.enter_context(_connected(where))
         refuse_other_versions(client)
-        stack.enter_context(taken(partial(_sent, client)))
+        stack.enter_context(task_backend(partial(_sent, client)))
         yield
 
 

@@ -1,6 +1,6 @@
-"""Work spread over the cores of this machine by processes and threads, or handed to whoever takes it to others.
+"""Tasks over the cores of this machine by processes and threads, or handed to a backend on other machines.
 
-`cluster` takes tasks to other machines. This file knows nothing of how: it only asks whether someone does, see `taken`.
+`cluster` is such a backend; this module only knows that there may be one, see `task_backend`.
 """
 
 import os
@@ -22,55 +22,76 @@ from multiprocessing import resource_tracker
 from threading import Semaphore
 from typing import Any
 
+import psutil
 from joblib import Parallel, cpu_count, delayed
 from threadpoolctl import ThreadpoolController
 
 from vegglue.errors import InputError, StorageError
 from vegglue.progress import silent
 
-# Threads that may be begun beside those at work, in what is done within `at_most`.
+# Threads that may be started beside those at work, within `at_most`.
 _SPARE: ContextVar[Semaphore | None] = ContextVar("spare threads", default=None)
-# How many cores may be used in what is done within `at_most`.
+# Number of cores that may be used, within `at_most`.
 _CORES: ContextVar[int | None] = ContextVar("cores", default=None)
-# Given work and tasks, the position of each task and work(*task), in the order in which they end.
-Taker = Callable[[Callable[..., Any], Iterable[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
-# Who takes tasks to other machines, in what is done within `taken`.
-_TAKER: ContextVar[Taker | None] = ContextVar("taker of tasks", default=None)
+# Given work and tasks, yields the position of each task and work(*task), in the order in which they end.
+Backend = Callable[[Callable[..., Any], Iterable[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
+_BACKEND: ContextVar[Backend | None] = ContextVar("backend of tasks", default=None)
 
 
 @contextmanager
-def taken(taker: Taker) -> Iterator[None]:
-    """Whatever `as_finished` and `side_by_side` are asked to do within is handed to the taker."""
-    token = _TAKER.set(taker)
+def task_backend(backend: Backend) -> Iterator[None]:
+    """Hand the tasks of `as_finished` and `parallel_map` within to a backend."""
+    token = _BACKEND.set(backend)
     try:
         yield
     finally:
-        _TAKER.reset(token)
+        _BACKEND.reset(token)
 
 
-def is_taken() -> bool:
-    """Whether a taker takes tasks elsewhere."""
-    return _TAKER.get() is not None
+def has_backend() -> bool:
+    """Whether a backend computes tasks elsewhere."""
+    return _BACKEND.get() is not None
 
 
 def cores_allowed() -> int:
-    """How many cores may be used here: those of `at_most`, all without it."""
+    """Number of cores that may be used: that of `at_most`, all without it."""
     return _CORES.get() or int(cpu_count())
 
 
 def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
-    """work(*task) for every task, in the order in which they end. What all tasks share is best held by `work`, as in
-    functools.partial: it then travels once to each process of a cluster. Errors: StorageError when one was killed.
+    """Compute work(*task) for every task in processes, and yield results in the order in which they end.
+
+    Parameters
+    ----------
+    work : callable
+        Best holds what all tasks share, as functools.partial does: it then travels once to each process of a cluster.
+    tasks : iterable of tuple
+    jobs : int
+        Number of processes, -1 for one on every core.
+
+    Raises
+    ------
+    StorageError
+        If a process was killed.
     """
-    taker = _TAKER.get()
-    if taker is not None:
-        yield from (found for _, found in taker(work, tasks))
+    backend = _BACKEND.get()
+    if backend is not None:
+        yield from (found for _, found in backend(work, tasks))
         return
+
     try:
+        keep_folder_out()
         with no_ctrl_c_for_children():
-            found = _pool(jobs, "generator_unordered")(delayed(_alone)(work, task) for task in tasks)
-        with _closing_quietly(found):
-            yield from (one for one in found)  # who leaves these closes them only, and not what is found
+            pool = Parallel(
+                n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1, initializer=_serve
+            )
+            found = pool(delayed(_alone)(work, task) for task in tasks)
+        try:
+            yield from (one for one in found)  # closing these closes the generator only, not the pool
+        finally:
+            with warnings.catch_warnings():  # of tasks that are not done when the pool is left at a Ctrl-C
+                warnings.simplefilter("ignore", UserWarning)
+                found.close()
     except BrokenProcessPool as error:
         raise StorageError(
             "A process that solved members was killed, most likely for want of memory; what was finished is kept: run "
@@ -78,18 +99,18 @@ def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs
         ) from error
 
 
-def side_by_side(
+def parallel_map(
     work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], finished: Callable[[int], None] = silent
 ) -> list[Any]:
-    """As `in_threads`, for work that is worth a journey: it and its tasks go to other machines where there are any.
+    """Compute work(*task) for every task, in their order, by the backend if there is one, else by threads.
 
-    Work that a task begins in its turn stays on the machine of the task.
+    Tasks that a task starts in its turn stay on its machine. finished: receives the number of tasks that are done.
     """
-    taker, waiting = _TAKER.get(), list(tasks)
-    if taker is None:
+    backend, waiting = _BACKEND.get(), list(tasks)
+    if backend is None:
         return in_threads(work, waiting, finished)
     found: list[Any] = [None] * len(waiting)
-    for ended, (position, one) in enumerate(taker(work, waiting), 1):
+    for ended, (position, one) in enumerate(backend(work, waiting), 1):
         found[position] = one
         finished(ended)
     return found
@@ -97,10 +118,7 @@ def side_by_side(
 
 @contextmanager
 def at_most(jobs: int) -> Iterator[None]:
-    """So many threads at once in all that is done within; -1 for one on every core.
-
-    Errors: InputError for any other that is not positive.
-    """
+    """Limit the number of threads at once within; -1 for one on every core. Raises InputError for others below 1."""
     if jobs == 0 or jobs < -1:
         raise InputError(f"jobs: expected the number of cores to use, or -1 for all of them, got {jobs}.")
     cores = int(cpu_count()) if jobs < 0 else jobs
@@ -115,24 +133,17 @@ def at_most(jobs: int) -> Iterator[None]:
 def in_threads(
     work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], finished: Callable[[int], None] = silent
 ) -> list[Any]:
-    """work(*task) for every task, in their order, by threads: for compiled work on large values that all share.
+    """Compute work(*task) for every task, in their order, by threads: for compiled work on large shared values.
 
-    Tasks that are split into tasks of their own share the threads that `at_most` allows, all cores without it.
-    finished: is told how many are done, each time another one is.
+    Tasks are taken one by one, by this thread and by as many others as `at_most` allows while some wait; tasks that
+    start tasks of their own share these threads. finished: receives the number of tasks that are done.
     """
     spare = _SPARE.get()
     if spare is None:
         with at_most(-1):
             return in_threads(work, tasks, finished)
-    with one_thread():
-        return _shared_out(work, list(tasks), spare, finished)
-
-
-def _shared_out(
-    work: Callable[..., Any], tasks: list[tuple[Any, ...]], spare: Semaphore, finished: Callable[[int], None]
-) -> list[Any]:
-    """Tasks taken one by one, by this thread and by as many others as are spare while some wait."""
-    waiting, found, ends = deque(enumerate(tasks)), [None] * len(tasks), count(1)
+    numbered = list(tasks)
+    waiting, found, ends = deque(enumerate(numbered)), [None] * len(numbered), count(1)
 
     def take_next() -> bool:
         try:
@@ -142,12 +153,12 @@ def _shared_out(
         try:
             found[position] = work(*task)
             finished(next(ends))
-        except BaseException:  # Ctrl-C, too: nobody waits for the rest any more
+        except BaseException:  # Ctrl-C, too: the rest is not needed any more
             waiting.clear()
             raise
         return True
 
-    def by_another() -> None:
+    def work_through() -> None:
         try:
             while take_next():
                 pass
@@ -155,56 +166,60 @@ def _shared_out(
             spare.release()
 
     others: list[Future[None]] = []
-    with ThreadPoolExecutor(max(len(tasks), 1)) as pool:  # which begins a thread only when it is needed
-        while waiting:
-            for _ in range(len(waiting) - 1):
-                if not spare.acquire(blocking=False):
-                    break
-                others.append(pool.submit(copy_context().run, by_another))
-            take_next()
-    for one in others:
-        one.result()  # raises what a task raised
+    with one_thread():
+        with ThreadPoolExecutor(max(len(numbered), 1)) as pool:  # starts a thread only when it is needed
+            while waiting:
+                for _ in range(len(waiting) - 1):
+                    if not spare.acquire(blocking=False):
+                        break
+                    others.append(pool.submit(copy_context().run, work_through))
+                take_next()
+        for one in others:
+            one.result()  # raises what a task raised
     return found
 
 
-def begun(work: Callable[..., Any], *task: Any) -> Callable[[], Any]:
-    """work(*task) by a thread that `at_most` has to spare, else when it is asked for; what is returned waits for it."""
+def submit(work: Callable[..., Any], *task: Any) -> Callable[[], Any]:
+    """Start work(*task) in a thread that `at_most` can spare; calling what is returned waits for the result.
+
+    Without a spare thread the work is done when the result is asked for.
+    """
     spare = _SPARE.get()
     if spare is None or not spare.acquire(blocking=False):
         return partial(work, *task)
 
-    def by_another() -> Any:
+    def beside() -> Any:
         try:
             return work(*task)
         finally:
             spare.release()
 
     pool = ThreadPoolExecutor(1)
-    found = pool.submit(copy_context().run, by_another)
+    found = pool.submit(copy_context().run, beside)
     pool.shutdown(wait=False)
     return found.result
 
 
 @lru_cache(maxsize=1)
 def _libraries(modules: int) -> ThreadpoolController:
-    """The libraries with threads of their own, looked for (5 ms) when a module was imported since."""
+    """The libraries with threads of their own, looked up (5 ms) after each import of a module."""
     return ThreadpoolController()
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """One thread for linear algebra in this process: its matrices are small, and the cores have tasks of their own."""
+    """Use one thread for linear algebra in this process: matrices are small, and the cores have tasks of their own."""
     with _libraries(len(sys.modules)).limit(limits=1):
         yield
 
 
 def one_thread_for_good() -> None:
-    """The same for the rest of this process: its threads may work on several tasks at once, and none may undo it."""
+    """The same for the rest of this process, whose threads may work on several tasks at once."""
     _libraries(len(sys.modules)).limit(limits=1)
 
 
 def import_beside(module: str) -> None:
-    """Import a module in a thread beside, for who asks for it later and is then told what went wrong, if anything."""
+    """Import a module in a thread; a later import of it finds it, or raises what is wrong with it."""
 
     def quietly() -> None:
         with suppress(ImportError):
@@ -214,17 +229,18 @@ def import_beside(module: str) -> None:
 
 
 def keep_folder_out() -> None:
-    """Processes begun from here on import nothing from the folder the user stands in: it may be a stranger's, with a
-    `numpy.py` of its own.
-    """
+    """Keep processes that are started later from importing out of the working folder, which may be a stranger's."""
     os.environ["PYTHONSAFEPATH"] = "1"
 
 
 @contextmanager
 def no_ctrl_c_for_children() -> Iterator[None]:
-    """Processes begun within never hear Ctrl-C, from their first moment on: it is for the run that they serve."""
+    """Processes started within never receive Ctrl-C, which is for the command that they serve."""
     keep_folder_out()  # before the first process of all, which comes next
-    resource_tracker.ensure_running()  # else it begins within, and takes the mask off again
+    if not hasattr(signal, "pthread_sigmask"):  # Windows: `_serve` ignores it a moment later
+        yield
+        return
+    resource_tracker.ensure_running()  # else it starts within, and unblocks the signal again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -232,35 +248,19 @@ def no_ctrl_c_for_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-@contextmanager
-def _closing_quietly(found: Any) -> Iterator[None]:
-    """Results of a pool, which warns of tasks that are not done when it is left: at a Ctrl-C nobody wonders."""
-    try:
-        yield
-    finally:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            found.close()
-
-
-def _pool(jobs: int, order: str) -> Parallel:
-    keep_folder_out()
-    return Parallel(n_jobs=jobs, return_as=order, pre_dispatch="2*n_jobs", batch_size=1, initializer=_serve)
-
-
 def _alone(work: Callable[..., Any], task: tuple[Any, ...]) -> Any:
-    with one_thread():  # one task a core: threads of linear algebra would only get in each other's way
+    with one_thread():  # one task a core: threads of linear algebra would only compete for it
         return work(*task)
 
 
 def _serve() -> None:
-    """A worker is one core, leaves Ctrl-C to the run it serves, and does not outlive it."""
+    """Prepare a worker: it is one core, ignores Ctrl-C, and ends with the command that it serves."""
     os.environ["LOKY_MAX_CPU_COUNT"] = "1"
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    run = os.getppid()
+    run = psutil.Process(os.getppid())
 
     def follow() -> None:
-        while os.getppid() == run:
+        while run.is_running():
             time.sleep(1.0)
         os._exit(1)
 

@@ -1,8 +1,8 @@
 """Files that appear under their name only when they are whole, and never follow a link out of their folder."""
 
 import errno
-import fcntl
 import os
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -16,28 +16,57 @@ from vegglue.errors import StorageError
 ATTEMPTS, BETWEEN = 200, 0.05
 MAKE_ROOM = "make room and run it again"
 NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
+# Flags of POSIX; Windows opens neither links nor pipes by accident.
+NOT_FOLLOWED = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+LOCKED_BYTE = 1 << 40  # [bytes] from the beginning: beyond what is written, as Windows lets nobody write a locked byte
+
+
+def lock(handle: int, shared: bool = False) -> None:
+    """Lock an open file until it is closed or its process ends; shared: others may hold such a lock, too.
+
+    Raises BlockingIOError if another process holds the lock, and OSError if the file system has none.
+    """
+    if sys.platform == "win32":
+        import msvcrt
+
+        os.lseek(handle, LOCKED_BYTE, os.SEEK_SET)
+        try:
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        except OSError as error:
+            raise BlockingIOError(*error.args) from None
+        finally:
+            os.lseek(handle, 0, os.SEEK_SET)
+    else:
+        import fcntl
+
+        fcntl.flock(handle, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[IO[bytes]]:
-    """A file to write, which takes the place of `path` when the block ends well; folders above it are made.
+    """Open a file that takes the place of `path` when the block ends without an error; folders above it are made.
 
-    It grows in `path`.new, which is locked: of two commands that write one result, one waits. What a killed command
-    left there is taken over. A link of either name is replaced, not followed: the folder of a run may come from others.
-    Errors: OSError when it cannot be written, and then what was there before stays.
+    It grows in `path`.new, which is locked: of two commands that write one result, one waits. A file that a killed
+    command left there is taken over. A link of either name is replaced, not followed: the folder of a run may come from
+    others. Raises OSError when the file cannot be written; what was there before then stays.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(path.name + ".new")
-    with _held(new) as file:
-        try:
+    file = _locked_file(new)
+    try:
+        with file:
             yield file
             file.flush()
             os.fsync(file.fileno())
+            if sys.platform != "win32":
+                os.replace(new, path)
+        if sys.platform == "win32":  # which renames closed files only
             os.replace(new, path)
-        except BaseException:
-            with suppress(OSError):
-                new.unlink()
-            raise
+    except BaseException:
+        file.close()
+        with suppress(OSError):
+            new.unlink()
+        raise
 
 
 def folder_within(folder: Path, name: str) -> Path:
@@ -71,14 +100,18 @@ def failed_writes_told(path: Path, advice: str) -> Iterator[None]:
         raise StorageError(f"{path}: cannot be written ({why}); {advice}.") from error
 
 
-def _held(path: Path) -> IO[bytes]:
-    """An empty file of this name that nobody else writes."""
+def _locked_file(path: Path) -> IO[bytes]:
+    """Open an empty file of this name that no other process writes. Raises StorageError after ATTEMPTS."""
     for _ in range(ATTEMPTS):
-        file = _opened(path)
-        if file is None:
+        try:
+            file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | NOT_FOLLOWED, 0o666), "wb")
+        except OSError as error:
+            if error.errno != errno.ELOOP:
+                raise
+            path.unlink(missing_ok=True)  # a link
             continue
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(file.fileno())
         except BlockingIOError:
             file.close()
             time.sleep(BETWEEN)
@@ -92,19 +125,8 @@ def _held(path: Path) -> IO[bytes]:
     raise StorageError(f"{path}: another process is writing this; wait for it to end, or stop it.")
 
 
-def _opened(path: Path) -> IO[bytes] | None:
-    """The file as it is, made if need be; None where a link was taken away first. No pipe makes it wait."""
-    try:
-        return os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666), "wb")
-    except OSError as error:
-        if error.errno != errno.ELOOP:
-            raise
-        path.unlink(missing_ok=True)
-        return None
-
-
 def _is_named(file: IO[bytes], path: Path) -> bool:
-    """Whether the open file is what lies there, under no other name; a second name is taken away."""
+    """Whether the open file lies at `path` and has no other name; a second name is removed."""
     mine = os.fstat(file.fileno())
     with suppress(FileNotFoundError):
         there = os.stat(path, follow_symlinks=False)

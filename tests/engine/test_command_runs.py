@@ -13,7 +13,7 @@ from vegglue.case.schema import Case
 from vegglue.engine.command import CommandRuns, command_predictions, command_runs, ended_runs, own_parameters
 from vegglue.errors import InputError, StorageError
 from vegglue.measurements.observations import read_observations
-from vegglue.parallel import at_most, taken
+from vegglue.parallel import at_most, task_backend
 from vegglue.results.lock import hold_lock
 
 THETAS = [{"n_b": 0.03, "phi": 2.0}, {"n_b": 0.04, "phi": 3.0}, {"n_b": 0.05, "phi": 4.0}]
@@ -167,7 +167,8 @@ def test_a_program_that_is_not_there_is_told_before_anything_runs(
 
 def test_a_cluster_is_refused(tmp_path: Path) -> None:
     case = commanded(tmp_path)
-    with taken(lambda work, tasks: iter(())), pytest.raises(InputError, match=r"--cluster: .* on this machine only"):
+    nowhere = task_backend(lambda work, tasks: iter(()))
+    with nowhere, pytest.raises(InputError, match=r"--cluster: .* on this machine only"):
         command_runs(case, tmp_path / "runs")
 
 

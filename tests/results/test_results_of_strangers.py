@@ -24,7 +24,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from stored import ALL, HASH, a_header, append, assert_whole, start, write_chunks
 
-from vegglue import first_look
+from vegglue import sandboxed_reader
 from vegglue.errors import StorageError
 from vegglue.results.digest import state_of, with_digest
 from vegglue.results.hdf5_reading import READ_HDF5
@@ -126,7 +126,7 @@ def test_damage_of_a_file_with_a_digest_is_noticed(
 def test_damage_of_a_file_without_a_digest_is_read_or_refused(
     kept: Kept, valid: Valid, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, edits: list[tuple[float, str]]
 ) -> None:
-    monkeypatch.setattr(first_look, "LONGEST_START", 5.0)
+    monkeypatch.setattr(sandboxed_reader, "LONGEST_START", 5.0)
     path = copy_of(kept, valid, tmp_path)
     path.write_bytes(damaged(without_digest(path), edits))
     assert len(sentence_of(kept, path).splitlines()) <= 1
@@ -144,7 +144,7 @@ def endless(path: Path) -> bytes:
 def test_a_file_that_is_read_in_circles_is_given_up(
     digest: Callable[[bytes], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(first_look, "LONGEST_START", 2.0)
+    monkeypatch.setattr(sandboxed_reader, "LONGEST_START", 2.0)
     path = tmp_path / "ensemble.h5"
     write_chunks(path, ALL, a_header())
     path.write_bytes(digest(endless(path)))
@@ -163,7 +163,7 @@ def test_a_reader_that_was_ended_is_replaced(tmp_path: Path) -> None:
         path = tmp_path / f"{number}.h5"
         write_chunks(path, ALL, a_header())
         read_ensemble(path, HASH)
-        reader = first_look._reader(os.getpid())
+        reader = sandboxed_reader._reader(os.getpid())
         if number == 0:  # one that lives is kept
             kept = reader
         elif number == 1:
@@ -177,19 +177,19 @@ def test_a_reader_that_was_ended_is_replaced(tmp_path: Path) -> None:
 def test_a_process_that_was_forked_has_a_reader_of_its_own(tmp_path: Path) -> None:
     path = tmp_path / "ensemble.h5"
     write_chunks(path, ALL, a_header())
-    assert first_look.why_unreadable(*state_of(path), by=READ_HDF5) is None
-    parents, child = first_look._reader(os.getpid()), os.fork()
+    assert sandboxed_reader.why_unreadable(*state_of(path), by=READ_HDF5) is None
+    parents, child = sandboxed_reader._reader(os.getpid()), os.fork()
     if not child:
-        first_look.why_unreadable.cache_clear()
+        sandboxed_reader.why_unreadable.cache_clear()
         right = (
-            first_look.why_unreadable(*state_of(path), by=READ_HDF5) is None
-            and first_look._reader(os.getpid()) is not parents
+            sandboxed_reader.why_unreadable(*state_of(path), by=READ_HDF5) is None
+            and sandboxed_reader._reader(os.getpid()) is not parents
         )
         os._exit(0 if right else 1)
     assert os.waitpid(child, 0)[1] == 0
     assert parents.poll() is None
-    first_look.why_unreadable.cache_clear()
-    assert first_look.why_unreadable(*state_of(path), by=READ_HDF5) is None, "the answers are not mixed up"
+    sandboxed_reader.why_unreadable.cache_clear()
+    assert sandboxed_reader.why_unreadable(*state_of(path), by=READ_HDF5) is None, "the answers are not mixed up"
 
 
 def test_a_reader_ends_with_whoever_asked(tmp_path: Path) -> None:
@@ -198,10 +198,10 @@ def test_a_reader_ends_with_whoever_asked(tmp_path: Path) -> None:
     asks = """
         import os
         from pathlib import Path
-        from vegglue import first_look
+        from vegglue import sandboxed_reader
         from vegglue.results import digest, hdf5_reading
-        first_look.why_unreadable(*digest.state_of(Path({path!r})), by=hdf5_reading.READ_HDF5)
-        print(first_look._reader(os.getpid()).pid, flush=True)
+        sandboxed_reader.why_unreadable(*digest.state_of(Path({path!r})), by=hdf5_reading.READ_HDF5)
+        print(sandboxed_reader._reader(os.getpid()).pid, flush=True)
         os.kill(os.getpid(), 9)
     """
     with start(asks, path=str(path)) as asking:
@@ -218,7 +218,7 @@ def test_a_reader_ends_with_whoever_asked(tmp_path: Path) -> None:
 
 
 def test_a_part_that_is_read_in_circles_is_set_aside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(first_look, "LONGEST_START", 2.0)
+    monkeypatch.setattr(sandboxed_reader, "LONGEST_START", 2.0)
     path = tmp_path / "ensemble.h5"
     write_chunks(path, ALL, a_header())
     path.write_bytes(endless(path))

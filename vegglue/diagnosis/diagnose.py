@@ -46,7 +46,7 @@ from vegglue.engine.interface import Model
 from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.measurements.plausibility import implausible_values
-from vegglue.parallel import begun, in_threads
+from vegglue.parallel import in_threads, submit
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import CandidateEffect, Diagnosis, Step
 from vegglue.wording.sentences import sentence
@@ -79,7 +79,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     watch(Progress("looking for what is missing"))
     first = screening = screen(base)
     found, candidate_effects = SearchState(absurd=absurd), dict[str, CandidateEffect]()
-    laws = partial(laws_beside, first) if absurd else begun(laws_beside, first)
+    laws = partial(laws_beside, first) if absurd else submit(laws_beside, first)
     while True:
         tested = candidate_effects_of(screening)
         candidate_effects = tested | _kept(candidate_effects, tested)

@@ -32,7 +32,7 @@ from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse, linearise_from
 from vegglue.normal_range import NORMAL95
-from vegglue.parallel import side_by_side
+from vegglue.parallel import parallel_map
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.diagnosis import CandidateEffect
 
@@ -78,7 +78,7 @@ def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = 
     """Each trial refitted, side by side; None where no flow is found."""
     nothing = fit(search.model, search.noise, search.point, REFIT_STEPS)
     finished = counted(watch, "refitting with each", len(trials), "refits")
-    ends = side_by_side(partial(_best_of_starts, search), [(trial,) for trial in trials], finished)
+    ends = parallel_map(partial(_best_of_starts, search), [(trial,) for trial in trials], finished)
     return [
         None if best is None else _refit(search, trial, best, nothing) for trial, best in zip(trials, ends, strict=True)
     ]

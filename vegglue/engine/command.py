@@ -31,6 +31,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import psutil
 
 from vegglue.arrays import Array
 from vegglue.case.case_effects import value_of
@@ -43,7 +44,7 @@ from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import LARGEST_READING
-from vegglue.parallel import cores_allowed, is_taken
+from vegglue.parallel import cores_allowed, has_backend
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.lock import hold_lock
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
@@ -224,8 +225,14 @@ def _waited_for(process: "subprocess.Popen[bytes]", until: float, stop: Event, l
 
 def _end_all(process: "subprocess.Popen[bytes]") -> None:
     """End the command, if it still runs, and whatever it has started and left behind."""
-    with suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
+    if sys.platform == "win32":
+        with suppress(psutil.Error):
+            for one in psutil.Process(process.pid).children(recursive=True):
+                one.kill()
+        process.kill()
+    else:
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
@@ -264,7 +271,7 @@ def command_runs(case: Case, folder: Path) -> CommandRuns:
     """
     settings = case.engine
     assert settings is not None
-    if is_taken():
+    if has_backend():
         raise InputError(
             f"--cluster: {case.name} runs the command of its `engine`, on this machine only; leave --cluster out, or "
             "let the command itself hand its work to the cluster."

@@ -47,7 +47,7 @@ from vegglue.flow.starts import on_grid
 from vegglue.flow.status import FAILED
 from vegglue.flow.tangent import CAUSE_LANES, adjoints, tangents
 from vegglue.flow.wet_band import chord_in_band, rows_inside, widen
-from vegglue.parallel import in_threads, side_by_side
+from vegglue.parallel import in_threads, parallel_map
 
 
 def problem_at(model: Model, experiment: str, z: Array) -> Problem:
@@ -75,7 +75,7 @@ def predict_members(predict_near: PredictNear, model: Model, points: Sequence[Po
     ]
     found = np.full((len(z), len(model.station)), np.nan)
     work, tasks = partial(_from_one, predict_near, model, points), [(k, z[part]) for k, part in sets]
-    for (_, part), prediction in zip(sets, side_by_side(work, tasks), strict=True):
+    for (_, part), prediction in zip(sets, parallel_map(work, tasks), strict=True):
         found[part] = prediction
     left = np.flatnonzero(np.isnan(found).any(axis=1))
     if left.size:
@@ -95,7 +95,7 @@ def _alone(model: Model, z: Array) -> Array:
     """The same from no point, as members of an ensemble are solved."""
     found = np.full((len(z), len(model.station)), np.nan)
     tasks = [(experiment, z) for experiment in model.case.experiments]
-    readings_of = side_by_side(partial(_read_alone, model), tasks)
+    readings_of = parallel_map(partial(_read_alone, model), tasks)
     for experiment, readings in zip(model.case.experiments, readings_of, strict=True):
         found[:, model.rows[experiment]] = readings
     found[np.isnan(found).any(axis=1)] = np.nan

@@ -1,4 +1,4 @@
-"""MATLAB files of version 5, loaded by the process of `first_look` before the command loads them itself, and their
+"""MATLAB files of version 5, loaded by the process of `sandboxed_reader` before the command loads them, and their
 structures read.
 """
 
@@ -13,10 +13,10 @@ from scipy.io import loadmat
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
-from vegglue.first_look import why_unreadable
 from vegglue.importers.library_files import read_by_library, refuse_larger_matlab
+from vegglue.sandboxed_reader import why_unreadable
 
-READ_MATLAB = f"{__name__}:read_all_variables"  # as `first_look` names it
+READ_MATLAB = f"{__name__}:read_all_variables"  # as `sandboxed_reader` names it
 KIND = "a MATLAB file of version 5"
 
 

@@ -27,7 +27,7 @@ from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.engine.newton import DIFFERENCE_STEP
 from vegglue.inference.posterior_summary import on_flat_scale
-from vegglue.parallel import side_by_side
+from vegglue.parallel import parallel_map
 from vegglue.results.posterior import Transfer
 
 # Posterior over prior variance of z [-] above which an experiment does not determine a parameter. Chosen, not measured:
@@ -48,7 +48,7 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
         return None
     noise = with_correlation(noise, noise.correlation, 1.0)
     parts = [one_experiment(model, noise, name) for name in here]
-    fits = side_by_side(partial(_alone, joint), parts)
+    fits = parallel_map(partial(_alone, joint), parts)
     scale, free = _scale(fits, [part.rows.size for _, part in parts], 1.0 if stated else 0.0)
     value, error = (np.full((len(here), len(model.names)), np.nan) for _ in range(2))
     for e, fitted in enumerate(fits):

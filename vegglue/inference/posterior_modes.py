@@ -25,7 +25,7 @@ from vegglue.engine.interface import Model, Point, linearise, linearise_from, pr
 from vegglue.engine.model import coarser, ever_coarser
 from vegglue.errors import InputError, shown_command
 from vegglue.inference.glue import fit_members, sizes_as_stated
-from vegglue.parallel import in_threads, side_by_side
+from vegglue.parallel import in_threads, parallel_map
 from vegglue.progress import Progress, Watch, counted
 from vegglue.results.ensemble import Ensemble
 
@@ -139,7 +139,7 @@ def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:
 
 def _fit_all(model: Model, noise: Noise, starts: Array, watch: Watch) -> list[MapEstimate]:
     finished = counted(watch, "following the best members downhill", len(starts), "members")
-    ends = side_by_side(partial(_fit_from, model, noise), [(z,) for z in starts], finished)
+    ends = parallel_map(partial(_fit_from, model, noise), [(z,) for z in starts], finished)
     return [end for end in ends if end is not None]
 
 
@@ -150,7 +150,7 @@ def _fit_from(model: Model, noise: Noise, z: Array) -> MapEstimate | None:
 
 def _refine_all(model: Model, coarse: Model, noise: Noise, ends: list[MapEstimate], watch: Watch) -> list[MapEstimate]:
     finished = counted(watch, "refining modes on finer cells", len(ends), "modes")
-    finer = side_by_side(partial(_refine, model, coarse, noise), [(end,) for end in ends], finished)
+    finer = parallel_map(partial(_refine, model, coarse, noise), [(end,) for end in ends], finished)
     return [end for end in finer if end is not None]
 
 

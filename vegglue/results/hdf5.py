@@ -4,7 +4,6 @@ Every group holds its own dimensions as scales. What is stored of which result s
 grows in `resume`.
 """
 
-import fcntl
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,12 +13,12 @@ import h5py
 import numpy as np
 
 from vegglue.errors import InputError, StorageError
-from vegglue.first_look import why_unreadable
 from vegglue.results.digest import is_unchanged, state_of, with_digest
 from vegglue.results.foreign_files import why_foreign
 from vegglue.results.hdf5_reading import READ_HDF5
 from vegglue.results.layout import Group
-from vegglue.whole_files import write_file
+from vegglue.sandboxed_reader import why_unreadable
+from vegglue.whole_files import lock, write_file
 
 # What reading a damaged file may raise, of Python or of the HDF5 library.
 UNREADABLE = (OSError, RuntimeError, ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError)
@@ -92,7 +91,7 @@ def refuse_in_use(path: Path) -> None:
     """Errors: StorageError when another program has the file open to change it, which locks it; OSError without one."""
     with path.open("rb") as file:
         try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            lock(file.fileno(), shared=True)
         except BlockingIOError as error:
             raise StorageError(f"{path} is in use by another program; close it there.") from error
         except OSError:

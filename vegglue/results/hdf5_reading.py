@@ -1,4 +1,4 @@
-"""How a result file is read to its end, by the process that does so before the command (`first_look`)."""
+"""How a result file is read to its end, by the process that does so before the command (`sandboxed_reader`)."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,7 @@ import numpy as np
 from vegglue.results.foreign_files import why_foreign
 
 AT_ONCE = 1 << 26  # [bytes] of values read at once
-READ_HDF5 = f"{__name__}:read_all_values"  # as `first_look` names it
+READ_HDF5 = f"{__name__}:read_all_values"  # as `sandboxed_reader` names it
 
 
 def read_all_values(path: str) -> None:

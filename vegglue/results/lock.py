@@ -1,6 +1,5 @@
-"""One run at a time in a folder: a lock that the operating system drops when its holder dies."""
+"""One run at a time in a folder: a lock that the operating system drops when its holder ends."""
 
-import fcntl
 import json
 import os
 import socket
@@ -10,46 +9,41 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from vegglue.errors import StorageError
+from vegglue.whole_files import NOT_FOLLOWED, lock
 
 
 @contextmanager
 def hold_lock(folder: Path) -> Iterator[None]:
-    """Hold `folder/.lock` for the length of the block; the file says who holds it (pid, host, time).
+    """Hold `folder/.lock` for the length of the block; the file names its holder (pid, host, time).
 
-    The lock itself is `flock`, so what a killed run left behind is taken over without asking. The file is emptied, not
-    removed: removing a locked file would let two runs hold two files of one name. A link is not followed: what it names
-    is another's.
-
-    Errors: StorageError when a living process holds it, or the folder cannot be written.
+    The operating system drops the lock of a killed run. The file is emptied, not removed: removing a locked file would
+    let two runs hold two files of one name. A link is not followed. Raises StorageError if a living process holds the
+    lock, or the folder cannot be written.
     """
     path = folder / ".lock"
     try:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | NOT_FOLLOWED, 0o644)
     except OSError as error:
         raise StorageError(f"{path}: cannot be written ({error.strerror}); make {folder} writable.") from error
     try:
-        _take(handle, path)
+        try:
+            lock(handle)
+        except BlockingIOError as error:
+            raise StorageError(f"{folder} is in use by {_holder(path)}; wait for it to end, or stop it.") from error
+        except OSError as error:
+            raise StorageError(f"{path}: cannot be locked ({error.strerror}); use a local folder.") from error
+        since = datetime.now(UTC).isoformat(timespec="seconds")
+        os.ftruncate(handle, 0)
+        os.write(handle, json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "since": since}).encode())
         yield
         os.ftruncate(handle, 0)
     finally:
         os.close(handle)
 
 
-def _take(handle: int, path: Path) -> None:
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise StorageError(f"{path.parent} is in use by {_holder(path)}; wait for it to end, or stop it.") from error
-    except OSError as error:
-        raise StorageError(f"{path}: this file system cannot lock ({error.strerror}); use a local folder.") from error
-    mark = {"pid": os.getpid(), "host": socket.gethostname(), "since": datetime.now(UTC).isoformat(timespec="seconds")}
-    os.ftruncate(handle, 0)
-    os.write(handle, json.dumps(mark).encode())
-
-
 def _holder(path: Path) -> str:
     try:
-        mark = json.loads(path.read_text())
+        mark = json.loads(path.read_text(encoding="utf-8"))
         return f"process {mark['pid']} on {mark['host']} since {mark['since']}"
     except (OSError, ValueError, KeyError):
         return "another process"
