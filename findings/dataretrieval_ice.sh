@@ -5,8 +5,8 @@
 #             site number keeps its leading zero as the docstring of the reader promises for codes.
 # Seen:       the column with "Ice" is text throughout, sound readings too ("120" < "95"). The stage of -999999 is a
 #             number among the others. Site 01491000 becomes 1491000, which is no site.
-# Matters:    maxima and comparisons of text run without an error and are wrong. hydrofunctions, for the same
-#             service, gives NaN in both places.
+# Matters:    maxima and comparisons of text run without an error and are wrong. hydrofunctions, which reads the JSON
+#             of the same service, gives NaN in both places.
 # Documented: the codes are in the help pages of the USGS; read_rdb documents na_values nowhere, no thread found.
 # Versions:   dataretrieval 1.4.0, pandas 2.3.3.
 set -eu

@@ -3,11 +3,11 @@
 #
 # Guess:      a window of time beyond the record gives the record, or NaN for the missing hours.
 # Seen:       the answer fills the window: each missing hour is -3.4028235e38, a finite number of the DSS format, in a
-#             plain array without a mask. np.isfinite is true, the mean is about -1e38, no warning.
+#             plain array without a mask. np.isfinite is true, the mean is about -2e38, no warning.
 # Matters:    boundary conditions and gauge records come from HEC-RAS and HEC-HMS as DSS. A test for NaN or infinity
 #             passes; in single precision the square of such a value overflows.
-# Documented: the value is part of the format; pydsstools issue 8 asks users to handle it and its author offers a mask
-#             there. hecdss has none; no remark in its documentation.
+# Documented: the value is part of the format; pydsstools issue 8 leaves it to the user, and pydsstools has a mask
+#             for it. hecdss has none; no remark in its documentation.
 # Versions:   hecdss 0.1.33, numpy 2.3.1.
 set -eu
 work=$(mktemp -d)
@@ -32,7 +32,7 @@ store = HecDss("weir.dss")
 store.put(series)
 values = store.get(path, datetime(2024, 1, 1, 20), datetime(2024, 1, 2, 4)).values
 store.close()
-print(f"hecdss {version('hecdss')}: 24 hours of 2 m3/s are stored, hours 20 to 28 are asked for")
+print(f"hecdss {version('hecdss')}: 24 hours of 2 m3/s are stored, hours 20 to 28 are requested")
 print("expected: four values, or NaN for the five hours that are not there")
 print(f"seen: {values.tolist()}, mean {values.mean():.3g}, type {type(values).__name__}")
 assert values[:4].tolist() == [2.0] * 4

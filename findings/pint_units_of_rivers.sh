@@ -8,7 +8,7 @@
 #             The common cfs, cms, m3/s and ft3/s are not known at all and raise.
 # Matters:    a reader that trusts "pint knows the unit" accepts headers of instruments with a wrong meaning;
 #             a check of dimensions is needed besides.
-# Documented: prefixes and units are in the definition file of the package; pint treats this as design.
+# Documented: prefixes and units are in the definition file of the package.
 # Versions:   pint 0.25.3 (0.26.2, for Python 3.12, is the same).
 set -eu
 work=$(mktemp -d)

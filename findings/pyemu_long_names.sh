@@ -2,7 +2,7 @@
 # pyEMU cuts names at 12 and 20 letters when it writes a binary matrix; different parameters get the same name.
 #
 # Guess:      a matrix that is written and read by the same library keeps its names. Names of up to 200 letters are
-#             allowed in PEST++ and pyEMU for years.
+#             allowed in PEST++ and pyEMU.
 # Seen:       Matrix.to_binary cuts columns at 12 and rows at 20 letters without a warning. "roughness_reach_1" and
 #             "roughness_reach_2" both come back as "roughness_re". to_ascii and to_coo keep whole names.
 # Matters:    a Jacobian or an ensemble written for PEST++ cannot be matched with its control file, or is matched
