@@ -6,22 +6,30 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from vegglue.results.candidate_effect import AmplitudeEstimate, Detectability, ScoreTest
-from vegglue.results.causes import CandidateLaw, CandidateLaws
-from vegglue.results.diagnosis import (
+from vegglue.measurements.plausibility import ImplausibleValues, Symptom
+from vegglue.results.causes import (
+    AmplitudeEstimate,
     CandidateEffect,
-    Diagnosis,
-    EstimatedErrors,
+    CandidateLaw,
+    CandidateLaws,
+    Detectability,
     FaultyInstrument,
     FieldFound,
-    FirstScreening,
     LocalAnomaly,
-    Misfit,
     ModelErrorUsed,
-    ParameterEstimates,
     PlaceMap,
-    Predictions,
+    Rival,
+    ScoreTest,
     Step,
+)
+from vegglue.results.diagnosis import Diagnosis, FirstScreening, Misfit, ParameterEstimates, Predictions
+from vegglue.results.verdict import (
+    ChiSquare,
+    EffectFound,
+    EffectsTested,
+    EstimatedErrors,
+    LawStandsOut,
+    NeighboursCorrelated,
     Verdict,
 )
 
@@ -76,6 +84,18 @@ def a_field(**fields: Any) -> FieldFound:
     return replace(usual, **fields)
 
 
+def an_effect_found(name: str = "eddies", **fields: Any) -> EffectFound:
+    """Of 0.3 m2/s with one rival; fields: to be changed."""
+    rival = Rival("mixing[D3]", "effect", 0.28)
+    return replace(EffectFound(name, "Störung – größer als 0", 0.3, (0.2, 0.4), "m2/s", 0.7, (), (rival,)), **fields)
+
+
+# Values that no flow can have, which a verdict doubts before all else.
+IMPLAUSIBLE = ImplausibleValues(
+    "velocity", "probe", "m/s", Symptom.FAST, "cm/s", 98.0, 2, 2, (41.0, 36.0, -1.0), (("low", "D3"),)
+)
+
+
 def candidate_laws_of(*names: str, **fields: Any) -> CandidateLaws:
     """Laws of the speed on the banks, of these names and chances that fall by half; fields: to be changed."""
     laws = tuple(
@@ -125,8 +145,8 @@ def a_diagnosis(
         name="open-x", version="0.1.0", candidate_effects=usual if candidate_effects is None else candidate_effects,
         steps=(step,) if steps is None else steps,
         verdict=Verdict(
-            "one-of", "Missing: eddies of 0.3 m²/s.", ("Fehler zählen – doppelt.",),
-            an_anomaly(), not_excluded=(), clears_the_model=False, tells_laws=False,
+            "one-of", ChiSquare(5.1, 3, 0.2), (an_effect_found(),), (an_anomaly(),), tested=EffectsTested(3, 4, 3),
+            notes=(NeighboursCorrelated(0.1), LawStandsOut(candidate_laws_of("law_bank_speed_step"), ("eddies",))),
         ),
         misfit=Misfit(chi2_first=2300.5, chi2=5.1, freedom=3, p=0.2, zones=zones),
         errors=EstimatedErrors(correlation=0.1, scale=1.0, grid_error=0.001, flagged=(1,)),
@@ -147,17 +167,18 @@ def a_diagnosis(
     return changed(diagnosis, PARTS, parts)
 
 
+SOUND = {"kind": "nothing-missing", "effects": (), "places": (), "notes": (), "clears_the_model": True}
 NOTHING = a_diagnosis(
-    candidate_effects=(), steps=(), verdict={"kind": "nothing-missing", "anomaly": None, "remarks": ()},
+    candidate_effects=(), steps=(), verdict=SOUND,
     misfit={"zones": pd.DataFrame(), "p": np.nan}, errors={"flagged": ()}, parameters={"first": {}, "last": {}},
     first_screening={"scores": {}, "compared": (), "cosine": np.zeros((0, 0))},
     place_map={"x": np.zeros(0), "y": np.zeros(0), "score": np.zeros(0)},
 )  # fmt: skip
 NOTHING = replace(NOTHING, places=(), instruments=(), model_error=None)
-NO_LOCATION = replace(a_diagnosis(verdict={"anomaly": None}), places=(), instruments=(), model_error=None)
+NO_LOCATION = replace(a_diagnosis(verdict={"places": ()}), places=(), instruments=(), model_error=None)
 # A field and places of other terms, and instruments that stood at no one place.
 EVERY_KIND = replace(
-    a_diagnosis(verdict={"kind": "none-of-these"}, place_map={"term": "inflow"}),
+    a_diagnosis(verdict={"kind": "none-of-these", "field": a_field()}, place_map={"term": "inflow"}),
     places=(an_anomaly(term="inflow", effect="unlisted_inflow", unit="m3/s"), an_anomaly(term="bed", odds={})),
     instruments=(an_instrument(), an_instrument(kind="probe", x=np.nan, stations=(0, 3), interval95=(-np.inf, 0.2))),
     field=a_field(),

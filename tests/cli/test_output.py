@@ -7,14 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import a_diagnosis
+from diagnoses import IMPLAUSIBLE, a_diagnosis
 from model_scores import a_model_score
 from posteriors import a_posterior, changed
 
 from vegglue.cli.ensemble_commands import _in_short
 from vegglue.cli.output import command_line
 from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
-from vegglue.results.diagnosis import BEFORE_ALL_ELSE
 from vegglue.workflow.compare import Comparison
 
 
@@ -66,7 +65,7 @@ def test_a_verdict_that_doubts_the_data_is_followed_by_no_table_of_effects(capsy
     """Effects followed with chances and amplitudes, as if these meant something."""
     show_diagnosis(a_diagnosis())
     assert "detectable from" in capsys.readouterr().out
-    show_diagnosis(a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."}))
+    show_diagnosis(a_diagnosis(verdict={"kind": "cannot-tell", "reasons": (IMPLAUSIBLE,)}))
     said = capsys.readouterr().out
     assert "detectable from" not in said
     assert "Mend them, or find them right, first" in " ".join(said.split())

@@ -12,7 +12,7 @@ from vegglue.calibration.fingerprints import Fingerprints
 from vegglue.calibration.residual_screening import screen
 from vegglue.diagnosis.candidate_effects import candidate_effects_of
 from vegglue.effects.library import library
-from vegglue.results.diagnosis import CandidateEffect
+from vegglue.results.causes import CandidateEffect
 
 STATION = stations_of(CASE_OF_TWINS, ("A", "B"), 6)
 

@@ -11,7 +11,7 @@ from vegglue.diagnosis.competition import hypotheses_of
 from vegglue.diagnosis.rivals import followed_further, with_chances
 from vegglue.diagnosis.tempered_probabilities import tempered_odds, tempered_probabilities
 from vegglue.progress import silent
-from vegglue.results.diagnosis import Step
+from vegglue.results.causes import Step
 
 ROWS, SLOPES, PRINTS = 60, 3, 8
 

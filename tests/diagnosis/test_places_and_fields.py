@@ -10,7 +10,7 @@ from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.conclusion import field_goes_first
 from vegglue.diagnosis.search_state import PriorWeight, SearchState
 from vegglue.progress import silent
-from vegglue.results.diagnosis import Step
+from vegglue.results.causes import Step
 
 
 @pytest.mark.parametrize(("log_factor", "gained", "first"), [

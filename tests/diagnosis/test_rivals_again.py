@@ -18,7 +18,7 @@ from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.rivals_again import Again, with_rivals_again
 from vegglue.engine.interface import Model, linearise
 from vegglue.progress import silent
-from vegglue.results.diagnosis import Step
+from vegglue.results.causes import Step
 
 # What is hidden, what was taken for the first of both, and amplitudes that are clearly seen.
 TRUE, LATER, TAKEN = "viscosity", "discharge_error[high]", "edge_mixing"

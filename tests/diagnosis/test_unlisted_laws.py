@@ -17,8 +17,7 @@ from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.search_state import PriorWeight, SearchState
 from vegglue.diagnosis.unlisted_laws import candidate_laws, clearly_a_law, laws_beside
 from vegglue.effects.grammar import LAWS
-from vegglue.results.causes import CandidateLaws
-from vegglue.results.diagnosis import Step
+from vegglue.results.causes import CandidateLaws, Step
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import measured_twin, true_place, twin_base
 

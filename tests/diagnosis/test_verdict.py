@@ -14,8 +14,9 @@ from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.rivals import undecided_of
-from vegglue.diagnosis.verdict import make_verdict
-from vegglue.results.diagnosis import EstimatedErrors, Misfit, ModelErrorUsed, Step
+from vegglue.results.causes import ModelErrorUsed, Step
+from vegglue.results.diagnosis import Misfit
+from vegglue.results.verdict import EstimatedErrors, make_verdict
 
 
 def test_nothing_is_missing_only_where_it_would_be_seen() -> None:

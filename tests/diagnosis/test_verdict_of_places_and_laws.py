@@ -2,12 +2,12 @@
 
 import pytest
 from diagnoses import a_candidate_effect, a_field, an_anomaly, an_instrument, candidate_laws_of
+from vegglue.diagnosis.remarks import TOO_SHALLOW
 from verdicts import MISSES, inputs, said, step
 
 from vegglue.diagnosis.competition import Hypothesis
-from vegglue.diagnosis.remarks import TOO_SHALLOW
 from vegglue.diagnosis.search_state import Undecided
-from vegglue.diagnosis.verdict import make_verdict
+from vegglue.results.verdict import make_verdict
 
 
 def test_a_place_wins_over_steps_and_all_are_told() -> None:

@@ -7,7 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import EVERY_KIND, NOTHING, a_diagnosis, a_field, an_anomaly, an_instrument, candidate_laws_of
+from diagnoses import (
+    EVERY_KIND,
+    IMPLAUSIBLE,
+    NOTHING,
+    a_diagnosis,
+    a_field,
+    an_anomaly,
+    an_instrument,
+    candidate_laws_of,
+)
 from posteriors import a_refinement, changed
 from report_runs import a_toy, told_of, written
 
@@ -21,7 +30,8 @@ from vegglue.pages.next_words import next_steps
 from vegglue.pages.run import LoopResults, Run
 from vegglue.pages.sections import safe_json
 from vegglue.pages.tables import station_rows
-from vegglue.results.diagnosis import BEFORE_ALL_ELSE, Diagnosis, Step
+from vegglue.results.causes import Step
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.model_comparison import ComparedModel, ModelComparison
 from vegglue.results.open_questions import ProposedMeasurement, Question
 
@@ -188,7 +198,7 @@ def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> 
 
 def test_no_field_work_is_proposed_before_wrong_measurements_are_mended(toy: Run) -> None:
     """Of velocities in cm/s read as m/s the page said to measure another section for six hours."""
-    doubted = a_diagnosis((), (), verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."})
+    doubted = a_diagnosis((), (), verdict={"kind": "cannot-tell", "reasons": (IMPLAUSIBLE,)})
     question = Question("eddies from a change of k_s", (GAUGE,))
     steps = [
         plain(step) for step in next_steps(replace(toy, diagnosis=doubted, loop=LoopResults(questions=(question,))))
@@ -198,7 +208,7 @@ def test_no_field_work_is_proposed_before_wrong_measurements_are_mended(toy: Run
 
 
 def test_what_is_found_with_doubtful_measurements_is_folded_and_says_so(toy: Run) -> None:
-    doubted = a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."})
+    doubted = a_diagnosis(verdict={"kind": "cannot-tell", "reasons": (IMPLAUSIBLE,)})
     sound, section = diagnosis_section(a_diagnosis()), diagnosis_section(doubted)
     assert sound.condition == ""
     assert "found with the measurements as they stand" in section.condition
@@ -370,7 +380,7 @@ def test_a_parameter_at_its_bound_is_told_in_the_headline(toy: Run) -> None:
     assert plain(headline_lines(pressed)[-1]).startswith("φ (upper) ends at a bound of its prior, and the bound, not")
     assert "bound" not in headline(replace(toy, diagnosis=NOTHING, posterior=changed(toy.posterior, bound_hit={
         name: np.array([False, False]) for name in toy.posterior.parameters})))  # fmt: skip
-    doubted = a_diagnosis(verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."})
+    doubted = a_diagnosis(verdict={"kind": "cannot-tell", "reasons": (IMPLAUSIBLE,)})
     assert "bound" not in headline(replace(pressed, diagnosis=doubted)), "which only follows from the data"
 
 

@@ -33,7 +33,8 @@ from vegglue.pages.diagnosis_words import diagnosis_section, ranked_suspects, rm
 from vegglue.pages.flow_maps import Outline
 from vegglue.pages.ladder_figure import draw_ladder, save_ladder_figure
 from vegglue.pages.style import COLOUR
-from vegglue.results.diagnosis import Diagnosis, Predictions, Step
+from vegglue.results.causes import Step
+from vegglue.results.diagnosis import Diagnosis, Predictions
 from vegglue.results.model_score import HeldOut, InSample, ModelScore, PredictiveScores
 
 pytestmark = pytest.mark.slow

@@ -11,8 +11,7 @@ import pytest
 from diagnoses import EVERY_KIND, NO_LOCATION, NOTHING, a_diagnosis
 
 from vegglue.errors import InputError, StorageError
-from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.diagnosis_json import diagnosis_json
+from vegglue.results.diagnosis import Diagnosis, diagnosis_json
 from vegglue.results.result_files import diagnosis_that_fits, read_diagnosis, write_diagnosis
 
 HASH = "d" * 64

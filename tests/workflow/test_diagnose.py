@@ -18,9 +18,7 @@ def test_a_diagnosis_is_written_after_all_that_belongs_to_it(tmp_path: Path, mon
     monkeypatch.setattr(verb, "diagnose_model", lambda *given: a_diagnosis())
     monkeypatch.setattr(verb, "keep_best_fit", lambda *given: order.append("best fit"))
     monkeypatch.setattr(verb, "write_diagnosis", lambda *given: order.append("diagnosis"))
-    monkeypatch.setattr(
-        "vegglue.pages.diagnosis_figures.save_diagnosis_figure", lambda *given: order.append("picture")
-    )
+    monkeypatch.setattr("vegglue.pages.diagnosis_figures.save_diagnosis_figure", lambda *given: order.append("picture"))
     vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1)
     assert order == ["picture", "best fit", "diagnosis"]
 

@@ -27,7 +27,8 @@ from vegglue.diagnosis.nominations import (
 from vegglue.diagnosis.stepwise_choice import Choice
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.observations import read_observations
-from vegglue.results.diagnosis import Diagnosis, LocalAnomaly, Step
+from vegglue.results.causes import LocalAnomaly, Step
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import write_diagnosis
 from vegglue.workflow.extend import extend, in_words, write_child
 

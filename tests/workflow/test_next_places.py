@@ -20,7 +20,8 @@ from vegglue.effects.library import library
 from vegglue.engine.interface import Model
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
-from vegglue.results.diagnosis import ParameterEstimates, Step
+from vegglue.results.causes import Step
+from vegglue.results.diagnosis import ParameterEstimates
 from vegglue.results.json_store import write_questions
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.workflow import next_measurement as verb

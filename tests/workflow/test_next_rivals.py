@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from diagnoses import a_diagnosis
+from diagnoses import IMPLAUSIBLE, a_diagnosis
 
 from vegglue.diagnosis.next_measurement import MeasurementWorth, _least
-from vegglue.results.diagnosis import BEFORE_ALL_ELSE
 from vegglue.workflow.next_measurement import _answers, _questions
 
 
@@ -27,7 +26,7 @@ FAR, SHALLOW = worth("a section far off", [0.2, 0.2, 9.0]), worth("a lower disch
 
 
 def test_nothing_is_asked_of_data_that_are_in_doubt() -> None:
-    doubted = a_diagnosis((), (), verdict={"kind": "cannot-tell", "sentence": f"{BEFORE_ALL_ELSE}velocities in cm/s."})
+    doubted = a_diagnosis((), (), verdict={"kind": "cannot-tell", "reasons": (IMPLAUSIBLE,)})
     case: Any = SimpleNamespace()
     assert _questions(case, replace(doubted, steps=a_diagnosis().steps)) == []
 

@@ -84,7 +84,7 @@ def gone(
     laws: CandidateLaws | None = None,
 ) -> tuple[list[str], list[str]]:
     """Cases whose ensembles `run` makes, and the kinds of results it shows, where nothing is solved."""
-    found = a_diagnosis(verdict={"kind": kind, "tells_laws": laws is not None})
+    found = a_diagnosis(verdict={"kind": kind, "laws": laws})
     found = replace(found, places=found.places[:1] * places, laws=laws)
     model_scores = {TWIN.name: 0.02, WITH_LAW.name: error_with_law}
     alone = SimpleNamespace(model_scores=(TWIN.name,), left_out=None)
@@ -144,9 +144,7 @@ def test_no_law_is_searched_for_a_place_or_in_silence(
 
 
 @pytest.mark.slow
-def test_measurements_are_read_once_and_the_site_is_built_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_measurements_are_read_once_and_the_site_is_built_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the case and of all its children; sites of coarser cells are others."""
     case = load_case(write_reach(tmp_path, COARSE, WITH_ERRORS))
     counted = {"read": 0, "built": 0}

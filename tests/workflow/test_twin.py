@@ -18,7 +18,7 @@ from vegglue.diagnosis.child_config import candidate_named
 from vegglue.engine.interface import Cause, responses
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
-from vegglue.results.diagnosis import Step
+from vegglue.results.causes import Step
 from vegglue.results.result_files import write_diagnosis
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import Answer, Hidden, TwinBase, errors_named, measured_twin, true_place, twin_base

@@ -12,8 +12,7 @@ from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.pages.posterior_words import posterior_in_words
 from vegglue.pages.prior_words import off_its_prior, pressed_bounds
-from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.diagnosis_json import diagnosis_json
+from vegglue.results.diagnosis import Diagnosis, diagnosis_json
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.results.posterior import Posterior

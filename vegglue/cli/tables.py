@@ -10,7 +10,8 @@ from vegglue.diagnosis.excluded_stations import exclusion_in_words
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.pages.homogeneity_words import REJECTED_BELOW
-from vegglue.results.diagnosis import CandidateEffect, Diagnosis
+from vegglue.results.causes import CandidateEffect
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.model_score import ModelScore
 from vegglue.results.open_questions import Question
 from vegglue.wording.numbers import in_digits, range_in_digits, so_many

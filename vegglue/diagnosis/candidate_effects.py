@@ -8,7 +8,7 @@ from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import prior_shrinkage
 from vegglue.decision_constants import constants
 from vegglue.normal_range import NORMAL95
-from vegglue.results.candidate_effect import AmplitudeEstimate, CandidateEffect, Detectability, ScoreTest
+from vegglue.results.causes import AmplitudeEstimate, CandidateEffect, Detectability, ScoreTest
 
 # Lengths of a fingerprint, in standard errors, that may be there undetected: thresholds are near a score of 3.2, so
 # that longer ones stand out and shorter ones change little. Which it is nobody knows.

@@ -29,7 +29,7 @@ from vegglue.effects.definition import Effect
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.errors import InputError
-from vegglue.results.diagnosis import LocalAnomaly
+from vegglue.results.causes import LocalAnomaly
 
 
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:

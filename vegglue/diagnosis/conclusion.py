@@ -1,61 +1,74 @@
 """What a diagnosis concludes from its first and its last screening, as the values it is kept and told in."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, log_evidence
+from vegglue.calibration.fingerprints import LEAST_DEPTH
 from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
 from vegglue.calibration.law_screening import LawScreening
 from vegglue.calibration.noise import with_correlation
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named
-from vegglue.case.case_effects import parameters_of_effects
+from vegglue.case.case_effects import effect_of, parameters_of_effects
+from vegglue.case.centreline import on_map
 from vegglue.case.channel_geometry import half_width
+from vegglue.case.grid import centreline_in
+from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.between_sections import largest_error_between
 from vegglue.diagnosis.candidate_effects import candidate_effects_of, not_excluded
-from vegglue.diagnosis.causes_in_words import places_told
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
-from vegglue.diagnosis.measured_stretch import stretch_in_words
+from vegglue.diagnosis.held_out import HeldOutErrors, held_out_errors
 from vegglue.diagnosis.misfit_zones import misfit_zones
-from vegglue.diagnosis.places_on_map import places_on_map_in_words
-from vegglue.diagnosis.search_state import SearchState
+from vegglue.diagnosis.search_state import SearchState, rivals_in
 from vegglue.diagnosis.tempered_probabilities import tempering
-from vegglue.diagnosis.unlisted_laws import candidate_laws, clearly_a_law, law_goes_first
-from vegglue.diagnosis.unseen import UnseenErrors, unseen_errors
-from vegglue.diagnosis.verdict import make_verdict
-from vegglue.diagnosis.verdict_inputs import VerdictInputs
+from vegglue.diagnosis.unlisted_laws import candidate_laws, clearly_a_law
+from vegglue.effects.definition import Stage
 from vegglue.engine.interface import Model
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.section_discharge import mismatched_discharges
-from vegglue.results.diagnosis import (
+from vegglue.results.causes import (
+    TERMS_AT_PLACES,
     CandidateEffect,
-    Diagnosis,
-    EstimatedErrors,
     FieldFound,
     FieldMapKept,
-    FirstScreening,
     LocalAnomaly,
-    Misfit,
     ModelErrorUsed,
-    ParameterEstimates,
     PlaceMap,
-    Predictions,
+    Rival,
+)
+from vegglue.results.diagnosis import Diagnosis, FirstScreening, Misfit, ParameterEstimates, Predictions
+from vegglue.results.verdict import (
+    EstimatedErrors,
+    MeasuredStretch,
+    Note,
+    PlacesOnMap,
+    TooShallow,
+    VerdictInputs,
+    make_verdict,
 )
 from vegglue.version import VERSION
 
-# Chance that errors alone make any effect look as strong, below which one is told as standing out: the rate of the
-# alarm beside what was accepted (`diagnose`), which places, instruments and slack may keep silent all the same.
-STANDS_OUT = 0.01
+# Chance that errors alone make any effect look as strong, below which one is significant: the rate of the alarm beside
+# what was accepted (`diagnose`), which places, instruments and slack may keep silent all the same.
+SIGNIFICANT = 0.01
 # Effects whose likeness is kept, the strongest of the first screening.
 COMPARED = 12
 # Spacings of a section [-] within which two readings stand side by side: neighbours are about one apart, others two.
 NEIGHBOURS_WITHIN = 1.5
+# Hypotheses that a verdict names if none leads.
+UNDECIDED_NAMED = 3
+# Share of the channel below which velocities come from a small part of it. Chosen, not measured.
+SMALL_PART = 0.5
+# Stages whose effects may change from place to place along the channel; others act at an end, or in what is read.
+ALONG_THE_CHANNEL: tuple[Stage, ...] = ("plants", "resistance", "exchange", "force")
 # Shares of the allowed model error of which the likelihood is computed [-].
 ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
@@ -64,34 +77,68 @@ def assemble_diagnosis(
     first: Screening,
     last: Screening,
     found: SearchState,
-    candidate_effects: Mapping[str, CandidateEffect],
-    unseen: Model | None,
+    effects: Mapping[str, CandidateEffect],
+    held_out: Model | None,
     laws_beside_first: Callable[[], LawScreening | None],
 ) -> Diagnosis:
-    """The diagnosis; candidate_effects: of every effect by its name; unseen: the model where nothing was calibrated."""
+    """The diagnosis; effects: every candidate by its name; held_out: the model at measurements no calibration uses."""
     laws = candidate_laws(first, last, found, laws_beside_first)
     if found.places and not found.steps and not found.instruments and clearly_a_law(laws):
         # What competed after the place did so in the flow with it.
         found = replace(found, places=(), prior_weights=(), of_shape=0.0, undecided=None)
-        last, candidate_effects = first, candidate_effects_of(first)
+        last, effects = first, candidate_effects_of(first)
     found = replace(found, places=tuple(as_calibrated(one, last.base) for one in found.places))
-    ranked = tuple(
-        sorted(candidate_effects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2)))
-    )
-    misfit = misfit_of(first, last, found.flagged)
-    field, field_map = (None, None) if law_goes_first(laws, found) else _field(first, last, found, misfit)
-    inputs = replace(_inputs(last, found, misfit, unseen), field=field, laws=laws)
+    ranked = tuple(sorted(effects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
+    misfit, errors = misfit_of(first, last, found.flagged), estimated_errors(last, found)
+    likely = laws is not None and laws.likelier and not found.accepted
+    field, field_map = (None, None) if likely else _field(first, last, found, misfit)
     base, before = last.base, first.base
+    model_error = _model_error(last)
+    # Whether silence is earned is a question only if nothing was found.
+    silent = not (found.steps or found.places or found.undecided)
+    unseen = HeldOutErrors(float("nan"), 1.0)
+    if silent and held_out is not None:
+        unseen = held_out_errors(base, held_out)
+    beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
+    model = base.model
+    verdict = make_verdict(
+        VerdictInputs(
+            candidates=ranked,
+            errors=errors,
+            misfit=misfit.size,
+            steps=found.steps,
+            places=found.places,
+            instruments=found.instruments,
+            undecided=undecided,
+            implausible=found.implausible,
+            field=field,
+            laws=laws,
+            model_error=model_error,
+            not_excluded=() if found.implausible else not_excluded(last),
+            held_out=unseen.ratio,
+            by_chance=unseen.by_chance,
+            neighbours=_neighbours_excluded(last, found),
+            strained=_strained(last),
+            between=largest_error_between(base) if silent else 1.0,
+            carried=tuple(mismatched_discharges(model.case, model.site, model.station)),
+            significant_effects=beside,
+            remainder=bool(beside) and not significant_effects(last, found, found.slack),
+            surroundings=tuple(_surroundings(last, found, undecided)),
+        )
+    )
     return Diagnosis(
         name=before.model.case.name,
         version=VERSION,
-        verdict=make_verdict(inputs, ranked),
+        verdict=verdict,
         candidate_effects=ranked,
         steps=found.steps,
         misfit=misfit,
-        errors=inputs.errors,
+        errors=errors,
         first_screening=_first_screening(first),
-        parameters=_parameters(before, base),
+        parameters=ParameterEstimates(
+            {name: interval95(before.model, before.fitted, name)[0] for name in before.model.names},
+            {name: interval95(base.model, base.fitted, name) for name in base.model.names},
+        ),
         predictions=Predictions(
             station=before.model.station,
             first=before.fitted.point.prediction,
@@ -102,7 +149,7 @@ def assemble_diagnosis(
         places=found.places,
         instruments=found.instruments,
         field=field,
-        model_error=inputs.model_error,
+        model_error=model_error,
         field_map=field_map,
         laws=laws,
     )
@@ -115,31 +162,44 @@ def as_calibrated(place: LocalAnomaly, base: Baseline) -> LocalAnomaly:
     return replace(place, amplitude=value, interval95=(low, high))
 
 
-def _inputs(last: Screening, found: SearchState, misfit: Misfit, unseen: Model | None) -> VerdictInputs:
-    """What the verdict rests on, but for fields and laws."""
-    silent = not (found.steps or found.places or found.undecided)
-    beside = significant_effects(last, found)
-    there = unseen_errors(last.base, unseen) if silent and unseen is not None else UnseenErrors(float("nan"), 1.0)
-    model = last.base.model
-    return VerdictInputs(
-        errors=estimated_errors(last, found),
-        misfit=misfit,
-        state=found,
-        field=None,
-        model_error=_model_error(last),
-        not_excluded=() if found.absurd else not_excluded(last),
-        unseen=there.ratio,
-        by_chance=there.by_chance,
-        neighbours=_neighbours_aside(last, found),
-        strained=_strained(last),
-        between=largest_error_between(last.base) if silent else 1.0,
-        stretch=stretch_in_words(model.case, model.station),
-        on_map=places_on_map_in_words(model.case, places_told(found)),
-        places_searched=any(one.x.size for one in last.fingerprints.places),
-        carried=tuple(mismatched_discharges(model.case, model.site, model.station)),
-        significant_effects=beside,
-        remainder=bool(beside) and not significant_effects(last, found, found.slack),
-    )
+def _surroundings(last: Screening, found: SearchState, undecided: Sequence[Rival]) -> Iterator[Note]:
+    """Where the named places lie on the map, which part of the channel was measured, and whether it is too shallow."""
+    case, station = last.base.model.case, last.base.model.station
+    yield from places_on_map(case, named_places(found.places, undecided))
+    yield from measured_stretch(case, station)
+    if not any(one.x.size for one in last.fingerprints.places):
+        yield TooShallow(LEAST_DEPTH)
+
+
+def named_places(places: Sequence[LocalAnomaly], undecided: Sequence[Rival]) -> list[tuple[float, float]]:
+    """x, y [m] of what the verdict names at places outside the list."""
+    rivals = [one for one in undecided[:UNDECIDED_NAMED] if one.kind in TERMS_AT_PLACES]
+    return [(one.x, one.y) for one in places or rivals]
+
+
+def places_on_map(case: Case, places: Sequence[tuple[float, float]]) -> Iterator[PlacesOnMap]:
+    """Where places along and across the channel [m] lie on the map; none if the case knows no map."""
+    line, frame = centreline_in(case), case.frame
+    if not places or (line is None and frame is None):
+        return
+    x, y = np.array(places).T
+    east, north = (x, y) if line is None else on_map(line, x, y)
+    if frame is not None:
+        east, north = frame.to_map(east, north)
+    yield PlacesOnMap(tuple((*one, float(e), float(n)) for one, e, n in zip(places, east, north, strict=True)))
+
+
+def measured_stretch(case: Case, station: pd.DataFrame) -> Iterator[MeasuredStretch]:
+    """The stretch with velocities and the effects that act along the channel, if it is less than SMALL_PART of it: an
+    effect is one law for the whole channel, and velocities only show it where they are.
+    """
+    effects = [effect_of(case, name) for name in case.effects]
+    law = [one for one in effects if one.stage in ALONG_THE_CHANNEL and "search" not in one.tags]
+    along = tuple(dict.fromkeys(one.name for one in law))
+    used = station["x"][velocity_rows(station) & station["used"].to_numpy()]
+    whole = case.grid.x[1] - case.grid.x[0]
+    if along and not used.empty and used.max() - used.min() < SMALL_PART * whole:
+        yield MeasuredStretch(float(used.min()), float(used.max()), float(whole), along)
 
 
 def significant_effects(last: Screening, found: SearchState, slack: float = 0.0) -> dict[str, float]:
@@ -151,7 +211,7 @@ def significant_effects(last: Screening, found: SearchState, slack: float = 0.0)
         one.name: last.effects.p_of(max(abs(last.best_score(j)) - slack, 0.0))
         for j, one in enumerate(last.fingerprints.candidates)
     }
-    return {name: p for name, p in chances.items() if p < STANDS_OUT and name not in found.effects}
+    return {name: p for name, p in chances.items() if p < SIGNIFICANT and name not in found.effects}
 
 
 def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Misfit:
@@ -168,13 +228,6 @@ def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Mi
         freedom=freedom,
         p=chance_of_misfit(misfit, freedom),
         zones=misfit_zones(before.model, errors_as_last, before.fitted.point, flagged),
-    )
-
-
-def _parameters(before: Baseline, after: Baseline) -> ParameterEstimates:
-    return ParameterEstimates(
-        {name: interval95(before.model, before.fitted, name)[0] for name in before.model.names},
-        {name: interval95(after.model, after.fitted, name) for name in after.model.names},
     )
 
 
@@ -208,7 +261,7 @@ def _field(
     accepted, or closes a misfit in which nothing was; None where there is nothing to explain, or where a place of the
     same term says it in fewer words.
     """
-    if found.absurd or (not (found.accepted or found.undecided) and misfit.p >= constants().poor_fit_chance):
+    if found.implausible or (not (found.accepted or found.undecided) and misfit.p >= constants().poor_fit_chance):
         return None, None
     screening = first if found.accepted else last
     best, responses = best_field(screening.search, half_width(screening.base.model.site))
@@ -240,7 +293,7 @@ def field_goes_first(log_factor: float, gained: float) -> bool:
     return bool(ahead > np.log(constants().field_odds))
 
 
-def _neighbours_aside(screening: Screening, found: SearchState) -> bool:
+def _neighbours_excluded(screening: Screening, found: SearchState) -> bool:
     """Whether two single readings were set aside that stand side by side in one section."""
     single = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
     noise = screening.base.noise

@@ -48,7 +48,8 @@ from vegglue.errors import InputError
 from vegglue.measurements.plausibility import implausible_values
 from vegglue.parallel import in_threads, submit
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.diagnosis import CandidateEffect, Diagnosis, Step
+from vegglue.results.causes import CandidateEffect, Step
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.wording.sentences import sentence
 
 # Effects and places that are accepted at most, and instruments.
@@ -74,17 +75,23 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
     watch(Progress(with_compilation("calibrating the model as it is")))
-    absurd = tuple(map(sentence, implausible_values(model.case, model.site, model.station)))
-    base = _calibrated_unless_absurd(model, absurd)
+    implausible = tuple(implausible_values(model.case, model.site, model.station))
+    try:
+        base = kept_baseline(model)
+    except InputError as error:
+        if not implausible:
+            raise
+        why = " ".join(map(sentence, implausible))
+        raise InputError(f"{model.case.name}: no flow comes near what was measured. {why}") from error
     watch(Progress("looking for what is missing"))
     first = screening = screen(base)
-    found, candidate_effects = SearchState(absurd=absurd), dict[str, CandidateEffect]()
-    laws = partial(laws_beside, first) if absurd else submit(laws_beside, first)
+    found, candidate_effects = SearchState(implausible=implausible), dict[str, CandidateEffect]()
+    laws = partial(laws_beside, first) if implausible else submit(laws_beside, first)
     while True:
         tested = candidate_effects_of(screening)
         candidate_effects = tested | _kept(candidate_effects, tested)
         found = _with_alarm(screening, found)
-        if found.absurd or not found.alarmed:
+        if found.implausible or not found.alarmed:
             break
         hypotheses = hypotheses_of(screening, watch)
         candidate_effects |= refitted(hypotheses, tested)
@@ -105,16 +112,6 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         for step in found.steps:
             candidate_effects[step.accepted] = _in_model(candidate_effects[step.accepted], screening.base)
     return assemble_diagnosis(first, screening, found, candidate_effects, unseen, laws)
-
-
-def _calibrated_unless_absurd(model: Model, absurd: Sequence[str]) -> Baseline:
-    """The calibrated model. Errors: InputError, which tells of absurd values first: no flow may come near them."""
-    try:
-        return kept_baseline(model)
-    except InputError as error:
-        if not absurd:
-            raise
-        raise InputError(f"{model.case.name}: no flow comes near what was measured. {' '.join(absurd)}") from error
 
 
 def _with_alarm(screening: Screening, found: SearchState) -> SearchState:

@@ -10,7 +10,8 @@ from vegglue.diagnosis.between_sections import acts_elsewhere
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error
 from vegglue.diagnosis.comparison import By, model_score
 from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
-from vegglue.results.diagnosis import Diagnosis, LocalAnomaly
+from vegglue.results.causes import LocalAnomaly
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.model_score import ModelScore
 
 Addition = tuple[Candidate, Mapping[str, float]]  # an effect, and values of its shapes

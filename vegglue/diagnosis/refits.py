@@ -34,7 +34,7 @@ from vegglue.engine.interface import Model, Point, linearise, linearise_as_coars
 from vegglue.normal_range import NORMAL95
 from vegglue.parallel import parallel_map
 from vegglue.progress import Progress, Watch, counted, silent
-from vegglue.results.diagnosis import CandidateEffect
+from vegglue.results.causes import CandidateEffect
 
 # Steps that a refit may take. Chosen, not measured: most need four.
 REFIT_STEPS = 10

@@ -19,7 +19,7 @@ from vegglue.diagnosis.search_state import Undecided
 from vegglue.diagnosis.tempered_probabilities import tempered_odds
 from vegglue.measurements.kinds import kind_of
 from vegglue.normal_range import NORMAL95
-from vegglue.results.diagnosis import FaultyInstrument, LocalAnomaly, Step
+from vegglue.results.causes import FaultyInstrument, LocalAnomaly, Step
 
 # Share of the squared fingerprint of a spot above which an experiment is said to point at it.
 POINTS_AT_IT = 0.1

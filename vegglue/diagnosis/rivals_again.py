@@ -15,7 +15,7 @@ from vegglue.diagnosis.competition import Hypothesis, hypotheses_of
 from vegglue.diagnosis.refits import Refit, calibrated_with, without_effect
 from vegglue.diagnosis.rivals import step_found
 from vegglue.progress import Progress, Watch
-from vegglue.results.diagnosis import CandidateEffect, Step
+from vegglue.results.causes import CandidateEffect, Step
 
 # The model, the steps and the candidate_effects, as they are now.
 Again = tuple[Baseline, tuple[Step, ...], dict[str, CandidateEffect]]

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
+from vegglue.calibration.candidates import Instrument
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import Hypothesis
-from vegglue.results.diagnosis import FaultyInstrument, LocalAnomaly, Step
+from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues
+from vegglue.results.causes import FaultyInstrument, LocalAnomaly, Rival, Step
 
 
 @dataclass(frozen=True)
@@ -24,12 +26,26 @@ class Undecided:
     chances: tuple[float, ...]
 
 
+def rivals_in(undecided: Undecided) -> tuple[Rival, ...]:
+    """The hypotheses as values with their probabilities, the likeliest first."""
+    rivals = []
+    for one, chance in zip(undecided.hypotheses, undecided.chances, strict=True):
+        if isinstance(one.what, Instrument):
+            rivals.append(Rival(one.name, one.what.kind, chance, one.what.x, one.what.y))
+        elif one.kind == "effect":
+            rivals.append(Rival(one.name, "effect", chance))
+        else:
+            shapes = one.what.shapes
+            rivals.append(Rival(one.name, one.kind, chance, shapes["x"], shapes["y"], one.what.amplitude))
+    return tuple(sorted(rivals, key=lambda one: -one.probability))
+
+
 @dataclass(frozen=True)
 class SearchState:
     """prior_weights: of all that is held. flagged: readings set aside, indices among the used stations. of_shape:
     ln evidence of places as they competed, less that in the model, whose covariance holds the error of their shape. p:
-    of the last alarm, and the rate below which it is sounded. undecided: what competed last and led to nothing. absurd:
-    values that no flow of the case can have, in sentences.
+    of the last alarm, and the rate below which it is sounded. undecided: what competed last and led to nothing.
+    implausible: values that no flow of the case can have.
     """
 
     steps: tuple[Step, ...] = ()
@@ -41,7 +57,7 @@ class SearchState:
     p: float = 1.0
     rate: float = 0.0
     undecided: Undecided | None = None
-    absurd: tuple[str, ...] = ()
+    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()
 
     @property
     def alarmed(self) -> bool:

@@ -38,7 +38,7 @@ def candidate_laws(
 
     beside_first: `laws_beside` the first screening, begun before it is known whether it is asked for.
     """
-    if found.absurd:
+    if found.implausible:
         return None
     screening = beside_first() if found.accepted or last is first else laws_beside(last)
     if screening is None or screening.p >= constants().law_alarm_rate:
@@ -50,16 +50,6 @@ def candidate_laws(
     laws = tuple(_law(screening, int(j), float(chances[j])) for j in order[:count])
     suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), laws)
     return None if found.steps and not clearly_a_law(suspected) else suspected
-
-
-def law_goes_first(laws: CandidateLaws | None, found: SearchState) -> bool:
-    """Whether a law is told rather than what else may be said where nothing listed was accepted."""
-    return laws is not None and is_likelier(laws) and not found.accepted
-
-
-def is_likelier(laws: CandidateLaws) -> bool:
-    """Whether laws are likelier than all else together."""
-    return laws.chance > 0.5
 
 
 def clearly_a_law(laws: CandidateLaws | None) -> bool:

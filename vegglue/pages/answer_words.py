@@ -21,10 +21,10 @@ from vegglue.pages.prior_words import ends_at_bounds
 from vegglue.pages.run import Run
 from vegglue.pages.typography import NARROW, decimals_between, fixed, html_notation, interval, percent, unit_html
 from vegglue.pages.validation_words import UNBELIEVED
-from vegglue.results.candidate_effect import AmplitudeEstimate
-from vegglue.results.diagnosis import Diagnosis, Step
+from vegglue.results.causes import AmplitudeEstimate, Step
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.posterior import Posterior
-from vegglue.results.small_misfit import small_misfit_in_short
+from vegglue.results.verdict import MisfitTooSmall, is_too_small
 from vegglue.wording.numbers import listed, so_many, without_asides
 from vegglue.wording.sentences import phrase
 
@@ -58,9 +58,12 @@ def _limits(run: Run) -> list[str]:
     """That parameters end at bounds, and that the misfit is far too small."""
     posterior, refined = run.posterior, run.posterior.refinement
     notation = html_notation({name: symbol(run.case, name) for name in posterior.parameters})
-    stated = refined is not None and refined.error_model.errors == "stated"
-    small = small_misfit_in_short(refined.misfit.chi2, refined.misfit.freedom) if stated and refined is not None else ""
-    return [one for one in (ends_at_bounds(posterior, notation), small) if one]
+    lines = [ends_at_bounds(posterior, notation)]
+    if refined is not None and refined.error_model.errors == "stated":
+        chi2, freedom = refined.misfit.chi2, refined.misfit.freedom
+        if is_too_small(chi2, freedom):
+            lines.append(phrase("misfit_too_small_in_short", MisfitTooSmall(chi2, freedom)))
+    return [one for one in lines if one]
 
 
 def _said(found: Diagnosis, model: str, tense: str) -> list[str]:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegglue.pages.typography import NARROW, fixed, interval, percent, short, unit_html
-from vegglue.results.causes import FAULT_WORDS, UNIT_OF_FIELD
-from vegglue.results.diagnosis import Diagnosis, FaultyInstrument, LocalAnomaly, Step
+from vegglue.results.causes import UNIT_OF_FIELD, FaultyInstrument, LocalAnomaly, Step
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.wording.numbers import so_many
+from vegglue.wording.sentences import phrase
 
 # What a spot of each term means where its score is positive, and where it is negative.
 TERM_SIGNS: Mapping[str, tuple[str, str]] = {
@@ -97,7 +98,7 @@ def against_rivals(place: LocalAnomaly) -> str:
     if nearest and nearest[0][1] > TOLD_ODDS:
         return f"{odds_in_words(nearest[0][1])} against all else"
     told = [(name, odds) for name, odds in nearest if odds <= TOLD_ODDS]
-    return ", ".join(f"{odds_in_words(odds)} against {FAULT_WORDS.get(name, name)}" for name, odds in told)
+    return ", ".join(f"{odds_in_words(odds)} against {phrase('instrument_kind', name)}" for name, odds in told)
 
 
 def size_of(place: LocalAnomaly) -> str:

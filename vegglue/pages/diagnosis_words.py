@@ -11,8 +11,8 @@ from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.pages.cause_words import InstrumentRow, PlaceRow, instrument_rows, place_rows
 from vegglue.pages.key_numbers import KeyNumber
 from vegglue.pages.typography import NARROW, as_given, fixed, interval, percent, short, unit_html
-from vegglue.results.candidate_effect import effects_among
-from vegglue.results.diagnosis import CandidateEffect, Diagnosis
+from vegglue.results.causes import CandidateEffect, effects_among
+from vegglue.results.diagnosis import Diagnosis
 
 # Effects in the open table, a screen of a laptop; the others stand below it, folded.
 SUSPECTS_LISTED = 8

@@ -45,7 +45,7 @@ from vegglue.pages.typography import NARROW, Notation, fixed, html_notation, plu
 from vegglue.pages.validation_words import UNBELIEVED, validation_in_words
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
-from vegglue.results.small_misfit import is_too_small
+from vegglue.results.verdict import is_too_small
 from vegglue.wording.numbers import so_many
 
 # Share of failed members [-] above which it is a doubt: fewer hardly change what the others say of the prior.

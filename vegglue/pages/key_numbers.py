@@ -16,7 +16,7 @@ from vegglue.pages.typography import NARROW, decimals, percent, plus_minus, shor
 from vegglue.pages.validation_words import DOUBTED, UNBELIEVED
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
-from vegglue.results.small_misfit import is_too_small
+from vegglue.results.verdict import is_too_small
 from vegglue.wording.numbers import listed, so_many
 
 # Largest |Q - Q_in| over all that enters [-] of a sound member: a hundredth of what a flow meter can tell.

@@ -16,8 +16,9 @@ from vegglue.pages.typography import PLAIN_TEXT, Notation
 from vegglue.pages.validation_words import validation_in_words
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, Posterior
 from vegglue.results.refinement import ErrorModel, PosteriorModes, Refinement
-from vegglue.results.small_misfit import small_misfit_in_words
+from vegglue.results.verdict import MisfitTooSmall, is_too_small
 from vegglue.wording.numbers import in_digits, so_many, telling_digits
+from vegglue.wording.sentences import sentence
 
 # |r| [-] above which a pair is told of: the other parameter then explains half the variance of each (r² = 0.49).
 STRONG_CORRELATION = 0.7
@@ -163,8 +164,10 @@ def fit_in_words(posterior: Posterior, notation: Notation = PLAIN_TEXT) -> list[
             "Against the standard errors of the data, the best member has chi2 = "
             f"{notation.number(fit.chi2, 3)} over {fit.used} stations."
         )
-        small = small_misfit_in_words(fit.chi2, fit.used - len(posterior.parameters))
-        sentences += [f"{small[:1].upper()}{small[1:]}"] if small else []
+        freedom = fit.used - len(posterior.parameters)
+        if is_too_small(fit.chi2, freedom):
+            small = sentence(MisfitTooSmall(fit.chi2, freedom))
+            sentences.append(f"{small[:1].upper()}{small[1:]}")
     return sentences
 
 

@@ -6,8 +6,9 @@ from vegglue.inference.refine import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.results.posterior import Posterior
 from vegglue.results.refinement import GroupsLeftOut, LeaveOneOut, MisfitTest, Refinement
-from vegglue.results.small_misfit import is_too_small, why_too_small
+from vegglue.results.verdict import MisfitTooSmall, is_too_small
 from vegglue.wording.numbers import in_digits, so_many
+from vegglue.wording.sentences import phrase
 
 # p-values [-]: below the first, the customary 1 in 20, its words are guarded; below the second, something
 # is said to be missing, which a run should not say by chance.
@@ -42,7 +43,8 @@ def chi2_in_words(misfit: MisfitTest, missing: str) -> str:
     if misfit.p_misfit < UNBELIEVED:
         return f"{result}: {missing}"
     if is_too_small(misfit.chi2, misfit.freedom):
-        return f"{result}, less than chance makes it: {why_too_small(misfit.chi2, misfit.freedom)}."
+        why = phrase("why_misfit_too_small", MisfitTooSmall(misfit.chi2, misfit.freedom))
+        return f"{result}, less than chance makes it: {why}."
     return f"{result}: the errors {'hardly ' if misfit.p_misfit < DOUBTED else ''}explain what is left."
 
 

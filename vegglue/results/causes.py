@@ -1,16 +1,18 @@
-"""Causes other than listed effects that a diagnosis found: places, instruments, fields, laws, the model's own error."""
+"""What a diagnosis finds, as values: candidate effects as the data see them, and causes that are in no list: places,
+instruments, fields, laws and the model's own error.
+"""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.decision_constants import constants
+from vegglue.effects.identity import EffectIdentity
 
-# Faulty instruments by their kind.
-FAULT_WORDS = {
-    "reading": "one reading that is off",
-    "position": "a probe that is off in all experiments",
-    "probe": "a probe that is off in all sections",
-    "gauge": "a gauge that is off",
-}
+# Terms of the equations that something at a place may change.
+TERMS_AT_PLACES = ("drag", "bed", "inflow", "viscosity")
 # Units of smooth fields, by their term.
 UNIT_OF_FIELD = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
 # ln of the likelihood ratio beyond which the model needs more error of its own than it is allowed: 1 % of chi2 with one
@@ -46,6 +48,14 @@ class LocalAnomaly:
     y_error: float = 0.0
     x_spread: float = 0.0
     y_spread: float = 0.0
+
+    @property
+    def nearest_odds(self) -> tuple[tuple[str, float], ...]:
+        """Odds against the nearest other term, and against what is known unless that is far, by name."""
+        nearest = sorted(self.odds.items(), key=lambda one: one[1])
+        terms = [one for one in nearest if one[0] in TERMS_AT_PLACES][:1]
+        known = [one for one in nearest if one[0] not in TERMS_AT_PLACES and one[1] < 1.0 / constants().rival_share]
+        return (*terms, *known[:1])
 
     @property
     def shapes(self) -> dict[str, float]:
@@ -151,6 +161,11 @@ class CandidateLaws:
     laws: tuple[CandidateLaw, ...]
 
     @property
+    def likelier(self) -> bool:
+        """Whether laws are likelier than all else together."""
+        return self.chance > 0.5
+
+    @property
     def alike(self) -> tuple[CandidateLaw, ...]:
         """Laws of the same term and quantity as the likeliest."""
         best = self.laws[0]
@@ -172,3 +187,138 @@ class ModelErrorUsed:
     def asks_for_more(self) -> bool:
         """Whether more than is allowed is asked for, beyond doubt: two readings may ask for nine times as much."""
         return self.needed > 1.0 and self.log_ratio > NEEDS_MORE
+
+
+# |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
+# its trace (cos^2 = 0.64).
+LOOKS_LIKE_FROM = 0.8
+# A smallest size from which on no data show an effect, see `Detectability`.
+NEVER = 1e100
+
+
+@dataclass(frozen=True)
+class AmplitudeEstimate:
+    """How large an effect is, in the unit of its amplitude.
+
+    value, interval95: from its own refit when there was one (refitted), else to first order, its prior taken into
+    account in both. off, scale: where the amplitude does nothing, and how far from there is plausible; support: within
+    which it must lie. objective: the least sum of squares with the effect, |W (y - f)|^2 + |z|^2 [-], predicted where
+    it was not refitted.
+    """
+
+    value: float
+    interval95: tuple[float, float]
+    unit: str
+    off: float
+    scale: float
+    refitted: bool
+    objective: float
+    support: tuple[float, float] = (-np.inf, np.inf)
+
+    @property
+    def relative_size(self) -> float:
+        """|value - off| / scale [-]."""
+        return abs(self.value - self.off) / self.scale
+
+
+@dataclass(frozen=True)
+class ScoreTest:
+    """Score T of an effect [standard errors], and the chance that errors alone make any effect score as high [-].
+
+    p_family: counted among bootstrap draws, never below one over their number; see `calibration/score_test`.
+    """
+
+    score: float
+    p_family: float
+
+
+@dataclass(frozen=True)
+class Detectability:
+    """Whether these data could show an effect.
+
+    visibility: share of its fingerprint that calibration cannot mimic [-]. smallest: distance of the amplitude from off
+    that is detected 19 times of 20; testable: that is less than twice a plausible one, and within its support.
+    confounder: the parameter whose slope is most like the fingerprint; cosine: between both [-].
+    """
+
+    visibility: float
+    smallest: float
+    testable: bool
+    confounder: str
+    cosine: float
+
+    @property
+    def ever(self) -> bool:
+        """Whether any size of it shows: a trace without length has a smallest size of some 1e300."""
+        return self.smallest < NEVER
+
+    @property
+    def looks_like(self) -> str:
+        """The parameter that a trace looks like a change of; '' where none is so like it."""
+        return self.confounder if abs(self.cosine) > LOOKS_LIKE_FROM else ""
+
+
+@dataclass(frozen=True)
+class CandidateEffect:
+    """One effect as the data see it, in the last model in which it was tested; shapes: at which it scores best."""
+
+    name: str
+    title: str
+    shapes: dict[str, float]
+    amplitude: AmplitudeEstimate
+    test: ScoreTest
+    detectability: Detectability
+
+
+def effects_among(candidate_effects: Sequence[CandidateEffect]) -> int:
+    """How many effects they are, wherever each may act."""
+    return len({EffectIdentity.parse(one.name).name for one in candidate_effects})
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another explanation with its probability [-].
+
+    kind: effect, a term at a place, or the kind of an instrument; x, y [m]: of a place or an instrument, and amplitude
+    [unit of the term]: of what is at a place; NaN otherwise.
+    """
+
+    name: str
+    kind: str
+    probability: float
+    x: float = float("nan")
+    y: float = float("nan")
+    amplitude: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Step:
+    """One round of the search: what was accepted, what it may be instead, chi2 before and after.
+
+    rivals: the effects that together hold 95 % of the chances, the accepted one among them; chances: of each, were it
+    one of all that were tried, of every kind; others: of the best of each other kind, by its name, where it is not
+    negligible; places: those of them that are something at a place. p_family: chance that errors alone sound the alarm
+    as loudly [-], counted, see `evidence.alarm_p`.
+    """
+
+    accepted: str
+    rivals: tuple[str, ...]
+    chances: tuple[float, ...]
+    groups: tuple[tuple[str, ...], ...]
+    chi2_before: float
+    chi2_after: float
+    p_family: float
+    others: dict[str, float] = field(default_factory=dict)
+    places: dict[str, LocalAnomaly] = field(default_factory=dict)
+
+    @property
+    def chance(self) -> dict[str, float]:
+        """Of each rival by its name."""
+        return dict(zip(self.rivals, self.chances, strict=True))
+
+    @property
+    def likelier_place(self) -> str:
+        """The place that is likelier than every group of effects that the data cannot tell apart; '' without."""
+        best = max(self.places, key=self.others.__getitem__, default="")
+        groups = [sum(self.chance[name] for name in group) for group in self.groups]
+        return best if best and self.others[best] > max(groups) else ""

@@ -1,20 +1,19 @@
-"""What a diagnosis says, as values: the verdict, the effects that explain the misfit, where it lies, and all numbers.
+"""A diagnosis as a value: the verdict, the effects that explain the misfit, where it lies, and all numbers.
 
-What is no effect of the library stands in causes.py, one effect of it in candidate_effect.py.
-How they lie in diagnosis.h5 is said in diagnosis_file.py, the object of `diagnose --json` in diagnosis_json.py.
+Causes stand in causes.py, the verdict in verdict.py; diagnosis_file.py lays it out in diagnosis.h5.
 """
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.decision_constants import constants
 from vegglue.measurements.kinds import stations_in_short
-from vegglue.results.candidate_effect import CandidateEffect, counted_in_words
+from vegglue.plain_json import plain
 from vegglue.results.causes import (
+    CandidateEffect,
     CandidateLaws,
     FaultyInstrument,
     FieldFound,
@@ -22,75 +21,11 @@ from vegglue.results.causes import (
     LocalAnomaly,
     ModelErrorUsed,
     PlaceMap,
+    Step,
 )
-from vegglue.wording.numbers import in_short, interval_in_short, so_many
-
-# instrument: some readings are off. Whether more is missing says `Verdict.clears_the_model`.
-VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
-
-
-@dataclass(frozen=True)
-class Step:
-    """One round of the search: what was accepted, what it may be instead, chi2 before and after.
-
-    rivals: the effects that together hold 95 % of the chances, the accepted one among them; chances: of each, were it
-    one of all that were tried, of every kind; others: of the best of each other kind, by its name, where it is not
-    negligible; places: those of them that are something at a place. p_family: chance that errors alone sound the alarm
-    as loudly [-], counted, see `evidence.alarm_p`.
-    """
-
-    accepted: str
-    rivals: tuple[str, ...]
-    chances: tuple[float, ...]
-    groups: tuple[tuple[str, ...], ...]
-    chi2_before: float
-    chi2_after: float
-    p_family: float
-    others: dict[str, float] = field(default_factory=dict)
-    places: dict[str, LocalAnomaly] = field(default_factory=dict)
-
-    @property
-    def chance(self) -> dict[str, float]:
-        """Of each rival by its name."""
-        return dict(zip(self.rivals, self.chances, strict=True))
-
-    @property
-    def likelier_place(self) -> str:
-        """The place that is likelier than every group of effects that the data cannot tell apart; '' without."""
-        best = max(self.places, key=self.others.__getitem__, default="")
-        groups = [sum(self.chance[name] for name in group) for group in self.groups]
-        return best if best and self.others[best] > max(groups) else ""
-
-
-# How a sentence begins that tells of measurements which no flow of the case can show, or of sections that carry another
-# discharge than stated.
-BEFORE_ALL_ELSE = "Before anything can be said of the model: "
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What was concluded. anomaly: of something that no listed effect explains, None without; not_excluded: groups
-    of effects among which one that is there undetected, besides what was accepted, is nine times of ten.
-    clears_the_model: whether nothing is missing in the model, an instrument or none being off; tells_laws: whether the
-    sentence tells of laws that stand out. left_over: its part that says what the model with all that was accepted still
-    asks for, '' for nothing; significant_effects: effects that stand out in it, and were not accepted, with the
-    family-wise p of each [-].
-    """
-
-    kind: VerdictKind
-    sentence: str
-    remarks: tuple[str, ...]
-    anomaly: LocalAnomaly | None
-    not_excluded: tuple[tuple[str, ...], ...]
-    clears_the_model: bool
-    tells_laws: bool
-    left_over: str = ""
-    significant_effects: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def doubts_the_data(self) -> bool:
-        """Whether doubts about the measurements stand before all else."""
-        return self.sentence.startswith(BEFORE_ALL_ELSE)
+from vegglue.results.verdict import ChiSquare, EstimatedErrors, Verdict
+from vegglue.wording.numbers import in_short, interval_in_short
+from vegglue.wording.sentences import phrase, tagged
 
 
 @dataclass(frozen=True)
@@ -116,30 +51,12 @@ class Misfit:
     @property
     def of_freedom(self) -> str:
         """Its degrees of freedom, in words."""
-        degrees = f"for {so_many(self.freedom, 'degree')} of freedom"
-        return degrees if self.freedom > 0 else "with no more readings than parameters"
+        return phrase("degrees_of_freedom", self.freedom)
 
     @property
-    def told(self) -> str:
-        """`chi2 is 234 for 244 degrees of freedom`."""
-        return f"chi2 is {self.chi2:.0f} {self.of_freedom}"
-
-
-@dataclass(frozen=True)
-class EstimatedErrors:
-    """What the errors were taken to be: correlation of neighbours [-], true over stated errors [-], root mean square
-    error of the grid in velocities [m/s], NaN without any, and rows of the stations rejected as outliers.
-    """
-
-    correlation: float
-    scale: float
-    grid_error: float
-    flagged: tuple[int, ...]
-
-    @property
-    def clearly_larger(self) -> bool:
-        """Whether they are larger than stated by more than can pass for the errors of stating them."""
-        return self.scale > constants().largest_scale
+    def size(self) -> ChiSquare:
+        """chi2 of the last model without the zones."""
+        return ChiSquare(self.chi2, self.freedom, self.p)
 
 
 @dataclass(frozen=True)
@@ -223,7 +140,7 @@ class Diagnosis:
 
     @property
     def law_stands_out(self) -> bool:
-        """Whether a law is worth a search: where the verdict cannot tell, only if no other cause is told before it."""
+        """Whether a law is worth a search: of a verdict that cannot tell, only if it names one."""
         return self.laws is not None and (self.verdict.kind != "cannot-tell" or self.verdict.tells_laws)
 
     @property
@@ -231,22 +148,18 @@ class Diagnosis:
         """Whether anything was taken into the model or set aside."""
         return bool(self.steps or self.places or self.instruments)
 
-    def first_score(self, candidate_effect: CandidateEffect) -> float:
+    def first_score(self, one: CandidateEffect) -> float:
         """The score of an effect before any was accepted [standard errors]."""
-        return self.first_screening.scores.get(candidate_effect.name, candidate_effect.test.score)
+        return self.first_screening.scores.get(one.name, one.test.score)
 
-    def last_score(self, candidate_effect: CandidateEffect) -> float:
-        """The score of an effect in the last model [standard errors]; NaN where it is the first, or was refitted."""
-        return candidate_effect.test.score if self.changed and not candidate_effect.amplitude.refitted else float("nan")
+    def last_score(self, one: CandidateEffect) -> float:
+        """The score of an effect in the last model [standard errors]; NaN if it is the first, or was refitted."""
+        return one.test.score if self.changed and not one.amplitude.refitted else float("nan")
 
-    def p_of_score(self, candidate_effect: CandidateEffect) -> float:
-        """The family-wise p [-] of the score that is told last; NaN where it is of another score, and a refit tells."""
-        told = (
-            self.last_score(candidate_effect)
-            if np.isfinite(self.last_score(candidate_effect))
-            else self.first_score(candidate_effect)
-        )
-        return candidate_effect.test.p_family if candidate_effect.test.score == told else float("nan")
+    def p_of_score(self, one: CandidateEffect) -> float:
+        """The family-wise p [-] of the last known score; NaN if it belongs to another score."""
+        last = self.last_score(one)
+        return one.test.p_family if one.test.score == (last if np.isfinite(last) else self.first_score(one)) else np.nan
 
     def candidate_effect(self, name: str) -> CandidateEffect:
         """The effect of that name; KeyError without."""
@@ -254,7 +167,7 @@ class Diagnosis:
 
     def __repr__(self) -> str:
         misfit, sizes = self.misfit, [(name, self.candidate_effect(name).amplitude) for name in self.set]
-        tested = f"{counted_in_words(self.candidate_effects)} tested, vegglue {self.version}"
+        tested = f"{phrase('effects_tested', self.verdict.tested)} tested, vegglue {self.version}"
         return in_short(
             f"Diagnosis of {self.name}: {self.verdict.kind}",
             [
@@ -264,3 +177,66 @@ class Diagnosis:
                 stations_in_short(self.predictions.station),
             ],
         )
+
+
+def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """One object with every number that is printed."""
+    verdict, misfit, errors = diagnosis.verdict, diagnosis.misfit, diagnosis.errors
+    tree = {
+        "verdict": verdict.kind,
+        "sentence": verdict.sentence,
+        "left_over": verdict.left_over,
+        "verdict_value": tagged(verdict),
+        "standing_out": verdict.significant_effects,
+        "set": diagnosis.set,
+        "groups": diagnosis.groups,
+        "not_excluded": verdict.not_excluded,
+        "where": None if verdict.anomaly is None else asdict(verdict.anomaly),
+        "effects": [*map(candidate_effect_json, diagnosis.candidate_effects)],
+        "steps": [asdict(step) for step in diagnosis.steps],
+        "remarks": verdict.remarks,
+        "chi2": {"first": misfit.chi2_first, "last": misfit.chi2, "freedom": misfit.freedom, "p": misfit.p},
+        "threshold": diagnosis.first_screening.threshold,
+        "noise": {"correlation": errors.correlation, "scale": errors.scale, "grid_error": errors.grid_error},
+        "flagged": [_reading(diagnosis, row) for row in errors.flagged],
+        "parameters": diagnosis.parameters.last,
+        "first_parameters": diagnosis.parameters.first,
+        "places": [asdict(one) for one in diagnosis.places],
+        "instruments": [asdict(one) for one in diagnosis.instruments],
+        "field": None if diagnosis.field is None else asdict(diagnosis.field),
+        "model_error": None if diagnosis.model_error is None else asdict(diagnosis.model_error),
+        "laws": None if diagnosis.laws is None else asdict(diagnosis.laws),
+        "zones": misfit.zones.to_dict("records"),
+    }
+    return {name: plain(value) for name, value in tree.items()}
+
+
+def candidate_effect_json(one: CandidateEffect) -> dict[str, Any]:
+    """All numbers of an effect by the names they have in JSON and in diagnosis.h5."""
+    amplitude, test, detectability = one.amplitude, one.test, one.detectability
+    return {
+        "name": one.name,
+        "title": one.title,
+        "unit": amplitude.unit,
+        "amplitude": amplitude.value,
+        "interval95": amplitude.interval95,
+        "score": test.score,
+        "p_family": test.p_family,
+        "visibility": detectability.visibility,
+        "smallest_detectable": detectability.smallest,
+        "testable": detectability.testable,
+        "refitted": amplitude.refitted,
+        "objective": amplitude.objective,
+        "mimicked_by": detectability.confounder,
+        "likeness": detectability.cosine,
+        "shapes": one.shapes,
+        "off": amplitude.off,
+        "scale": amplitude.scale,
+        "support": amplitude.support,
+    }
+
+
+def _reading(diagnosis: Diagnosis, row: int) -> dict[str, Any]:
+    station = diagnosis.predictions.station.iloc[row]
+    place = {name: str(station[name]) for name in ("experiment", "kind", "section")}
+    return place | {name: float(station[name]) for name in ("x", "y", "value")}

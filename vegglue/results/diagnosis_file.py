@@ -6,35 +6,52 @@ Lists and values of several parts are attributes as well, as JSON.
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
 from pydantic import TypeAdapter
 
-from vegglue.results.candidate_effect import AmplitudeEstimate, CandidateEffect, Detectability, ScoreTest
-from vegglue.results.causes import UNIT_OF_FIELD, CandidateLaws
-from vegglue.results.diagnosis import (
-    Diagnosis,
-    EstimatedErrors,
+from vegglue.measurements.section_discharge import CarriedDischarge
+from vegglue.results.causes import (
+    UNIT_OF_FIELD,
+    AmplitudeEstimate,
+    CandidateEffect,
+    CandidateLaw,
+    CandidateLaws,
+    Detectability,
     FaultyInstrument,
     FieldFound,
     FieldMapKept,
-    FirstScreening,
     LocalAnomaly,
-    Misfit,
     ModelErrorUsed,
-    ParameterEstimates,
     PlaceMap,
-    Predictions,
+    Rival,
+    ScoreTest,
     Step,
-    Verdict,
-    VerdictKind,
 )
-from vegglue.results.diagnosis_json import flat_candidate_effect
+from vegglue.results.diagnosis import (
+    Diagnosis,
+    FirstScreening,
+    Misfit,
+    ParameterEstimates,
+    Predictions,
+    candidate_effect_json,
+)
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
 from vegglue.results.fitting import IN_WORDS, YES_OR_NO, ReadGroup, fitting, names_of, stated_as, stations_from
 from vegglue.results.layout import Group, Stored, Variable, table_group
+from vegglue.results.verdict import (
+    ChiSquare,
+    EffectFound,
+    EffectsTested,
+    EstimatedErrors,
+    Note,
+    Reason,
+    Remaining,
+    Verdict,
+)
+from vegglue.wording.sentences import tag_of, tagged
 
 # Datasets of the group `stations` that are not columns of the table of stations.
 AT_STATIONS = ("prediction_first", "prediction", "error")
@@ -56,6 +73,14 @@ ZONE_COLUMNS = {
     **dict.fromkeys(("experiment", "section", "zone"), Stored(("zone_number",), type=IN_WORDS)),
     **dict.fromkeys(("stations", "mean", "standard_error", "chi2"), Stored(("zone_number",))),
 }
+# Classes of the values in a verdict, by their tags.
+VERDICT_VALUES = {
+    tag_of(one): one
+    for one in (
+        Verdict, ChiSquare, EffectFound, EffectsTested, LocalAnomaly, FaultyInstrument, FieldFound, CandidateLaws,
+        CandidateLaw, Rival, CarriedDischarge, *get_args(Reason), *get_args(Note), *get_args(Remaining),
+    )
+}  # fmt: skip
 
 
 def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
@@ -102,9 +127,7 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
         "name": diagnosis.name,
         "verdict": verdict.kind,
         "sentence": verdict.sentence,
-        "clears_the_model": verdict.clears_the_model,
-        "tells_laws": verdict.tells_laws,
-        "left_over": verdict.left_over,
+        "verdict_value": json.dumps(tagged(verdict)),
         "chi2_first": misfit.chi2_first,
         "chi2": misfit.chi2,
         "freedom": misfit.freedom,
@@ -118,10 +141,6 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
     }
     composed = {
         "steps": [asdict(step) for step in diagnosis.steps],
-        "where": None if verdict.anomaly is None else asdict(verdict.anomaly),
-        "remarks": verdict.remarks,
-        "not_excluded": verdict.not_excluded,
-        "standing_out": verdict.significant_effects,
         "flagged": errors.flagged,
         "first_scores": diagnosis.first_screening.scores,
         "first_parameters": diagnosis.parameters.first,
@@ -142,7 +161,7 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
     found = Diagnosis(
         name=stated_as(str, attributes, "name"),
         version=stated_as(str, attributes, "version"),
-        verdict=_verdict_from(attributes),
+        verdict=_verdict_from(stated_as(str, attributes, "verdict_value")),
         candidate_effects=tuple(_candidate_effect_from(row) for row in candidate_effects.to_dict("records")),
         steps=_parsed(tuple[Step, ...], attributes["steps"]),
         misfit=Misfit(
@@ -190,19 +209,24 @@ def _parsed(kind: Any, text: str) -> Any:
     return TypeAdapter(kind).validate_json(text)
 
 
-def _verdict_from(attributes: Mapping[str, Any]) -> Verdict:
-    kind: VerdictKind = TypeAdapter(VerdictKind).validate_python(attributes["verdict"])
-    return Verdict(
-        kind=kind,
-        sentence=stated_as(str, attributes, "sentence"),
-        remarks=_parsed(tuple[str, ...], attributes["remarks"]),
-        anomaly=_parsed(LocalAnomaly | None, attributes["where"]),
-        not_excluded=_parsed(tuple[tuple[str, ...], ...], attributes["not_excluded"]),
-        clears_the_model=stated_as(bool, attributes, "clears_the_model"),
-        tells_laws=stated_as(bool, attributes, "tells_laws"),
-        left_over=stated_as(str, attributes, "left_over"),
-        significant_effects=_parsed(dict[str, float], attributes["standing_out"]),
-    )
+def _verdict_from(text: str) -> Verdict:
+    found = _untagged(json.loads(text))
+    if not isinstance(found, Verdict):
+        raise ValueError("verdict_value is no verdict")
+    return found
+
+
+def _untagged(tree: Any) -> Any:
+    """The values of which `tagged` made this tree. Errors: ValueError where one does not fit its class."""
+    if isinstance(tree, list):
+        return tuple(map(_untagged, tree))
+    if not isinstance(tree, dict):
+        return tree
+    own = {name: _untagged(value) for name, value in tree.items()}
+    tag = "tag" if "tag" in own else "kind"
+    if own.get(tag) not in VERDICT_VALUES:
+        return own
+    return TypeAdapter(VERDICT_VALUES[own.pop(tag)]).validate_python(own)
 
 
 def _instruments_from(text: str) -> tuple[FaultyInstrument, ...]:
@@ -233,7 +257,7 @@ def _table_from(group: ReadGroup, dim: str, columns: Mapping[str, Stored]) -> pd
 
 
 def _row(candidate_effect: CandidateEffect) -> dict[str, Any]:
-    row = flat_candidate_effect(candidate_effect)
+    row = candidate_effect_json(candidate_effect)
     ends = dict(zip(("low95", "high95", "least", "most"), (*row.pop("interval95"), *row.pop("support")), strict=True))
     return row | ends | {"shapes": json.dumps(candidate_effect.shapes)}
 

@@ -20,7 +20,7 @@ from vegglue.results.posterior import Posterior
 from vegglue.results.posterior_file import posterior_attributes, posterior_from, posterior_groups
 from vegglue.results.resume import part_file
 
-POSTERIOR_FORMAT, DIAGNOSIS_FORMAT, FLOW_FORMAT = "vegglue posterior 1", "vegglue diagnosis 8", "vegglue flow 1"
+POSTERIOR_FORMAT, DIAGNOSIS_FORMAT, FLOW_FORMAT = "vegglue posterior 1", "vegglue diagnosis 9", "vegglue flow 1"
 Result = TypeVar("Result")
 
 

@@ -51,6 +51,25 @@ def in_digits(value: float, digits: int = 3) -> str:
     return f"{float(text):.0f}" if "e+" in text and abs(float(text)) <= LARGEST_IN_FULL else text
 
 
+def chance_in_words(chance: float) -> str:
+    """A chance as a per cent, neither 0 nor 100 %: `under 1%`, `37%`, `over 99%`."""
+    if chance < 0.01:
+        return "under 1%"
+    return "over 99%" if chance > 0.99 else f"{chance:.0%}"
+
+
+def odds_in_words(odds: float) -> str:
+    """`30 to 1`, `1 to 3` below one, `over 1,000 to 1`."""
+    if odds < 1.0:
+        return f"1 to {1.0 / odds:.0f}" if odds > 0.001 else "1 to over 1,000"
+    return "over 1,000 to 1" if odds > 1000 else f"{odds:.0f} to 1"
+
+
+def place_in_words(x: float, y: float) -> str:
+    """`x = 14.3, y = 1.5`, without what is NaN."""
+    return ", ".join(f"{name} = {in_digits(value, 4)}" for name, value in (("x", x), ("y", y)) if math.isfinite(value))
+
+
 def range_in_digits(bounds: Sequence[float], digits: int = 3) -> str:
     """`low to high`, or one number if both read the same."""
     low, high = (in_digits(one, digits) for one in bounds)

@@ -8,10 +8,13 @@ from functools import cache
 from typing import Any
 
 from vegglue.wording.numbers import (
+    chance_in_words,
     duration_in_short,
     experiments_in_words,
     in_digits,
     listed,
+    odds_in_words,
+    place_in_words,
     range_in_digits,
     section_in_words,
     so_many,
@@ -53,8 +56,9 @@ def sentences(values: Any) -> tuple[str, ...]:
 
 
 def tag_of(value: Any) -> str:
-    """`parameter_far_from_prior` of an instance of the class ParameterFarFromPrior."""
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", type(value).__name__).lower()
+    """`parameter_far_from_prior` of the class ParameterFarFromPrior and of its instances."""
+    name = (value if isinstance(value, type) else type(value)).__name__
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
 
 def tagged(value: Any) -> Any:
@@ -92,11 +96,19 @@ def macros() -> dict[str, Callable[..., str]]:
         "listed": listed,
         "many": so_many,
         "duration": duration_in_short,
+        "chance": chance_in_words,
+        "odds": odds_in_words,
         "experiments": experiments_in_words,
         "range": range_in_digits,
         "percent": lambda share: f"{share:.0%}",
     }
-    environment.globals |= {"sentence": sentence, "digits_of_range": telling_digits, "section_at": section_in_words}
+    environment.globals |= {
+        "sentence": sentence,
+        "digits_of_range": telling_digits,
+        "section_at": section_in_words,
+        "place_at": place_in_words,
+        "tag_of": tag_of,
+    }
     found: dict[str, Callable[..., str]] = {}
     for name in environment.list_templates():
         for macro, render in vars(environment.get_template(name).module).items():

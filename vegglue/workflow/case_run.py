@@ -135,9 +135,7 @@ class CaseRun:
         unseen = Model(case, there.site, there.observations.table, NEWTON)
         return unseen_with_command(unseen, self.model, self.folder, self.watch)
 
-    def with_settings(
-        self, runs: Path | str, jobs: int = -1, watch: Watch = silent, force: bool = False
-    ) -> "CaseRun":
+    def with_settings(self, runs: Path | str, jobs: int = -1, watch: Watch = silent, force: bool = False) -> "CaseRun":
         """The same case in another folder of runs, or with other settings, and what was read of it."""
         return CaseRun(self.case, Path(runs), jobs, watch, force, beside=self)
 

@@ -22,9 +22,10 @@ from vegglue.errors import InputError, shown_path
 from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.progress import Watch
-from vegglue.results.diagnosis import Diagnosis, Verdict
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.verdict import CommandCompared, CommandDiffers, CommandNotSettled
 from vegglue.whole_files import MAKE_ROOM
-from vegglue.wording.numbers import in_digits, so_many
+from vegglue.wording.numbers import in_digits
 
 PLACE_FILE = "place.json"
 # Share of a standard error [-] by which the command may differ from what was reckoned with before it is a doubt.
@@ -35,7 +36,6 @@ CLOSE_ENOUGH = 0.5
 BEYOND_BELIEF = 3.0
 # How many times as large as those of the built-in engine velocities are that may be in another unit: 10 is dm/s.
 OF_ANOTHER_UNIT = 5.0
-TO_CALM = "let its flow come to rest, or set `engine.step` larger"
 
 
 def with_command(model: Model, folder: Path, watch: Watch) -> Model:
@@ -68,66 +68,28 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
     reckoned = linearise(bare, z)
     why = "running the command once more"
     there, reasons = command_predictions(runs, bare.case, model.station, [theta], watch, why)
-    said = [
-        "Predictions and slopes are those of the command of `engine`, the slopes by central differences, "
-        f"{so_many(place.places, 'time')} two runs for each of {so_many(len(bare.names), 'parameter')}; what an effect "
-        "or a place would change, and how the flow bends away from these slopes, is what the built-in engine says "
-        "of the same site."
-    ]
-    compared, off = _beside_what_was_reckoned(there[0], reasons[0], reckoned, found.predictions.error)
-    said.append(f"At the parameters found last {compared}.")
-    if place.rough:
-        said.append(f"{_noisy(place)}: {TO_CALM}.")
-    if not place.settled:
-        said.append("The search for its best place did not settle: its predictions may be rough.")
-    doubt = _reason_not_to_believe(place, off)
-    told = found.verdict if not doubt else _disbelieved(found.verdict, doubt)
-    return replace(found, verdict=replace(told, remarks=(" ".join(said), *told.remarks)))
+    compared = _compared(place, len(bare.names), there[0], reasons[0], reckoned, found.predictions.error)
+    verdict = replace(found.verdict, notes=(compared, *found.verdict.notes))
+    if compared.errors > BEYOND_BELIEF:
+        verdict = replace(verdict, kind="cannot-tell", distrust=CommandDiffers(compared.errors))
+    elif place.rough and not place.settled:
+        # Noise in differences alone is a caution, as of a parameter that hardly matters; with a search that did not
+        # settle it has led astray: a command with noise of a third of an error, to friction that was not there.
+        verdict = replace(verdict, kind="cannot-tell", distrust=CommandNotSettled(tuple(place.rough)))
+    return replace(found, verdict=verdict)
 
 
-def _beside_what_was_reckoned(there: Array, failure: str, reckoned: Point | None, error: Array) -> tuple[str, float]:
-    """How far the command is from what was reckoned with, in words and in errors; 0 where nobody can tell.
-
-    failure: why the command gave nothing, '' where it did; error: of each station, NaN where it does not count.
-    """
-    if failure:
-        why = failure.removesuffix(".")
-        return f"the command failed, so that nothing tells how far it is from what was reckoned with: {why}", 0.0
-    if reckoned is None:
-        return (
-            "the built-in engine finds no steady flow, so that nothing tells how far the command is from what was "
-            "reckoned with; take sizes and chances with care"
-        ), 0.0
-    used = np.isfinite(error)
-    off = root_mean_square((there - reckoned.prediction)[used] / error[used])
-    doubt = "; take sizes and chances with care" if off > CLOSE_ENOUGH else ""
-    return f"it differs from what was reckoned with by {off:.2f} errors{doubt}", off
-
-
-def _noisy(place: CommandPlace) -> str:
-    return f"Its differences in {' and '.join(place.rough)} are mostly noise"
-
-
-def _reason_not_to_believe(place: CommandPlace, off: float) -> str:
-    """Why no verdict rests on what the command says, '' when one may; off: from what was reckoned with [errors].
-
-    Noise in differences alone is a caution, as of a parameter that hardly matters; with a search that did not settle
-    it has led astray, a command with noise of a third of an error to friction that was not there.
-    """
-    if off > BEYOND_BELIEF:
-        return (
-            "at the parameters found last the command of `engine` differs from what was reckoned with by "
-            f"{off:.1f} errors; see whether it reads its parameters, and comes to rest"
-        )
-    if place.rough and not place.settled:
-        return f"the search for the best place of the command did not settle. {_noisy(place)}: {TO_CALM}"
-    return ""
-
-
-def _disbelieved(verdict: Verdict, why: str) -> Verdict:
-    """The verdict on numbers that the command does not give."""
-    sentence = f"These data cannot tell: {why}. What was found with it: {verdict.sentence}"
-    return replace(verdict, kind="cannot-tell", sentence=sentence)
+def _compared(
+    place: CommandPlace, parameters: int, there: Array, failure: str, reckoned: Point | None, error: Array
+) -> CommandCompared:
+    """How far the command is from its linear model; error: of each station, NaN if it does not count."""
+    off = float("nan")
+    if not failure and reckoned is not None:
+        used = np.isfinite(error)
+        off = root_mean_square((there - reckoned.prediction)[used] / error[used])
+    return CommandCompared(
+        place.places, parameters, off, failure.removesuffix("."), tuple(place.rough), place.settled, off > CLOSE_ENOUGH
+    )
 
 
 def command_tried(model: Model, folder: Path) -> str:

@@ -19,8 +19,8 @@ from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.causes import CandidateLaw, CandidateLaws
-from vegglue.results.diagnosis import CandidateEffect, Diagnosis, Step
+from vegglue.results.causes import CandidateEffect, CandidateLaw, CandidateLaws, Step
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import questions_that_fit, write_questions
 from vegglue.results.open_questions import HIDDEN_BEHIND, ProposedMeasurement, Question
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run

@@ -27,7 +27,7 @@ BY_CHANCE = 0.05
 
 
 @dataclass(frozen=True)
-class UnseenErrors:
+class HeldOutErrors:
     """Errors at what was not seen, over those expected [-], and the ratio that errors alone exceed in 5 % of cases.
 
     ratio: NaN without velocities that were not seen, infinite where the model finds no flow for them.
@@ -37,20 +37,20 @@ class UnseenErrors:
     by_chance: float
 
 
-def unseen_errors(base: Baseline, unseen: Model) -> UnseenErrors:
+def held_out_errors(base: Baseline, unseen: Model) -> HeldOutErrors:
     """Those of a calibrated model; unseen: the model at stations it has not seen."""
     there = Model(_case_there(base, unseen), unseen.site, unseen.station, unseen.engine)
     point = linearise(there, base.fitted.point.z)
     rows = np.flatnonzero(leading_velocities(there.station))
     if not rows.size or point is None:
-        return UnseenErrors(float("inf") if rows.size else float("nan"), 1.0)
+        return HeldOutErrors(float("inf") if rows.size else float("nan"), 1.0)
     error = there.station["value"].to_numpy(float)[rows] - point.prediction[rows]
     own, alike = _expected(base, there, point, rows)
     squares = (alike**2).sum(axis=1)
     total = float((own + squares).sum())
     degrees = total**2 / float((own**2 + 2.0 * own * squares).sum() + ((alike.T @ alike) ** 2).sum())
     by_chance = float(np.sqrt(chdtri(degrees, BY_CHANCE) / degrees))
-    return UnseenErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
+    return HeldOutErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
 
 
 def _expected(base: Baseline, there: Model, point: Point, rows: np.ndarray) -> tuple[Array, Array]:

@@ -1,0 +1,771 @@
+"""The verdict of a diagnosis as a value, and the rules that make it from what was found.
+
+Silence has to be earned, and so has a name: see DECISIONS. The words stand in wording/templates/verdict.j2, one macro
+for each class of this file. A new reason is a class here, its rule, and its macro.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from dataclasses import field as by_default
+from typing import Literal, get_args
+
+from scipy.special import chdtr
+
+from vegglue.case.parameter_space import FURTHEST
+from vegglue.decision_constants import constants
+from vegglue.effects.identity import EffectIdentity
+from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues
+from vegglue.measurements.section_discharge import (
+    CHANGE_DISCHARGE,
+    CarriedDischarge,
+    DischargeMismatch,
+    discharge_mismatches,
+)
+from vegglue.normal_range import NORMAL95
+from vegglue.results.causes import (
+    CandidateEffect,
+    CandidateLaws,
+    FaultyInstrument,
+    FieldFound,
+    LocalAnomaly,
+    ModelErrorUsed,
+    Rival,
+    Step,
+    effects_among,
+)
+from vegglue.wording.sentences import sentence, sentences
+
+# instrument: some readings are off. Whether more is missing states `Verdict.clears_the_model`.
+VerdictKind = Literal["nothing-missing", "identified", "one-of", "none-of-these", "instrument", "cannot-tell"]
+# Effects of the library, and terms at a place, that let sections read another discharge than stated: water that comes
+# or goes, readings that are off as a whole, a bed or a level that is not there.
+OF_DISCHARGES = (
+    *CHANGE_DISCHARGE, "outlet_level_error", "gauge_datum", "device_gain", "probe_gain", "zero_offset",
+    "partial_depth", "floor_level_error", "bank_level_error", "bed_slope_error", "flank_scour",
+)  # fmt: skip
+TERMS_OF_DISCHARGES, OF_DEVICES = ("inflow", "bed"), ("device_gain", "zero_offset")
+# Share of a plausible size within which an amplitude lies at an end of its support: as far off as refits start at
+# least, see `candidates.START_OFF_ENDS`.
+AT_BOUND = 0.01
+# Amplitude over a plausible one, above which it is noted as too large to be believed. Chosen, not measured.
+IMPLAUSIBLE = 3.0
+# Chance of a chi2 as small under errors alone [-], below which it is noted. Chosen: as rare as what is called missing.
+TOO_SMALL = 0.001
+
+
+@dataclass(frozen=True)
+class ChiSquare:
+    """chi2 = |W (y - f)|^2 of a model [-], its degrees of freedom, and the chance p of a chi2 as large [-]."""
+
+    value: float
+    freedom: int
+    p: float = float("nan")
+
+
+@dataclass(frozen=True)
+class EstimatedErrors:
+    """The errors as estimated: correlation of neighbours [-], true over stated errors [-], root mean square error of
+    the grid in velocities [m/s], NaN without any, and rows of the stations rejected as outliers.
+    """
+
+    correlation: float
+    scale: float
+    grid_error: float
+    flagged: tuple[int, ...]
+
+    @property
+    def clearly_larger(self) -> bool:
+        """Whether they are larger than stated by more than the error of stating them."""
+        return self.scale > constants().largest_scale
+
+
+# Reasons: why no more is known. The first three are about the measurements: DischargeMismatch, ImplausibleOutlet and
+# ImplausibleValues of `measurements`.
+
+
+@dataclass(frozen=True)
+class MisfitBeyondErrors:
+    """The model misses by `ratio` times the errors, root mean square [-], with all that was found."""
+
+    ratio: float
+
+
+@dataclass(frozen=True)
+class ParameterFarFromPrior:
+    """A parameter replaces a cause: it lies so many standard deviations from the middle of its prior."""
+
+    parameter: str
+    deviations: float
+
+
+@dataclass(frozen=True)
+class AmplitudeAtBound:
+    """Effects, by name, whose amplitudes lie at an end of their support."""
+
+    effects: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class NeighboursExcluded:
+    """Readings side by side are excluded, which one bad probe does not explain."""
+
+
+@dataclass(frozen=True)
+class TooManyGroups:
+    """More groups of effects than a set may have, with the probability of each effect among those calibrated [-]."""
+
+    effects: tuple[Rival, ...]
+
+
+@dataclass(frozen=True)
+class NoneLeads:
+    """Hypotheses compete and none of them leads clearly: they stand in `Verdict.undecided`."""
+
+
+@dataclass(frozen=True)
+class MisfitUnexplained:
+    """The misfit is larger than the errors allow, and no effect and no place is significant."""
+
+
+@dataclass(frozen=True)
+class ErrorsLargerThanStated:
+    """Only errors `scale` times the stated ones explain the misfit [-]."""
+
+    scale: float
+
+
+@dataclass(frozen=True)
+class CorrelatedErrors:
+    """Only errors of neighbours with this correlation explain the misfit [-]."""
+
+    correlation: float
+
+
+@dataclass(frozen=True)
+class ModelErrorExceeded:
+    """The model needs `ratio` times its allowed error [-]; allowed: relative error of friction [-]."""
+
+    ratio: float
+    allowed: float
+
+
+@dataclass(frozen=True)
+class NoFlowHeldOut:
+    """The model finds no steady flow in the held-out experiments."""
+
+
+@dataclass(frozen=True)
+class HeldOutMissed:
+    """The held-out measurements are missed by `ratio` times the expected errors [-]."""
+
+    ratio: float
+
+
+@dataclass(frozen=True)
+class UncertainBetweenSections:
+    """Halfway between the sections the model may miss by `ratio` times the errors of the data [-]."""
+
+    ratio: float
+
+
+@dataclass(frozen=True)
+class FewTestable:
+    """So few of the effects would be seen at twice a plausible size; counts in `Verdict.tested`."""
+
+
+@dataclass(frozen=True)
+class CommandDiffers:
+    """The command of `engine` differs from its linear model by `errors` standard errors, root mean square [-]."""
+
+    errors: float
+
+
+@dataclass(frozen=True)
+class CommandNotSettled:
+    """The search for the best parameters of the command did not settle: differences in these are mostly noise."""
+
+    parameters: tuple[str, ...]
+
+
+OfTheData = DischargeMismatch | ImplausibleOutlet | ImplausibleValues
+Reason = (
+    OfTheData
+    | MisfitBeyondErrors
+    | ParameterFarFromPrior
+    | AmplitudeAtBound
+    | NeighboursExcluded
+    | TooManyGroups
+    | NoneLeads
+    | MisfitUnexplained
+    | ErrorsLargerThanStated
+    | CorrelatedErrors
+    | ModelErrorExceeded
+    | NoFlowHeldOut
+    | HeldOutMissed
+    | UncertainBetweenSections
+    | FewTestable
+    | CommandDiffers
+    | CommandNotSettled
+)
+
+
+@dataclass(frozen=True)
+class EffectFound:
+    """An accepted effect: its title, amplitude [unit] with its 95 % interval, and what it may be instead.
+
+    probability: of it and of those alike together, among all that was tried [-]; alike: effects that leave the same
+    trace in these data; rivals: others with their probabilities, the likeliest first; likelier: a place that is
+    likelier than every group of effects, with its probability, NaN without one.
+    """
+
+    name: str
+    title: str
+    amplitude: float
+    interval95: tuple[float, float]
+    unit: str
+    probability: float
+    alike: tuple[str, ...] = ()
+    rivals: tuple[Rival, ...] = ()
+    likelier: LocalAnomaly | None = None
+    likelier_probability: float = float("nan")
+
+
+@dataclass(frozen=True)
+class EffectsTested:
+    """How many effects were tested, as how many candidates (one effect in one experiment, section, device or patch
+    each), and how many of these would be seen at twice a plausible size.
+    """
+
+    effects: int
+    candidates: int
+    testable: int
+
+
+# What the model still asks for with all that was accepted.
+
+
+@dataclass(frozen=True)
+class ErrorsStillLarger:
+    """Even so the errors are `scale` times the stated ones [-]."""
+
+    scale: float
+
+
+@dataclass(frozen=True)
+class EffectsStillSignificant:
+    """Effects that are significant and were not accepted, the clearest first, with the family-wise p of each [-].
+
+    remainder: whether they may be a remainder of what was accepted.
+    """
+
+    effects: tuple[tuple[str, float], ...]
+    remainder: bool
+
+
+Remaining = ErrorsStillLarger | EffectsStillSignificant
+
+# Notes: what else should be known beside the verdict. DischargeMismatch and ModelErrorUsed are notes as well.
+
+
+@dataclass(frozen=True)
+class MisfitTooSmall:
+    """chi2 is far smaller than its degrees of freedom: errors are too large, or readings are no separate ones."""
+
+    chi2: float
+    freedom: int
+
+    @property
+    def ratio(self) -> float:
+        """chi2 over its degrees of freedom [-]."""
+        return self.chi2 / self.freedom
+
+    @property
+    def errors(self) -> float:
+        """Errors that would fit over those used [-]."""
+        return math.sqrt(self.ratio)
+
+
+@dataclass(frozen=True)
+class ImplausibleAmplitude:
+    """An accepted effect is `times` what is plausible [-]."""
+
+    effect: str
+    times: float
+
+
+@dataclass(frozen=True)
+class EffectsNotExcluded:
+    """Effects, the likeliest first, among which one that is there undetected is; beside: besides what was accepted."""
+
+    effects: tuple[str, ...]
+    beside: bool
+
+
+@dataclass(frozen=True)
+class LawStandsOut:
+    """Laws that are significant; instead_of: the accepted effects."""
+
+    laws: CandidateLaws
+    instead_of: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class NeighboursCorrelated:
+    """Correlation of the errors of neighbours, which is allowed for [-]."""
+
+    correlation: float
+
+
+@dataclass(frozen=True)
+class StatedErrorsTooSmall:
+    """The stated errors are too small by a factor, which is allowed for [-]."""
+
+    scale: float
+
+
+@dataclass(frozen=True)
+class InstrumentExcluded:
+    """An instrument whose readings are excluded; clear: whether it is off by more than `least`, which chance or the
+    model may make [standard errors].
+    """
+
+    instrument: FaultyInstrument
+    clear: bool
+    least: float
+
+
+@dataclass(frozen=True)
+class EffectsUntestable:
+    """Effects that these data cannot show, by the parameter whose change leaves their trace, '' for none; counts of
+    both; also: whether others that are named elsewhere are untestable, too.
+    """
+
+    groups: tuple[tuple[str, tuple[str, ...]], ...]
+    effects: int
+    candidates: int
+    also: bool
+
+
+@dataclass(frozen=True)
+class PlacesOnMap:
+    """x, y in the model and east, north on the map [m] of what is named at places."""
+
+    places: tuple[tuple[float, float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class MeasuredStretch:
+    """Velocities lie between x = low and high in a model of some length [m]; effects: that act along the channel."""
+
+    low: float
+    high: float
+    length: float
+    effects: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class TooShallow:
+    """No place and no law was searched for: the water is nowhere deeper than `depth` [m]."""
+
+    depth: float
+
+
+@dataclass(frozen=True)
+class MisfitRemains:
+    """The misfit with all that was accepted is still larger than the errors allow."""
+
+    misfit: ChiSquare
+
+
+@dataclass(frozen=True)
+class CommandCompared:
+    """How the linear model of a command of `engine` was made and how far it is from the command.
+
+    repeated: how often its differences were taken; parameters: how many; errors: root mean square difference at the
+    last parameters [standard errors], NaN when unknown; failure: why the command gave nothing, '' when it did; rough:
+    parameters whose differences are mostly noise; settled: whether the search for the best place settled; careful:
+    whether sizes and chances have to be taken with care.
+    """
+
+    repeated: int
+    parameters: int
+    errors: float
+    failure: str
+    rough: tuple[str, ...]
+    settled: bool
+    careful: bool
+
+
+Note = (
+    DischargeMismatch
+    | MisfitTooSmall
+    | ImplausibleAmplitude
+    | EffectsNotExcluded
+    | ModelErrorUsed
+    | LawStandsOut
+    | NeighboursCorrelated
+    | StatedErrorsTooSmall
+    | InstrumentExcluded
+    | EffectsUntestable
+    | PlacesOnMap
+    | MeasuredStretch
+    | TooShallow
+    | MisfitRemains
+    | CommandCompared
+)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict: its kind, what was found, and why no more is known.
+
+    Parameters
+    ----------
+    kind
+        One of the six kinds.
+    misfit
+        chi2 of the last model, with all effects and places in it.
+    effects, places
+        All that was accepted into the model, in the order it was found. Whether the kind names them as missing depends
+        on `reasons`: with a reason they only explain most of the misfit.
+    undecided
+        The likeliest hypotheses if none of them leads clearly.
+    instruments
+        Faulty instruments that the verdict names; others stand in `notes`.
+    field, laws
+        A smooth field, or laws, that the verdict names.
+    reasons
+        Why no more is known; empty for a verdict without doubt.
+    tested
+        Counts of the tested effects.
+    clears_the_model
+        Whether nothing is missing in the model, whether or not an instrument is off.
+    may_explain
+        Sections that carry another discharge than stated, for which what was found may be the reason.
+    remaining
+        What the model with all that was accepted still asks for.
+    notes
+        What else should be known, the most important first.
+    not_excluded
+        Groups of effects among which one that is there undetected, besides what was accepted, is nine times of ten.
+    significant_effects
+        Effects that are significant in the last model and were not accepted, with the family-wise p of each [-].
+    distrust
+        Why the numbers of a command of `engine` cannot be believed; None for any other model.
+    """
+
+    kind: VerdictKind
+    misfit: ChiSquare
+    effects: tuple[EffectFound, ...] = ()
+    places: tuple[LocalAnomaly, ...] = ()
+    undecided: tuple[Rival, ...] = ()
+    instruments: tuple[FaultyInstrument, ...] = ()
+    field: FieldFound | None = None
+    laws: CandidateLaws | None = None
+    reasons: tuple[Reason, ...] = ()
+    tested: EffectsTested = EffectsTested(0, 0, 0)
+    clears_the_model: bool = False
+    may_explain: tuple[DischargeMismatch, ...] = ()
+    remaining: tuple[Remaining, ...] = ()
+    notes: tuple[Note, ...] = ()
+    not_excluded: tuple[tuple[str, ...], ...] = ()
+    significant_effects: Mapping[str, float] = by_default(default_factory=dict)
+    distrust: Reason | None = None
+
+    @property
+    def doubts_the_data(self) -> bool:
+        """Whether the measurements have to be corrected before anything is known of the model."""
+        return any(isinstance(one, get_args(OfTheData)) for one in self.reasons)
+
+    @property
+    def tells_laws(self) -> bool:
+        """Whether the verdict names laws."""
+        return self.laws is not None
+
+    @property
+    def anomaly(self) -> LocalAnomaly | None:
+        """The first place that was accepted."""
+        return self.places[0] if self.places else None
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words."""
+        return sentence(self)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The notes in words."""
+        return sentences(self.notes)
+
+    @property
+    def left_over(self) -> str:
+        """What the model still asks for, in words; '' for nothing."""
+        return " ".join(sentences(self.remaining))
+
+
+@dataclass(frozen=True)
+class VerdictInputs:
+    """What a verdict rests on.
+
+    candidates: every tested effect, the strongest first; implausible: values that no flow can have; held_out: errors at
+    held-out measurements over the expected ones [-], NaN without any, infinite without a flow; by_chance: what of that
+    errors alone exceed in 5 % of cases; neighbours: whether readings side by side are excluded; strained: the
+    parameter furthest off its prior, and how far [standard deviations]; between: errors between the sections over those
+    of the data [-]; carried: sections that clearly carry another discharge than stated; remainder: whether all
+    significant effects may be a remainder of what was accepted; surroundings: notes on the map, the measured stretch
+    and the depth.
+    """
+
+    candidates: tuple[CandidateEffect, ...]
+    errors: EstimatedErrors
+    misfit: ChiSquare
+    steps: tuple[Step, ...] = ()
+    places: tuple[LocalAnomaly, ...] = ()
+    instruments: tuple[FaultyInstrument, ...] = ()
+    undecided: tuple[Rival, ...] = ()
+    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()
+    field: FieldFound | None = None
+    laws: CandidateLaws | None = None
+    model_error: ModelErrorUsed | None = None
+    not_excluded: tuple[tuple[str, ...], ...] = ()
+    held_out: float = float("nan")
+    by_chance: float = 1.0
+    neighbours: bool = False
+    strained: tuple[str, float] = ("", 0.0)
+    between: float = 1.0
+    carried: tuple[CarriedDischarge, ...] = ()
+    significant_effects: Mapping[str, float] = by_default(default_factory=dict)
+    remainder: bool = False
+    surroundings: tuple[Note, ...] = ()
+
+
+def make_verdict(inputs: VerdictInputs) -> Verdict:
+    """The verdict on what was found, with what remains and what else should be known."""
+    testable = sum(one.detectability.testable for one in inputs.candidates)
+    plain = Verdict(
+        kind="cannot-tell",
+        misfit=inputs.misfit,
+        effects=tuple(effect_found(step, inputs.candidates) for step in inputs.steps),
+        places=inputs.places,
+        tested=EffectsTested(effects_among(inputs.candidates), len(inputs.candidates), testable),
+        not_excluded=inputs.not_excluded,
+        significant_effects=dict(inputs.significant_effects),
+    )
+    found = _concluded(inputs, plain)
+    remaining: list[Remaining] = []
+    if (inputs.steps or inputs.places) and found.kind != "cannot-tell" and found.laws is None and inputs.field is None:
+        if inputs.errors.clearly_larger:
+            remaining.append(ErrorsStillLarger(inputs.errors.scale))
+        if ranked := sorted(inputs.significant_effects.items(), key=lambda one: one[1]):
+            remaining.append(EffectsStillSignificant(tuple(ranked), inputs.remainder))
+    explained = () if found.doubts_the_data else tuple(discharge_mismatches(inputs.carried))
+    found = replace(found, remaining=tuple(remaining), may_explain=explained)
+    return replace(found, notes=tuple(_notes(inputs, found)))
+
+
+def _concluded(inputs: VerdictInputs, plain: Verdict) -> Verdict:
+    """Kind, reasons and what is named: data first, then doubt, laws, fields, places, effects, and silence."""
+    if inputs.implausible:
+        return replace(plain, reasons=inputs.implausible)
+    if off := _unexplained(inputs):
+        return replace(plain, reasons=tuple(discharge_mismatches(off)))
+    doubt, laws, accepted = _doubt(inputs), inputs.laws, bool(inputs.steps or inputs.places)
+    if laws is not None:
+        nothing_else = not (accepted or inputs.undecided or inputs.field)
+        if nothing_else or (not doubt and laws.likelier and not accepted):
+            return _with_laws(inputs, plain, laws, doubt)
+    if inputs.field is not None:
+        return replace(plain, kind="none-of-these", field=inputs.field)
+    if accepted and doubt:
+        return replace(plain, reasons=(doubt,))
+    if inputs.places:
+        return replace(plain, kind="none-of-these")
+    if inputs.steps:
+        first = inputs.steps[0]
+        if len(first.groups) > constants().most_groups:
+            effects = tuple(Rival(name, "effect", first.chance[name]) for name in first.rivals)
+            return replace(plain, reasons=(TooManyGroups(effects),))
+        single = all(len(step.rivals) == 1 and not step.others for step in inputs.steps)
+        return replace(plain, kind="identified" if single else "one-of", instruments=inputs.instruments)
+    if inputs.undecided:
+        return replace(plain, undecided=inputs.undecided, reasons=(NoneLeads(),))
+    return _silent(inputs, plain)
+
+
+def _unexplained(inputs: VerdictInputs) -> list[CarriedDischarge]:
+    """Sections that carry another discharge than stated, for no reason among what was accepted."""
+    if any(place.term in TERMS_OF_DISCHARGES for place in inputs.places):
+        return []
+    names = {step.accepted for step in inputs.steps}
+    believed = [
+        EffectIdentity.parse(one.name)
+        for one in inputs.candidates
+        if one.name in names and one.amplitude.relative_size <= constants().far_off_prior
+    ]
+
+    def may_be_why(one: EffectIdentity, section: CarriedDischarge) -> bool:
+        # Which sections a device measured is not known here.
+        acts = not one.target or one.name in OF_DEVICES or bool({section.experiment, section.section} & set(one.target))
+        return one.name in OF_DISCHARGES and acts
+
+    return [section for section in inputs.carried if not any(may_be_why(one, section) for one in believed)]
+
+
+def _doubt(inputs: VerdictInputs) -> Reason | None:
+    """Why no name can be believed, None when it can."""
+    parameter, far = inputs.strained
+    ratio = inputs.misfit.value / max(inputs.misfit.freedom, 1)
+    if ratio > constants().absurd_misfit:
+        return MisfitBeyondErrors(math.sqrt(ratio))
+    if far > constants().far_off_prior:
+        return ParameterFarFromPrior(parameter, far)
+    names = {step.accepted for step in inputs.steps}
+    at_bound = tuple(one.name for one in inputs.candidates if one.name in names and _is_at_bound(one))
+    return AmplitudeAtBound(at_bound) if at_bound else None
+
+
+def _is_at_bound(one: CandidateEffect) -> bool:
+    """Whether an amplitude lies at an end of its support, other than the end at which it is off, or as far off its
+    prior as a calibration goes.
+    """
+    amplitude = one.amplitude
+    ends = [end for end in amplitude.support if end != amplitude.off]
+    near = any(abs(amplitude.value - end) < AT_BOUND * amplitude.scale for end in ends)
+    return amplitude.relative_size > FURTHEST - AT_BOUND or near
+
+
+def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt: Reason | None) -> Verdict:
+    """Laws if no known effect explains the misfit; an instrument that is clearly off goes before laws that are not
+    likelier than all else, except readings side by side.
+    """
+    found = replace(plain, laws=laws)
+    if inputs.neighbours and not laws.likelier:
+        doubt = doubt or NeighboursExcluded()
+    if doubt:
+        return replace(found, reasons=(doubt,))
+    if laws.likelier:
+        return replace(found, kind="none-of-these")
+    if inputs.instruments and all(map(is_clear, inputs.instruments)):
+        return replace(found, kind="instrument", instruments=inputs.instruments)
+    return found
+
+
+def _silent(inputs: VerdictInputs, plain: Verdict) -> Verdict:
+    """Nothing is missing, or an instrument is off, if silence is earned."""
+    clear = tuple(filter(is_clear, inputs.instruments))
+    all_clear = bool(clear) and len(clear) == len(inputs.instruments) and not inputs.neighbours
+    named = inputs.instruments if all_clear else ()
+    if inputs.misfit.p < constants().poor_fit_chance:
+        return replace(plain, reasons=(MisfitUnexplained(),))
+    if unearned := _unearned(inputs):
+        return replace(plain, reasons=(unearned,), instruments=named)
+    if inputs.between > constants().held_out_ratio:
+        kind: VerdictKind = "instrument" if all_clear else "cannot-tell"
+        return replace(plain, kind=kind, reasons=(UncertainBetweenSections(inputs.between),), instruments=named)
+    if plain.tested.testable < constants().testable_share * max(len(inputs.candidates), 1):
+        return replace(plain, reasons=(FewTestable(),))
+    return replace(plain, kind="instrument" if clear else "nothing-missing", instruments=clear, clears_the_model=True)
+
+
+def _unearned(inputs: VerdictInputs) -> Reason | None:
+    """Why it cannot be concluded that nothing is missing, None when it can."""
+    errors, used = inputs.errors, inputs.model_error
+    if errors.clearly_larger:
+        return ErrorsLargerThanStated(errors.scale)
+    if errors.correlation > constants().largest_correlation:
+        return CorrelatedErrors(errors.correlation)
+    if inputs.neighbours:
+        return NeighboursExcluded()
+    if used is not None and used.asks_for_more:
+        return ModelErrorExceeded(used.needed, used.friction)
+    if inputs.held_out == math.inf:
+        return NoFlowHeldOut()
+    if inputs.held_out > max(constants().held_out_ratio, inputs.by_chance):
+        return HeldOutMissed(inputs.held_out)
+    return None
+
+
+def is_clear(instrument: FaultyInstrument) -> bool:
+    """Whether an instrument is off by instrument_errors of its standard errors."""
+    low, high = instrument.interval95
+    return abs(instrument.offset) > constants().instrument_errors * (high - low) / (2.0 * NORMAL95)
+
+
+def effect_found(step: Step, candidates: Iterable[CandidateEffect]) -> EffectFound:
+    """An accepted effect with what it may be instead, the likeliest first."""
+    best = next(one for one in candidates if one.name == step.accepted)
+    alike = next(group for group in step.groups if step.accepted in group)
+    first = step.likelier_place
+    rivals = [Rival(name, "effect", step.chance[name]) for name in step.rivals if name not in alike]
+    for name, chance in step.others.items():
+        place = step.places.get(name)
+        if name != first:
+            at = {} if place is None else {"x": place.x, "y": place.y, "amplitude": place.amplitude}
+            rivals.append(Rival(name, name if place is None else place.term, chance, **at))
+    return EffectFound(
+        name=best.name,
+        title=best.title,
+        amplitude=best.amplitude.value,
+        interval95=best.amplitude.interval95,
+        unit=best.amplitude.unit,
+        probability=sum(step.chance[name] for name in alike),
+        alike=tuple(name for name in alike if name != step.accepted),
+        rivals=tuple(sorted(rivals, key=lambda one: -one.probability)),
+        likelier=step.places[first] if first else None,
+        likelier_probability=step.others[first] if first else float("nan"),
+    )
+
+
+def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
+    """What else should be known, on discharges and on what is named first."""
+    misfit, errors, accepted = inputs.misfit, inputs.errors, tuple(step.accepted for step in inputs.steps)
+    yield from discharge_mismatches(inputs.carried)
+    if is_too_small(misfit.value, misfit.freedom):
+        yield MisfitTooSmall(misfit.value, misfit.freedom)
+    by_name = {one.name: one for one in inputs.candidates}
+    for name in accepted:
+        if (times := by_name[name].amplitude.relative_size) > IMPLAUSIBLE:
+            yield ImplausibleAmplitude(name, times)
+    hidden = tuple(name for group in inputs.not_excluded for name in group)
+    if hidden and misfit.p >= constants().poor_fit_chance:
+        yield EffectsNotExcluded(hidden, bool(inputs.steps or inputs.places))
+    if inputs.model_error is not None:
+        yield inputs.model_error
+    if inputs.laws is not None and found.laws is None:
+        yield LawStandsOut(inputs.laws, accepted)
+    if errors.correlation > 0:
+        yield NeighboursCorrelated(errors.correlation)
+    if errors.scale > 1 and not any(isinstance(one, ErrorsStillLarger) for one in found.remaining):
+        yield StatedErrorsTooSmall(errors.scale)
+    others = [one for one in inputs.instruments if one not in found.instruments]
+    yield from (InstrumentExcluded(one, is_clear(one), constants().instrument_errors) for one in others)
+    yield from _untestable(inputs.candidates, {*hidden, *accepted}, inputs.significant_effects)
+    yield from inputs.surroundings
+    named = found.kind in ("identified", "one-of", "none-of-these", "instrument")
+    if named and misfit.p < constants().poor_fit_chance and found.laws is None:
+        yield MisfitRemains(misfit)
+
+
+def _untestable(
+    candidates: Sequence[CandidateEffect], named: set[str], significant: Iterable[str]
+) -> Iterable[EffectsUntestable]:
+    """The effects that cannot be tested and are named nowhere else, by what they look like, the largest group first."""
+    blind = [one for one in candidates if not one.detectability.testable]
+    hidden = [one for one in blind if one.name not in {*named, *significant}]
+    alike: dict[str, list[str]] = {}
+    for one in hidden:
+        alike.setdefault(one.detectability.looks_like, []).append(one.name)
+    groups = sorted(alike.items(), key=lambda group: (not group[0], -len(group[1])))
+    if hidden:
+        yield EffectsUntestable(
+            tuple((parameter, tuple(names)) for parameter, names in groups),
+            effects_among(hidden),
+            len(hidden),
+            any(one.name in named for one in blind),
+        )
+
+
+def is_too_small(chi2: float, freedom: int) -> bool:
+    """Whether P(chi2_f <= chi2) of a misfit with f degrees of freedom is below TOO_SMALL; False without any."""
+    return freedom > 0 and bool(chdtr(freedom, chi2) < TOO_SMALL)
