@@ -1,0 +1,67 @@
+#!/bin/sh
+# The last ensemble of a PD0 file that ends whole is lost, and a file of one ensemble has "no header".
+#
+# Guess:      a file of N whole ensembles gives N times.
+# Seen:       N - 1, without a warning: an ensemble counts only if the header of another one follows. A file with one
+#             ensemble raises "No header in this file", one with two a ZeroDivisionError.
+# Matters:    stationary measurements stored as one average a file come back empty, and a transect ends one
+#             ensemble before the bank at which it is extrapolated.
+# Documented: the comment in the source of the search reads "or if the file ends in the next ensemble"; no public
+#             thread found.
+# Versions:   mhkit 1.1.2 (its module dolfyn).
+set -eu
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+"${PYTHON:-python3}" -m venv "$work/venv"
+"$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check mhkit==1.1.2
+cd "$work"
+timeout 100 "$work/venv/bin/python" -W ignore - <<'PYTHON'
+import logging
+import struct
+from importlib.metadata import version
+
+import numpy as np
+
+logging.disable(logging.CRITICAL)
+import mhkit.dolfyn as dolfyn
+
+
+def ensemble(number, velocity, cell=10, first=35, coordinates=0x1F, spoilt=False):
+    """One ensemble of PD0 by its published layout: header, two leaders, velocities, three blocks of quality."""
+    clock = (20, 6, 3, 10, *divmod(number, 60), 0)
+    fixed = struct.pack(
+        "<H8B3H4BH4Bhh2BHH4BH", 0, 10, 16, 0x41, 0x41, 0, 13, 4, len(velocity), 1, cell, 25, 1, 64, 5, 0, 1500,
+        0, 1, 0, coordinates, 0, 0, 0x7D, 0x3D, first, 15, 1, 5, 50, 0, 5)
+    fixed += struct.pack("<8xHBBIB", 0, 255, 0, 12345, 20)
+    leader = struct.pack(
+        "<HH7BBHHHHhhhh3B3B8BIHIIB8B", 0x80, number, *clock, 0, 0, 1480, 2, 0, 0, 0, 0, 1450,
+        0, 1, 0, 0, 0, 0, *[0] * 8, 0, 0, 0, 0, 0, 20, *clock)
+    rows = np.asarray(velocity).round().astype("<i2")  # mm/s, four a cell
+    blocks = [fixed, leader, struct.pack("<H", 0x100) + rows.tobytes()]
+    blocks += [struct.pack("<H", name) + bytes([value]) * rows.size
+               for name, value in ((0x200, 120), (0x300, 90), (0x400, 100))]
+    starts = np.cumsum([6 + 2 * len(blocks), *map(len, blocks)]).tolist()
+    whole = struct.pack("<HHBB", 0x7F7F, starts[-1] + 2, 0, len(blocks))
+    whole += struct.pack(f"<{len(blocks)}H", *starts[:-1]) + b"".join(blocks) + bytes(2)
+    return whole + struct.pack("<H", (sum(whole) ^ (0x5555 if spoilt else 0)) & 0xFFFF)
+
+
+def read(name, ensembles):
+    """What mhkit makes of a file of these ensembles."""
+    with open(name, "wb") as file:
+        file.write(b"".join(ensembles))
+    return dolfyn.read(name)
+
+
+seen = {}
+for count in (1, 2, 3, 10):
+    try:
+        data = read(f"of{count}.000", [ensemble(number, np.tile([300, 0, 0, 0], (8, 1))) for number in range(count)])
+        seen[count] = f"{data.sizes['time']} ensembles"
+    except (RuntimeError, ZeroDivisionError) as error:
+        seen[count] = type(error).__name__
+print(f"mhkit {version('mhkit')}: files of 1, 2, 3 and 10 whole ensembles")
+print("expected: 1, 2, 3 and 10 ensembles")
+print(f"seen: {seen}")
+assert seen == {1: "RuntimeError", 2: "ZeroDivisionError", 3: "2 ensembles", 10: "9 ensembles"}, "changed"
+PYTHON
