@@ -16,16 +16,14 @@ from instrument_files import VECTRINO_HEADING, flowtracker, riversurveyor, vectr
 from matlab_files import profiler_mat, qrev_mat, riversurveyor_mat
 from scipy.io import savemat
 
-from vegglue.importers.confluence_mat import _loaded
-from vegglue.importers.drawn_centreline import _of_map
-from vegglue.importers.file_words import FileWords
+from vegglue.importers.file_options import FileOptions
 from vegglue.importers.instruments import reader_of
-from vegglue.importers.measured_rows import read_rows
-from vegglue.importers.placement import Placement
-from vegglue.importers.polygon_files import read_polygons
-from vegglue.importers.terrain_files import read_terrain
+from vegglue.importers.library_files import load_matlab
+from vegglue.importers.measured_rows import Placement, read_rows
+from vegglue.importers.terrain import read_terrain
+from vegglue.importers.vector_files import read_line, read_polygons
 
-OF_TABLES = FileWords(experiment="low", standard_error={"m/s": 0.01})
+OF_TABLES = FileOptions(experiment="low", standard_error={"m/s": 0.01})
 WORDS = replace(OF_TABLES, line=((0.0, 0.0), (0.0, 9.0)), start=(0.0, 0.0), position=(1.0, 0.0, 0.3))
 PLACES, DEPTHS, VELOCITIES = [1.0, 2.0, 3.0], [0.5, 0.7, 0.6], [0.3, 0.4, 0.2]
 SQUARE = [[0.0, 0.0], [0.0, 2.0], [2.0, 2.0], [2.0, 0.0], [0.0, 0.0]]
@@ -119,11 +117,11 @@ IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("qrev.mat", _made(lambda path: qrev_mat(path, transects=1)), _measured),
     ("profiler.mat", _made(lambda path: profiler_mat(path, np.full(2, 0.3))), _measured),
     ("summary.xml", SUMMARY, _measured),
-    ("maps.mat", _matlab(), lambda path: _loaded(path, "X", "Y")),
+    ("maps.mat", _matlab(), lambda path: load_matlab(path, "a file of the set", ("X", "Y"))),
     ("tracker.dis", flowtracker(PLACES, DEPTHS, VELOCITIES).encode(), _measured),
     ("surveyor.dis", riversurveyor(PLACES, DEPTHS, VELOCITIES).encode(), _measured),
     ("probe.dat", vectrino((0.3, 0.0, 0.0), 0.02, 40, 2).encode(), _measured),
     ("gauging.ft", _gauging(), _measured),
-    ("line.geojson", LINE, _of_map),
+    ("line.geojson", LINE, read_line),
     ("boat.txt", winriver(EAST, NORTH, 1.0, (0.1, 0.4), 0.01).encode(), _measured),
 )

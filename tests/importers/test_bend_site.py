@@ -17,7 +17,7 @@ from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import CentrelineShape
 from vegglue.errors import InputError
-from vegglue.importers.placement import Placement
+from vegglue.importers.measured_rows import Placement
 from vegglue.measurements.observations import read_observations
 
 FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0, crs="EPSG:2056")

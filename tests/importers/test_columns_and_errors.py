@@ -11,7 +11,7 @@ from field_folders import CHANNEL, JUNE, folder_of
 import vegglue
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
-from vegglue.importers.file_words import FileWords
+from vegglue.importers.file_options import FileOptions
 from vegglue.importers.measured_rows import read_rows
 from vegglue.measurements.observations import read_observations
 
@@ -152,13 +152,13 @@ def test_a_name_that_says_less_yields(tmp_path: Path, headings: str, wanted: dic
     """The number of samples was y, the bed the height of a point, and the magnitude the velocity along."""
     numbers = ",".join(str(1 + place) for place in range(headings.count(",") + 1))
     (tmp_path / "a.csv").write_text(f"{headings}\n{numbers}\n{numbers}.5\n", encoding="utf-8")
-    taken = read_rows(tmp_path / "a.csv", FileWords())
+    taken = read_rows(tmp_path / "a.csv", FileOptions())
     assert taken.columns == {role: headings.split(",")[place] for role, place in wanted.items()}
 
 
 def test_north_is_known_beside_a_column_named_as_x(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("Ost,N,u\n1,2,3\n4,5,6\n", encoding="utf-8")
-    assert set(read_rows(tmp_path / "a.csv", FileWords(columns={"x": "Ost"})).numbers) == {"x", "y", "u"}
+    assert set(read_rows(tmp_path / "a.csv", FileOptions(columns={"x": "Ost"})).numbers) == {"x", "y", "u"}
 
 
 @pytest.mark.parametrize(
@@ -174,12 +174,12 @@ def test_north_is_known_beside_a_column_named_as_x(tmp_path: Path) -> None:
 def test_an_error_without_a_unit_has_that_of_its_values(tmp_path: Path, table: str, role: str, error: float) -> None:
     """0.3 beside U [cm/s] was 0.3 m/s."""
     (tmp_path / "a.csv").write_text(table, encoding="utf-8")
-    assert read_rows(tmp_path / "a.csv", FileWords()).numbers[role].tolist() == pytest.approx([error])
+    assert read_rows(tmp_path / "a.csv", FileOptions()).numbers[role].tolist() == pytest.approx([error])
 
 
 def test_an_error_follows_the_unit_that_the_site_file_says(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x,y,u,u_se\n1,2,40,0.3\n", encoding="utf-8")
-    taken = read_rows(tmp_path / "a.csv", FileWords(units={"u": "cm/s"}))
+    taken = read_rows(tmp_path / "a.csv", FileOptions(units={"u": "cm/s"}))
     assert taken.numbers["u_se"].tolist() == pytest.approx([0.003])
     assert taken.units["u_se"] == "cm/s"
 
@@ -191,7 +191,7 @@ def test_an_error_follows_the_unit_that_the_site_file_says(tmp_path: Path) -> No
 def test_a_unit_may_have_words_behind_it(tmp_path: Path, heading: str, level: float) -> None:
     """Levels in cm above the floor were read as metres."""
     (tmp_path / "a.csv").write_text(f"x;y;{heading}\n1;2;95\n2;2;95\n", encoding="utf-8")
-    assert read_rows(tmp_path / "a.csv", FileWords()).numbers["level"].tolist() == pytest.approx([level, level])
+    assert read_rows(tmp_path / "a.csv", FileOptions()).numbers["level"].tolist() == pytest.approx([level, level])
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,7 @@ def test_sevens_and_eights_are_marks_where_nothing_measured_is_so_large(
 ) -> None:
     """A check doubted them, an import kept them."""
     (tmp_path / "a.csv").write_text(f"{headings}\n1,2,0.4\n2,2,{number}\n", encoding="utf-8")
-    taken = read_rows(tmp_path / "a.csv", FileWords())
+    taken = read_rows(tmp_path / "a.csv", FileOptions())
     last = list(taken.numbers)[-1]
     assert np.isfinite(taken.numbers[last]).tolist() == [True, kept]
-    assert any("1 mark for no value" in one for one in taken.said) == (not kept)
+    assert any("1 mark for no value" in one for one in taken.notes) == (not kept)

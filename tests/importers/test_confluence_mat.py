@@ -9,7 +9,7 @@ from scipy.io import savemat
 
 import vegglue
 from vegglue.errors import InputError
-from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
+from vegglue.importers.confluence import mat_folder, tables_of_mat
 from vegglue.measurements.observations import read_observations
 from vegglue.workflow.import_folder import assumptions_of
 

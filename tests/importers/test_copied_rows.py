@@ -6,8 +6,7 @@ import pytest
 from field_folders import field_folder
 
 import vegglue
-from vegglue.importers.copied_rows import without_copies
-from vegglue.importers.loose_table import LooseTable
+from vegglue.importers.table_parser import ParsedTable, without_copies
 from vegglue.measurements.observations import read_observations
 
 SURVEY = [f"low,A,12,{number / 10},{0.4 + number / 100},0.012" for number in range(12)]
@@ -15,8 +14,8 @@ HEADING = "experiment,section,x,y,u,u_se"
 
 
 def kept_of(rows: list[str]) -> list[str]:
-    numbered = tuple((number, [row]) for number, row in enumerate(rows, 2))
-    return [fields[0] for _, fields in without_copies(LooseTable(("row",), ("",), numbered, False, "")).rows]
+    texts, numbers = tuple([row] for row in rows), tuple(range(2, len(rows) + 2))
+    return [fields[0] for fields in without_copies(ParsedTable(("row",), ("",), texts, numbers, False, "")).rows]
 
 
 @pytest.mark.parametrize("times", [1, 4])

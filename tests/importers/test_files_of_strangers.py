@@ -12,12 +12,12 @@ from scipy.io import savemat
 from untrusted_imports import IMPORTS
 
 from vegglue.errors import InputError
-from vegglue.importers.confluence_mat import _loaded
-from vegglue.importers.file_words import FileWords
-from vegglue.importers.loose_table import read_loosely
-from vegglue.importers.matlab_exports import read_matlab
-from vegglue.importers.polygon_files import read_polygons
-from vegglue.importers.terrain_files import read_geotiff
+from vegglue.importers.file_options import FileOptions
+from vegglue.importers.instruments import read_matlab
+from vegglue.importers.library_files import load_matlab
+from vegglue.importers.table_parser import parse_table
+from vegglue.importers.terrain import read_geotiff
+from vegglue.importers.vector_files import read_polygons
 
 pytestmark = pytest.mark.slow
 
@@ -51,7 +51,7 @@ def test_a_workbook_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
     path = workbook_with(tmp_path / "bomb.xlsx", (b" " * 1_000_000 for _ in range(150)))
     assert path.stat().st_size < 1_000_000
     with pytest.raises(InputError, match=r"bomb\.xlsx: expected at most 100,000,000 bytes, got 150,"):
-        read_loosely(path)
+        parse_table(path)
 
 
 def test_a_workbook_with_few_cells_far_to_the_right_is_refused(tmp_path: Path) -> None:
@@ -62,7 +62,7 @@ def test_a_workbook_with_few_cells_far_to_the_right_is_refused(tmp_path: Path) -
         yield b"</sheetData></worksheet>"
 
     with pytest.raises(InputError, match=r"wide\.xlsx: expected at most 100,000,000 bytes, got 100,"):
-        read_loosely(workbook_with(tmp_path / "wide.xlsx", rows()))
+        parse_table(workbook_with(tmp_path / "wide.xlsx", rows()))
 
 
 def test_a_geotiff_that_claims_many_pixels_is_refused(tmp_path: Path) -> None:
@@ -79,10 +79,10 @@ def test_a_matlab_file_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
     savemat(tmp_path / "maps.mat", {"X": np.zeros((4000, 4000))}, do_compression=True)
     assert (tmp_path / "maps.mat").stat().st_size < 200_000
     with pytest.raises(InputError, match=r"maps\.mat: expected at most 100,000,000 bytes, got 100,"):
-        _loaded(tmp_path / "maps.mat", "X")
+        load_matlab(tmp_path / "maps.mat", "a file of the set", ("X",))
     savemat(tmp_path / "boat.mat", {"Summary": {"Track": np.zeros((4000, 4000))}}, do_compression=True)
     with pytest.raises(InputError, match=r"boat\.mat: expected at most 100,000,000 bytes, got 100,"):
-        read_matlab(tmp_path / "boat.mat", FileWords(start=(0.0, 0.0)))
+        read_matlab(tmp_path / "boat.mat", FileOptions(start=(0.0, 0.0)))
 
 
 @pytest.mark.parametrize(("place", "byte"), [(320, 0x91), (241, 2)])
@@ -93,7 +93,7 @@ def test_a_matlab_file_that_crashes_its_reader_is_refused(tmp_path: Path, place:
     content[place] = byte
     (tmp_path / "boat.mat").write_bytes(content)
     with pytest.raises(InputError, match=r"boat\.mat cannot be read as a MATLAB file of version 5: .*; save it anew"):
-        read_matlab(tmp_path / "boat.mat", FileWords(start=(0.0, 0.0)))
+        read_matlab(tmp_path / "boat.mat", FileOptions(start=(0.0, 0.0)))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from field_folders import CHANNEL, JUNE, folder_of
 import vegglue
 from vegglue.errors import InputError
 from vegglue.importers.column_names import role_of, unit_stated
-from vegglue.importers.file_words import FileWords
+from vegglue.importers.file_options import FileOptions
 from vegglue.importers.measured_rows import read_rows
 
 
@@ -18,7 +18,7 @@ def test_a_sign_makes_another_quantity_of_a_letter(tmp_path: Path, heading: str)
     """The shear velocity u* and the scatter σ_u were the velocity, and the step Δx the place."""
     table = f"{heading},x,y,u\n0.05,8,0,0.4\n0.06,20,0,0.5\n"
     (tmp_path / "a.csv").write_text(table, encoding="utf-8")
-    taken = read_rows(tmp_path / "a.csv", FileWords())
+    taken = read_rows(tmp_path / "a.csv", FileOptions())
     assert dict(taken.columns) == {"x": "x", "y": "y", "u": "u"}
     assert list(taken.others) == [heading]
 
@@ -69,13 +69,13 @@ def test_a_unit_of_something_else_is_refused_in_round_brackets_too(tmp_path: Pat
     """It was left out of account, and the numbers taken for SI: a velocity was a discharge."""
     (tmp_path / "a.csv").write_text(f"a;b;{heading}\n1;2;3\n2;2;3\n", encoding="utf-8")
     with pytest.raises(InputError, match=stated):
-        read_rows(tmp_path / "a.csv", FileWords())
+        read_rows(tmp_path / "a.csv", FileOptions())
 
 
 @pytest.mark.parametrize("heading", ["u (mean)", "u (60 s)", "u (A/B)", "u (m/s, mean of 60 s)", "u (-)"])
 def test_words_in_round_brackets_are_no_units(tmp_path: Path, heading: str) -> None:
     (tmp_path / "a.csv").write_text(f"x;y;{heading}\n1;2;3\n2;2;3\n", encoding="utf-8")
-    assert read_rows(tmp_path / "a.csv", FileWords()).units["u"] == "m/s"
+    assert read_rows(tmp_path / "a.csv", FileOptions()).units["u"] == "m/s"
 
 
 @pytest.mark.parametrize(
@@ -109,22 +109,25 @@ def test_two_columns_of_one_name_are_no_repeats_to_choose_from(tmp_path: Path, h
     """The first of them was taken, at y = 0, and the others were named at the end of a line only."""
     (tmp_path / "a.csv").write_text(f"{heading}\n8,0.4,0.5,0.4\n9,0.4,0.5,0.4\n", encoding="utf-8")
     with pytest.raises(InputError, match=re.escape(f"expected one column of u, got {named}; put their values below")):
-        read_rows(tmp_path / "a.csv", FileWords())
+        read_rows(tmp_path / "a.csv", FileOptions())
 
 
 def test_one_reading_in_two_units_is_one(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x [m],x [ft],u\n8,26.2,0.5\n9,29.5,0.5\n", encoding="utf-8")
-    assert read_rows(tmp_path / "a.csv", FileWords()).numbers["x"].tolist() == [8.0, 9.0]
+    assert read_rows(tmp_path / "a.csv", FileOptions()).numbers["x"].tolist() == [8.0, 9.0]
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (FileWords(units={"u": "cm/s"}), "expected in `units` what its columns hold, x, east_velocity, north_velocity"),
-        (FileWords(columns={"x": "x", "y": "x"}), "expected a column of its own for y, got 'x', which is that of x"),
+        (
+            FileOptions(units={"u": "cm/s"}),
+            "`units` what its columns hold, x, east_velocity, north_velocity",
+        ),
+        (FileOptions(columns={"x": "x", "y": "x"}), "expected a column of its own for y, got 'x', which is that of x"),
     ],
 )
-def test_words_of_the_site_file_that_reach_no_column_are_refused(tmp_path: Path, words: FileWords, said: str) -> None:
+def test_words_of_the_site_file_that_reach_no_column_are_refused(tmp_path: Path, words: FileOptions, said: str) -> None:
     """`units: {u: cm/s}` beside Ve and Vn did nothing, and these were m/s."""
     (tmp_path / "a.csv").write_text("x,Ve,Vn\n8,40,3\n9,41,3\n", encoding="utf-8")
     with pytest.raises(InputError, match=said):
@@ -151,15 +154,15 @@ def test_a_unit_may_stand_behind_in(heading: str) -> None:
 def test_a_velocity_with_a_direction_is_a_speed(tmp_path: Path, headings: str, roles: set[str]) -> None:
     """It was taken for the one along the channel, and its direction dropped."""
     (tmp_path / "a.csv").write_text(f"x;y;{headings}\n8;0;40;30\n20;0;50;31\n", encoding="utf-8")
-    taken = read_rows(tmp_path / "a.csv", FileWords())
+    taken = read_rows(tmp_path / "a.csv", FileOptions())
     assert set(taken.numbers) == {"x", "y"} | roles
     assert "u" in roles or taken.numbers["speed"].tolist() == [0.4, 0.5]
-    assert read_rows(tmp_path / "a.csv", FileWords(columns={"u": headings.split(";")[0]})).numbers["u"][0] == 0.4
+    assert read_rows(tmp_path / "a.csv", FileOptions(columns={"u": headings.split(";")[0]})).numbers["u"][0] == 0.4
 
 
 def test_an_empty_direction_leaves_the_velocity_along(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x;y;snelheid;richting\n8;0;0,4;\n20;0;0,5;\n", encoding="utf-8")
-    assert "u" in read_rows(tmp_path / "a.csv", FileWords()).numbers
+    assert "u" in read_rows(tmp_path / "a.csv", FileOptions()).numbers
 
 
 @pytest.mark.parametrize(
@@ -168,11 +171,11 @@ def test_an_empty_direction_leaves_the_velocity_along(tmp_path: Path) -> None:
 def test_a_column_is_named_without_its_unit(tmp_path: Path, heading: str) -> None:
     """`columns: {speed: snelheid}` was refused, and wanted `snelheid [cm/s]`."""
     (tmp_path / "a.csv").write_text(f"x;y;{heading}\n8;0;40\n20;0;50\n", encoding="utf-8")
-    words = FileWords(columns={"speed": "snelheid"}, units={"speed": "cm/s"})
+    words = FileOptions(columns={"speed": "snelheid"}, units={"speed": "cm/s"})
     assert read_rows(tmp_path / "a.csv", words).numbers["speed"].tolist() == [0.4, 0.5]
 
 
 def test_a_name_of_two_columns_needs_its_unit(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x;y;snel [cm/s];snel [m/s]\n8;0;40;0,4\n20;0;50;0,5\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"expected the column 'snel' for speed, got x, y, snel \[cm/s\]"):
-        read_rows(tmp_path / "a.csv", FileWords(columns={"speed": "snel"}))
+        read_rows(tmp_path / "a.csv", FileOptions(columns={"speed": "snel"}))

@@ -12,12 +12,11 @@ import vegglue
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError
 from vegglue.importers import instruments
-from vegglue.importers.file_words import FileWords
+from vegglue.importers.file_options import FileOptions
+from vegglue.importers.gaugings import read_gauging
 from vegglue.importers.instruments import reader_of
 from vegglue.importers.nortek import read_nortek, read_vector
-from vegglue.importers.pd0_transects import read_pd0
-from vegglue.importers.tape_tables import read_tape_table
-from vegglue.importers.winriver import read_winriver
+from vegglue.importers.teledyne import read_pd0, read_winriver
 from vegglue.measurements.observations import read_observations
 
 PLACES, DEPTHS, VELOCITIES = [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.5, 0.8, 0.6, 0.0], [0.0, 0.3, 0.5, 0.4, 0.0]
@@ -44,15 +43,15 @@ def test_every_reader_has_a_file_that_is_damaged(tmp_path: Path) -> None:
 def test_verticals_along_a_tape_stand_where_it_lay(tmp_path: Path, export) -> None:
     path = tmp_path / "gauging.dis"
     path.write_text(export(PLACES, DEPTHS, VELOCITIES), encoding="utf-8")
-    words = FileWords(line=ACROSS)
-    assert reader_of(path) is read_tape_table
-    taken = read_tape_table(path, words)
+    words = FileOptions(line=ACROSS)
+    assert reader_of(path) is read_gauging
+    taken = read_gauging(path, words)
     assert np.allclose(taken.numbers["x"], 12.0)
     assert np.allclose(taken.numbers["y"], [1.0, 0.0, -1.0], atol=0.01)
     assert np.allclose(taken.numbers["u"], [0.3, 0.5, 0.4], atol=0.001)
     assert (taken.numbers["u_se"] > 0.05 * 0.3).all()
     with pytest.raises(InputError, match="expected where the tape lay"):
-        read_tape_table(path, FileWords())
+        read_gauging(path, FileOptions())
 
 
 def test_a_gauging_becomes_a_case(tmp_path: Path) -> None:
@@ -74,7 +73,7 @@ def test_a_transect_is_averaged_over_the_depth_and_along_the_section(tmp_path: P
     text = winriver(0.6 * along, 0.8 * along, 2.0, (0.64, -0.48), 0.05)
     (tmp_path / "transect_ASC.TXT").write_text(text, encoding="utf-8")
     assert reader_of(tmp_path / "transect_ASC.TXT") is read_winriver
-    taken = read_winriver(tmp_path / "transect_ASC.TXT", FileWords(start=(100.0, 200.0)))
+    taken = read_winriver(tmp_path / "transect_ASC.TXT", FileOptions(start=(100.0, 200.0)))
     assert taken.size == 15
     assert np.allclose(taken.numbers["x"] - 100.0, 0.75 * (taken.numbers["y"] - 200.0), atol=0.02)
     assert taken.numbers["east_velocity"] == pytest.approx(0.64, abs=0.03)
@@ -168,13 +167,13 @@ def test_a_record_in_beams_is_refused(tmp_path: Path) -> None:
     (tmp_path / "p.dat").write_text(vectrino((0.4, 0.0, 0.0), 0.01, 100, bad=0), encoding="utf-8")
     (tmp_path / "p.hdr").write_text(f"{VECTRINO_HEADING}Coordinate system    BEAM\n", encoding="utf-8")
     with pytest.raises(InputError, match="expected velocities in XYZ or ENU, got BEAM; export them anew"):
-        read_nortek(tmp_path / "p.dat", FileWords(position=(1.0, 0.0, 0.2)))
+        read_nortek(tmp_path / "p.dat", FileOptions(position=(1.0, 0.0, 0.2)))
 
 
 def test_a_record_without_its_rate_or_place_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "p.dat"
     path.write_text(vectrino((0.3, 0.0, 0.0), 0.03, 100, bad=0), encoding="utf-8")
     with pytest.raises(InputError, match="expected where the probe stood"):
-        read_nortek(path, FileWords())
+        read_nortek(path, FileOptions())
     with pytest.raises(InputError, match=r"expected `Sampling rate` in the \.hdr"):
-        read_nortek(path, FileWords(position=(1.0, 0.0, 0.2)))
+        read_nortek(path, FileOptions(position=(1.0, 0.0, 0.2)))

@@ -8,8 +8,8 @@ from field_folders import field_folder
 
 import vegglue
 from vegglue.errors import InputError
-from vegglue.importers.loose_table import read_loosely
-from vegglue.importers.unit_words import unit_named
+from vegglue.importers.column_names import unit_named
+from vegglue.importers.table_parser import parse_table
 
 HEADING = "experiment,section,x,y,u,u_se"
 ROWS = [f"low,D{number},{number}.0,-1.5,0.5718,0.012" for number in range(12)]
@@ -36,16 +36,16 @@ def commas_in_x(row: str) -> str:
 )
 def test_decimal_commas_between_commas_are_refused(tmp_path: Path, rows: list[str], wrong: int, fields: int) -> None:
     """Their row was read with its columns shifted, and averaged into a sound station."""
-    said = rf"v\.csv, row {wrong}: expected 6 fields as in the heading, got {fields}; if numbers are written with a dec"
+    said = rf"v\.csv, row {wrong}: expected 6 fields as in the heading, got {fields}; if numbers"
     with pytest.raises(InputError, match=said):
-        read_loosely(table_of(tmp_path, HEADING, *rows))
+        parse_table(table_of(tmp_path, HEADING, *rows))
 
 
 def test_a_longer_row_without_a_heading_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"row 1: expected 3 fields as in others, got 4; if numbers"):
-        read_loosely(table_of(tmp_path, "1,5,2.0,0.3", "1.5,2.1,0.3", "1.5,2.2,0.3"))
+        parse_table(table_of(tmp_path, "1,5,2.0,0.3", "1.5,2.1,0.3", "1.5,2.2,0.3"))
     with pytest.raises(InputError, match=r"row 2: expected 3 fields as in the heading, got 4; mend the row"):
-        read_loosely(table_of(tmp_path, "x;y;u", "1.5;2.1;0.3;0.3", "1.5;2.2;0.3"))
+        parse_table(table_of(tmp_path, "x;y;u", "1.5;2.1;0.3;0.3", "1.5;2.2;0.3"))
 
 
 @pytest.mark.parametrize(
@@ -62,9 +62,9 @@ def test_a_longer_row_without_a_heading_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_rows_that_fit_are_read(tmp_path: Path, lines: list[str], headings: tuple[str, ...], first: list[str]) -> None:
-    table = read_loosely(table_of(tmp_path, *lines))
+    table = parse_table(table_of(tmp_path, *lines))
     assert table.headings == headings
-    assert table.rows[0][1] == first
+    assert list(table.rows[0]) == first
 
 
 @pytest.mark.parametrize(
@@ -96,9 +96,9 @@ def test_rows_that_fit_are_read(tmp_path: Path, lines: list[str], headings: tupl
 @pytest.mark.parametrize("units", [[], ["-;1;m;m;-;-;"]])
 def test_remarks_and_dry_rows_are_rows(tmp_path: Path, rows: list[str], units: list[str]) -> None:
     """A remark in two of six rows had them parted by their decimal commas, and a dry first row became the heading."""
-    table = read_loosely(table_of(tmp_path, "raai;x;q;level;u;direction;note", *units, *rows))
+    table = parse_table(table_of(tmp_path, "raai;x;q;level;u;direction;note", *units, *rows))
     assert table.headings[:3] == ("raai", "x", "q")
-    assert [row[0] for _, row in table.rows] == [row.split(";")[0] for row in rows]
+    assert [row[0] for row in table.rows] == [row.split(";")[0] for row in rows]
     assert table.form.startswith("semicolons")
     assert bool(any(table.units)) == bool(units)
 
@@ -109,22 +109,20 @@ def test_remarks_and_dry_rows_are_rows(tmp_path: Path, rows: list[str], units: l
 def test_spaces_part_numbers_with_decimal_commas(tmp_path: Path, rows: list[str]) -> None:
     """They were parted by the commas, as these cut all lines but the heading."""
     headings = ("section", "x", "y", "u")[-len(rows[0].split()) :]
-    table = read_loosely(table_of(tmp_path, " ".join(headings), *rows, rows[0], rows[0], rows[0], rows[0]))
+    table = parse_table(table_of(tmp_path, " ".join(headings), *rows, rows[0], rows[0], rows[0], rows[0]))
     assert table.headings == headings
     assert table.decimal_comma
 
 
 @pytest.mark.parametrize("rows", [["1;2;0,5", "3;4;0,6"], ["A;1;dry", "B;2;0,6"], ["A;1;dry", "B;2;wet"]])
 def test_what_a_title_says_with_its_unit_is_no_row(tmp_path: Path, rows: list[str]) -> None:
-    table = read_loosely(table_of(tmp_path, "Site;Mill brook", "Discharge;620;l/s", "x;y;u", *rows))
+    table = parse_table(table_of(tmp_path, "Site;Mill brook", "Discharge;620;l/s", "x;y;u", *rows))
     assert table.headings == ("x", "y", "u")
-    assert [";".join(row) for _, row in table.rows] == rows
+    assert [";".join(row) for row in table.rows] == rows
 
 
 def test_words_with_semicolons_do_not_part_a_table_of_commas(tmp_path: Path) -> None:
-    table = read_loosely(
-        table_of(tmp_path, "x,y,u,note", "1,2,0.5,wet; deep", "3,4,0.6,dry; steep", "5,6,0.7,mud; old")
-    )
+    table = parse_table(table_of(tmp_path, "x,y,u,note", "1,2,0.5,wet; deep", "3,4,0.6,dry; steep", "5,6,0.7,mud; old"))
     assert table.headings == ("x", "y", "u", "note")
 
 
@@ -169,7 +167,7 @@ def test_a_unit_that_nobody_gave_is_said(tmp_path: Path, heading: str, said: str
 
 def test_a_unit_may_name_the_datum_of_a_level(tmp_path: Path) -> None:
     """`m a.s.l.` in a row of units made that row the heading, and no column was known."""
-    table = read_loosely(table_of(tmp_path, "Gauge;Chainage;Level", ";m;m a.s.l.", "A;2;47,748", "B;17;47,736"))
+    table = parse_table(table_of(tmp_path, "Gauge;Chainage;Level", ";m;m a.s.l.", "A;2;47,748", "B;17;47,736"))
     assert table.headings == ("Gauge", "Chainage", "Level")
     assert table.units == ("", "m", "m a.s.l.")
 
@@ -180,15 +178,15 @@ def test_a_level_may_be_in_centimetres_above_a_datum(unit: str) -> None:
 
 
 def test_two_titles_above_two_rows_are_no_table(tmp_path: Path) -> None:
-    table = read_loosely(table_of(tmp_path, "Levels", "May", "experiment,x,level,note", "low,2.0,0.5,", "low,3.0,0.6,"))
+    table = parse_table(table_of(tmp_path, "Levels", "May", "experiment,x,level,note", "low,2.0,0.5,", "low,3.0,0.6,"))
     assert table.headings == ("experiment", "x", "level")
     assert len(table.rows) == 2
 
 
 def test_a_number_in_groups_is_no_heading(tmp_path: Path) -> None:
-    table = read_loosely(table_of(tmp_path, "run;x (m);level (m)", "low;1.236,00;0,5", "low;2,0;0,6"))
+    table = parse_table(table_of(tmp_path, "run;x (m);level (m)", "low;1.236,00;0,5", "low;2,0;0,6"))
     assert table.headings == ("run", "x (m)", "level (m)")
-    assert table.number(table.rows[0][1][1]) == 1236.0
+    assert table.numbers(tmp_path, 1).tolist() == [1236.0, 2.0]
 
 
 def test_text_with_decimal_commas_in_a_workbook_is_numbers(tmp_path: Path) -> None:
@@ -197,8 +195,8 @@ def test_text_with_decimal_commas_in_a_workbook_is_numbers(tmp_path: Path) -> No
     for row in (["x", "y", "u"], ["1,5", 2, "0,25"], ["2,5", 2.5, "0,3"]):
         book.active.append(row)
     book.save(tmp_path / "v.xlsx")
-    table = read_loosely(tmp_path / "v.xlsx")
-    assert [[table.number(text) for text in row] for _, row in table.rows] == [[1.5, 2.0, 0.25], [2.5, 2.5, 0.3]]
+    table = parse_table(tmp_path / "v.xlsx")
+    assert [table.numbers(tmp_path, column).tolist() for column in range(3)] == [[1.5, 2.5], [2.0, 2.5], [0.25, 0.3]]
 
 
 def test_a_date_in_a_workbook_is_the_day(tmp_path: Path) -> None:
@@ -208,5 +206,5 @@ def test_a_date_in_a_workbook_is_the_day(tmp_path: Path) -> None:
     for row in (["date", "x", "u"], [datetime(2024, 6, 3), 8, 0.4], [datetime(2024, 6, 3, 14, 30), 9, 0.5]):
         book.active.append(row)
     book.save(tmp_path / "a.xlsx")
-    rows = read_loosely(tmp_path / "a.xlsx").rows
-    assert [row[0] for _, row in rows] == ["2024-06-03", "2024-06-03 14:30:00"]
+    rows = parse_table(tmp_path / "a.xlsx").rows
+    assert [row[0] for row in rows] == ["2024-06-03", "2024-06-03 14:30:00"]

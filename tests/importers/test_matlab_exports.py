@@ -9,12 +9,11 @@ from scipy.io import savemat
 
 import vegglue
 from vegglue.errors import InputError
-from vegglue.importers.file_words import FileWords
-from vegglue.importers.instruments import reader_of
-from vegglue.importers.matlab_exports import read_matlab
+from vegglue.importers.file_options import FileOptions
+from vegglue.importers.instruments import read_matlab, reader_of
 from vegglue.measurements.observations import read_observations
 
-START = FileWords(start=(100.0, 200.0))
+START = FileOptions(start=(100.0, 200.0))
 MEANS = np.linspace(0.30, 0.24, 31)  # slower towards the bed
 
 
@@ -24,7 +23,7 @@ def test_a_transect_of_a_riversurveyor_becomes_stations(tmp_path: Path, unit: st
     riversurveyor_mat(path, unit)
     assert reader_of(path) is read_matlab
     taken = read_matlab(path, START)
-    assert "RiverSurveyor MATLAB export, 36 ensembles" in taken.said[0]
+    assert "RiverSurveyor MATLAB export, 36 ensembles" in taken.notes[0]
     assert taken.numbers["east_velocity"] == pytest.approx(0.64, abs=0.03)
     assert taken.numbers["north_velocity"] == pytest.approx(-0.48, abs=0.03)
     assert np.allclose(taken.numbers["x"] - 100.0, 0.75 * (taken.numbers["y"] - 200.0), atol=1e-6)
@@ -35,7 +34,7 @@ def test_transects_there_and_back_lie_on_one_another(tmp_path: Path) -> None:
     qrev_mat(path)
     assert reader_of(path) is read_matlab
     taken = read_matlab(path, START)
-    assert taken.said[0] == "QRev, 2 transects, 118 ensembles, 2 without velocities left out"
+    assert taken.notes[0] == "QRev, 2 transects, 118 ensembles, 2 without velocities left out"
     assert taken.size == 15
     assert taken.numbers["x"].min() == pytest.approx(100.0, abs=0.2)
     assert taken.numbers["x"].max() == pytest.approx(100.0 + 59 * 0.06, abs=0.2)
@@ -43,35 +42,35 @@ def test_transects_there_and_back_lie_on_one_another(tmp_path: Path) -> None:
     assert taken.numbers["east_velocity"] == pytest.approx(0.64, abs=0.02)  # without the cells that were filled up
     assert taken.numbers["north_velocity"] == pytest.approx(-0.48, abs=0.02)
     with pytest.raises(InputError, match=r"^\S+ expected where the boat started"):
-        read_matlab(path, FileWords())
+        read_matlab(path, FileOptions())
 
 
 def test_one_transect_of_qrev_is_enough(tmp_path: Path) -> None:
     path = tmp_path / "mill_QRev.mat"
     qrev_mat(path, transects=1)
-    assert read_matlab(path, START).said[0].startswith("QRev, 1 transect, 59 ensembles")
+    assert read_matlab(path, START).notes[0].startswith("QRev, 1 transect, 59 ensembles")
 
 
 @pytest.mark.parametrize("beams", [False, True])
 def test_a_profile_is_the_mean_of_each_cell_that_is_strong(tmp_path: Path, beams: bool) -> None:
     path = tmp_path / "p.mat"
     profiler_mat(path, MEANS, beams)
-    taken = read_matlab(path, FileWords(position=(2.0, 0.3, 0.15)))
+    taken = read_matlab(path, FileOptions(position=(2.0, 0.3, 0.15)))
     assert taken.size == 30
-    assert "Vectrino Profiler, 400 samples at 50 Hz, 30 of 31 cells" in taken.said
+    assert "Vectrino Profiler, 400 samples at 50 Hz, 30 of 31 cells" in taken.notes
     assert taken.numbers["z"] == pytest.approx(0.15 - 0.04 - 0.001 * np.arange(30))
     assert taken.numbers["u"] == pytest.approx(MEANS[:30], abs=0.005)
     assert taken.numbers["v"] == pytest.approx(0.0, abs=0.005)
     assert taken.numbers["u_std"] == pytest.approx(0.02, rel=0.2)
     assert taken.numbers["duration_s"] == pytest.approx(np.where(np.arange(30) == 3, 359, 360) / 50)
     with pytest.raises(InputError, match="expected where the probe stood"):
-        read_matlab(path, FileWords())
+        read_matlab(path, FileOptions())
 
 
 def test_cells_at_the_bed_are_left_out(tmp_path: Path) -> None:
     path = tmp_path / "p.mat"
     profiler_mat(path, MEANS, bed=0.0602)
-    taken = read_matlab(path, FileWords(position=(2.0, 0.3, 0.0602)))
+    taken = read_matlab(path, FileOptions(position=(2.0, 0.3, 0.0602)))
     assert taken.numbers["z"].min() == pytest.approx(0.0012)
 
 
@@ -92,7 +91,7 @@ def test_profiles_one_above_the_other_become_a_vertical(tmp_path: Path) -> None:
     assert table["value"].iloc[1] == pytest.approx(0.0, abs=0.005)
 
 
-def refusal(path: Path, words: FileWords = START) -> str:
+def refusal(path: Path, words: FileOptions = START) -> str:
     with pytest.raises(InputError) as caught:
         reader_of(path)(path, words)
     assert len(str(caught.value).splitlines()) == 1
@@ -109,7 +108,7 @@ def test_another_mat_file_is_refused_in_one_sentence(tmp_path: Path) -> None:
     qrev_mat(path, validData=np.ones(3))
     assert "expected the transects of a measurement saved by QRev" in refusal(path)
     profiler_mat(path, MEANS, sampleRate="fast")
-    assert "expected the structures of a Vectrino Profiler" in refusal(path, FileWords(position=(0.0, 0.0, 0.1)))
+    assert "expected the structures of a Vectrino Profiler" in refusal(path, FileOptions(position=(0.0, 0.0, 0.1)))
     savemat(path, {"meas_struct": {"a": 1.0}})
     assert "expected the transects of a measurement saved by QRev" in refusal(path)
     savemat(path, {name: {"a": 1.0} for name in ("Setup", "Summary", "System", "WaterTrack")})

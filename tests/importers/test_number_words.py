@@ -2,7 +2,7 @@
 
 import pytest
 
-from vegglue.importers.number_words import has_decimal_comma, is_number, number_in
+from vegglue.importers.table_parser import has_decimal_comma, is_number, number_in
 
 
 @pytest.mark.parametrize(

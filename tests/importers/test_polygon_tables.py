@@ -8,7 +8,7 @@ from field_folders import CHANNEL, JUNE, folder_of
 
 import vegglue
 from vegglue.errors import InputError
-from vegglue.importers.polygon_files import planted_in_words, planted_polygons
+from vegglue.importers.vector_files import planted_polygons, summary_of_plants
 from vegglue.workflow.import_folder import assumptions_of
 
 SQUARE = [[10, 0], [14, 0], [14, 1], [10, 1], [10, 0]]
@@ -62,7 +62,7 @@ def test_a_density_is_told_by_its_heading_and_its_unit(tmp_path: Path, heading: 
     """Densities under another heading, or per square foot, were left out without a word: all patches were alike."""
     (found,) = planted_polygons(drawn(tmp_path / "a.geojson", **{heading: 2}), None)
     assert found.density == (density if density is None else pytest.approx(density))
-    said = planted_in_words([found])
+    said = summary_of_plants([found])
     if density is None:
         assert said == "1 patch: no stems, and so equally dense; not read: a_per_m"
     else:
@@ -83,20 +83,20 @@ def test_units_that_a_table_of_patches_does_not_give_are_told(tmp_path: Path, he
     rows = "".join(f"reed,{x},{y},20\n" for x, y in SQUARE[:-1])
     (tmp_path / "patch.csv").write_text(f"{heading}\n{rows}", encoding="utf-8")
     found = planted_polygons(tmp_path / "patch.csv", None)
-    assert planted_in_words(found) == f"1 patch: stems from {heading.split(',')[-1]}{taken}"
+    assert summary_of_plants(found) == f"1 patch: stems from {heading.split(',')[-1]}{taken}"
 
 
 @pytest.mark.parametrize(("heading", "density"), [("stengels_m2", 2.0), ("Halme pro m²", 2.0), ("tiges_par_m2", 2.0)])
 def test_stems_of_other_languages_are_read(tmp_path: Path, heading: str, density: float) -> None:
     (found,) = planted_polygons(drawn(tmp_path / "a.geojson", **{heading: 2}), None)
     assert found.density == density
-    assert planted_in_words([found]) == f"1 patch: stems from {heading}"
+    assert summary_of_plants([found]) == f"1 patch: stems from {heading}"
 
 
 def test_what_may_be_a_density_is_told_with_what_to_write(tmp_path: Path) -> None:
     """Patches were equally dense, and the attribute that says otherwise was one of those not read."""
     path = drawn(tmp_path / "a.geojson", bedekkingsdichtheid=2, stem_diameter=4, name="riet")
-    said = planted_in_words(planted_polygons(path, None))
+    said = summary_of_plants(planted_polygons(path, None))
     assert "bedekkingsdichtheid may be their density: where it is, write `patches: {file: ..., columns: {stems:" in said
     assert "stem_diameter may" not in said
     (found,) = planted_polygons(path, None, {"stems": "bedekkingsdichtheid"})

@@ -6,9 +6,9 @@ import pytest
 
 import vegglue
 from vegglue.errors import InputError
-from vegglue.importers.file_words import FileWords
+from vegglue.importers.file_options import FileOptions
 from vegglue.importers.instruments import reader_of
-from vegglue.importers.qrev_summary import read_qrev_summary
+from vegglue.importers.qrev import read_qrev_summary
 from vegglue.measurements.observations import read_observations
 
 # The elements that are read, as QRev writes them, among others; no measurement.
@@ -56,7 +56,7 @@ def test_another_summary_is_refused_in_one_sentence(tmp_path: Path, change: tupl
     path = tmp_path / "mill_QRev.xml"
     path.write_text(SUMMARY.replace(*change), encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        reader_of(path)(path, FileWords(start=(0.0, 0.0)))
+        reader_of(path)(path, FileOptions(start=(0.0, 0.0)))
     assert said in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
 
@@ -64,4 +64,4 @@ def test_another_summary_is_refused_in_one_sentence(tmp_path: Path, change: tupl
 def test_a_section_without_a_place_is_refused(tmp_path: Path) -> None:
     (tmp_path / "mill_QRev.xml").write_text(SUMMARY, encoding="utf-8")
     with pytest.raises(InputError, match="expected where the boat started"):
-        read_qrev_summary(tmp_path / "mill_QRev.xml", FileWords())
+        read_qrev_summary(tmp_path / "mill_QRev.xml", FileOptions())

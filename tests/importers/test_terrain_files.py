@@ -14,10 +14,10 @@ from vegglue.case.grid import Grid
 from vegglue.case.gridded_site import build_site
 from vegglue.case.polygons import area_of, in_polygon
 from vegglue.errors import InputError
-from vegglue.importers.file_words import FileWords
-from vegglue.importers.placement import Placement
-from vegglue.importers.polygon_files import planted_polygons, read_polygons
-from vegglue.importers.terrain_files import read_geotiff, read_terrain
+from vegglue.importers.file_options import FileOptions
+from vegglue.importers.measured_rows import Placement
+from vegglue.importers.terrain import read_geotiff, read_terrain
+from vegglue.importers.vector_files import planted_polygons, read_polygons
 
 FRAME = Frame(origin=(5000.0, 2000.0), angle=30.0)
 # Of the tags of a GeoTIFF: size of a pixel, where its first corner lies, keys, and what stands for no level.
@@ -62,13 +62,13 @@ def write_xyz(path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "write", "words"),
     [
-        ("bed.tif", write_geotiff, FileWords()),
-        ("bed.asc", write_ascii, FileWords()),
-        ("bed.xyz", write_xyz, FileWords(columns={"x": "1", "y": "2", "z": "3"})),
-        ("bed.xyz", write_xyz, FileWords()),
+        ("bed.tif", write_geotiff, FileOptions()),
+        ("bed.asc", write_ascii, FileOptions()),
+        ("bed.xyz", write_xyz, FileOptions(columns={"x": "1", "y": "2", "z": "3"})),
+        ("bed.xyz", write_xyz, FileOptions()),
     ],
 )
-def test_a_bed_on_the_map_is_read_along_the_channel(tmp_path: Path, name: str, write, words: FileWords) -> None:
+def test_a_bed_on_the_map_is_read_along_the_channel(tmp_path: Path, name: str, write, words: FileOptions) -> None:
     write(tmp_path / name)
     terrain = read_terrain(tmp_path / name, Placement(FRAME), words, sections=False)
     x, y = np.array([1.0, 20.0, 39.0]), np.array([-4.0, 0.3, 4.0])
@@ -127,7 +127,7 @@ def test_cross_sections_carry_the_thalweg_along_the_channel(tmp_path: Path) -> N
     for x, lowest in ((0.0, 2.0), (20.0, -2.0)):
         rows += [f"{x},{y},{z}" for y, z in ((-5, 1.0 - x / 100), (lowest, -x / 100), (5, 1.0 - x / 100))]
     (tmp_path / "sections.csv").write_text("\n".join(rows), encoding="utf-8")
-    terrain = read_terrain(tmp_path / "sections.csv", Placement(), FileWords(), sections=True)
+    terrain = read_terrain(tmp_path / "sections.csv", Placement(), FileOptions(), sections=True)
     assert terrain.level(np.array([0.0, 20.0]), np.array([2.0, -2.0])) == pytest.approx([0.0, -0.2])
     assert terrain.level(np.array([10.0, 10.0]), np.array([-5.0, 5.0])) == pytest.approx([0.9, 0.9])
     left, middle, right = terrain.level(np.full(3, 10.0), np.array([-2.0, 0.0, 2.0]))
@@ -145,10 +145,10 @@ def test_sections_of_a_flume_stay_apart(tmp_path: Path, names: bool, spread: flo
             at = f"{0.5 * number + spread * part:.3f},{0.4 * part},{z - 0.02 * number:.3f}"
             rows.append(f"S{number},{at}" if names else at)
     (tmp_path / "sections.csv").write_text("\n".join(rows), encoding="utf-8")
-    terrain = read_terrain(tmp_path / "sections.csv", Placement(), FileWords(), sections=True)
+    terrain = read_terrain(tmp_path / "sections.csv", Placement(), FileOptions(), sections=True)
     x = np.linspace(0.0, 2.0, 9)
     assert np.allclose(terrain.level(x, np.zeros(9)), 0.1 - 0.04 * x)
-    assert "in 5 cross-sections" in terrain.said
+    assert "in 5 cross-sections" in terrain.taken
 
 
 @pytest.mark.parametrize(
@@ -285,7 +285,7 @@ def test_depths_are_no_levels_of_a_bed(tmp_path: Path) -> None:
     rows = [f"{x},{y},{depth}" for x in (0, 20, 40) for y, depth in ((-3, -0.2), (-1, 0.9), (1, 0.9), (3, -0.2))]
     (tmp_path / "bed.csv").write_text("\n".join(["x,y,depth", *rows]), encoding="utf-8")
     with pytest.raises(InputError, match="take depths off the level of the water above them, and call that z"):
-        read_terrain(tmp_path / "bed.csv", Placement(), FileWords(), sections=False)
+        read_terrain(tmp_path / "bed.csv", Placement(), FileOptions(), sections=False)
     site = "bed: {file: bed.csv, columns: {z: depth}}\n" + JUNE
     folder = folder_of(tmp_path / "brook", site, a__csv="x,y,u\n8,2,0.4\n")
     (tmp_path / "bed.csv").rename(folder / "bed.csv")
@@ -298,7 +298,7 @@ def test_what_a_bed_has_no_use_for_is_told_as_not_read(tmp_path: Path) -> None:
     """Depths alone were; velocities beside the levels of a bed were told as taken."""
     rows = [f"{x},{y},{0.1 * y * y},0.9,0.4" for x in (0, 20, 40) for y in (-3, -1, 1, 3)]
     (tmp_path / "bed.csv").write_text("\n".join(["x,y,z,depth,u", *rows]), encoding="utf-8")
-    said = read_terrain(tmp_path / "bed.csv", Placement(), FileWords(), sections=False).said
+    said = read_terrain(tmp_path / "bed.csv", Placement(), FileOptions(), sections=False).taken
     assert "x from x [m], y from y [m], z from z [m];" in said
     assert said.endswith("not read: depth and u")
 
@@ -318,7 +318,7 @@ def test_sections_as_others_keep_them_are_refused_with_what_to_do(tmp_path: Path
     """Only the columns that were known were named, and a geometry of HEC-RAS was a row with too many fields."""
     (tmp_path / "bed.g01").write_text(table, encoding="utf-8")
     with pytest.raises(InputError, match=advice):
-        read_terrain(tmp_path / "bed.g01", Placement(), FileWords(), sections=True)
+        read_terrain(tmp_path / "bed.g01", Placement(), FileOptions(), sections=True)
 
 
 def test_a_bed_of_more_levels_than_a_case_reads_is_refused(tmp_path: Path) -> None:

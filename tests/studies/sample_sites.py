@@ -18,7 +18,7 @@ from scipy.interpolate import RegularGridInterpolator
 from vegglue.case.centreline import centreline_of, heading_at
 from vegglue.case.schema import Case
 from vegglue.flow.sensor import FlowFields
-from vegglue.importers.placement import Placement
+from vegglue.importers.measured_rows import Placement
 from vegglue.inference.solve_ensemble import solve_flow
 
 ROOT = Path(__file__).parents[2]

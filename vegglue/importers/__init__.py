@@ -1,11 +1,11 @@
 """Folders of measurements as cases.
 
-A further layout is a file that makes the keys and values of a config, and a line in `workflow/import_folder.py`. A
-further instrument is a file with a reader (path, what the site file says of it) -> `MeasuredRows`, and its place in
-`instruments.py`, or in `matlab_exports.py`; transects of a boat become stations in `transects.py`, verticals along a
-tape in `tape_tables.py`, records of a probe their means in `point_records.py`. A new
-ending stands among those of `instruments.py`, or of text in `measured_files.py`.
+Every table, text or workbook, is read by `table_parser.py`; names and units of its columns stand in `column_names.py`,
+and which column holds what is decided in `column_roles.py`. A further instrument is a file with a reader (path,
+options) -> `MeasuredRows`, and its place in `instruments.py`; transects of a boat become stations in `transects.py`. A
+further layout of folders is a file that makes the keys and values of a config, and a line in
+`workflow/import_folder.py`.
 
 May import: case, measurements, wording.
-Open first: field_folder.py, measured_files.py, instruments.py, column_names.py.
+Open first: field_folder.py, measured_files.py, instruments.py, table_parser.py, column_names.py.
 """

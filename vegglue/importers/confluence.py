@@ -1,9 +1,11 @@
 """The open-channel confluence set of R.B. Canelas (GitHub, Confluence-velocity-dataset-2021, GPL-3.0) -> a case.
 
-The set is not part of this project: a user downloads it. Its folder holds bed.csv (x_m, y_m, z_bed_m), water_level.csv
+The set is not part of this project: a user downloads it. Its tables are bed.csv (x_m, y_m, z_bed_m), water_level.csv
 (x_m, y_m, z_ws_m) and depth_averaged.csv (verticals: x_m, y_m, h_m, U_depthavg_ms, V_depthavg_ms, bed_extrapolated).
-x runs downstream from the upstream corner of the junction; the side inflow comes through the wall at y = 0. What the
-calibration needs of it is written into a folder beside the config.
+As its author ships it, data_3d_velocity_topography_surface_maps/ holds a MATLAB file for each section (X, Y, Z, U, V:
+points by height and vertical) and topo_water_level_maps.mat (Xtopo, Ytopo, Ztopo, Xwl, Ywl, Zwl). x runs downstream
+from the upstream corner of the junction; the side inflow comes through the wall at y = 0. What the calibration needs of
+it is written into a folder beside the config.
 """
 
 import csv
@@ -11,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
@@ -27,6 +30,7 @@ from vegglue.importers.config_parts import (
     validated,
     wall_prior,
 )
+from vegglue.importers.library_files import load_matlab
 from vegglue.measurements.csv_table import read_table
 
 EXPERIMENT = "measured"
@@ -45,8 +49,13 @@ WALL = 0.011
 BLOCKS, LEVEL_ERROR = 3, 0.001
 # Spread of the priors of what integration of the sections gives [-], and of the level at the outlet [m].
 UPSTREAM, SIDE, OUTLET = 0.05, 0.5, 0.002
-
-# What `import` says of the set.
+MAPS_OF_THE_SET, OF_THE_SET = "topo_water_level_maps.mat", "a file of the set"
+# Folders within folders that are looked through: its archive unpacks to two. Not all: it may be a whole disk.
+DEEPEST = 2
+# Of the map of the bed every fourth value along x [-]: it is stored each centimetre, and was measured each 5 cm.
+THINNED = 4
+ANOTHER_PLACE = "give another place by --to"
+# What `import` prints of the set.
 NOT_STATED = (
     "The set states no discharges, no errors, no walls and no width of the side channel, and so is assumed: discharges "
     f"by integration of sections, {100 * RULE:.0f} % and {BESIDES:g} m/s for velocities, {1000 * LEVEL_ERROR:.0f} mm "
@@ -56,31 +65,62 @@ NOT_STATED = (
 
 
 def holds_confluence(folder: Path) -> bool:
-    """Whether a folder is laid out as the confluence set."""
+    """Whether a folder holds the tables of the confluence set."""
     return (folder / "depth_averaged.csv").is_file()
+
+
+def mat_folder(folder: Path) -> Path | None:
+    """The folder of the MATLAB files, the one given or one inside it; None if there is none."""
+    for depth in range(1 + DEEPEST):
+        found = sorted(folder.glob("*/" * depth + MAPS_OF_THE_SET)) if folder.is_dir() else []
+        if found:
+            return found[0].parent
+    return None
 
 
 def case_from_confluence(folder: Path, target: Path) -> Tree:
     """The config, as keys and values, of the set in a folder; every second section is held out as validation.
 
-    Files are written into a folder beside `target`. Errors: InputError for what cannot be read.
+    Files are written into a folder beside `target`. InputError for what cannot be read.
     """
+    verticals = folder / "depth_averaged.csv"
     bed = _columns(folder / "bed.csv", "x_m", "y_m", "z_bed_m")
     level = _columns(folder / "water_level.csv", "x_m", "y_m", "z_ws_m")
-    vertical = _columns(folder / "depth_averaged.csv", "x_m", "y_m", "h_m", "U_depthavg_ms", "bed_extrapolated")
+    vertical = _columns(verticals, "x_m", "y_m", "h_m", "U_depthavg_ms", "bed_extrapolated")
     width = float(bed[:, 1].max())
     grid = _grid(bed, vertical, width)
-    across = _across(folder / "depth_averaged.csv")
-    angle = _angle(vertical, across)
+    across = []
+    with verticals.open(encoding="utf-8-sig", newline="") as file:
+        for row, fields in enumerate(csv.DictReader(file), 2):
+            text = fields.get("V_depthavg_ms") or "nan"
+            try:
+                across.append(float(text))
+            except ValueError:
+                raise InputError(
+                    f"{shown_path(verticals)}, row {row}: expected a number or nothing in column V_depthavg_ms, got "
+                    f"{text!r}; correct it."
+                ) from None
     vertical = np.column_stack([vertical, across])
+    # The water heads from the mouth of the tributary, y <= 0, so many degrees from downstream; 90 if none was measured.
+    mouth = vertical[(vertical[:, 1] <= 0.0) & ~np.isnan(vertical[:, 5])]
+    ahead, aside = mouth[:, 3].sum(), mouth[:, 5].sum()
+    angle = round(float(np.degrees(np.arctan2(aside, ahead))), 1) if aside > 0.0 else 90.0
     # Where the bed is not known there is no depth to average over; and the tributary itself is not modelled.
     vertical = vertical[(vertical[:, 4] == 0) & (vertical[:, 1] > 0.0) & (vertical[:, 1] < width)]
     sections = np.unique(vertical[:, 0])
     blocks = _blocks(level, grid, width)
     into = target.with_name(f"{target.stem}-data")
-    _write(into / "bed.csv", "x,y,z", _to_the_walls(bed, width))
+    carried = []  # to the walls: the outermost level of each cross-section
+    for x in np.unique(bed[:, 0]):
+        here = bed[bed[:, 0] == x]
+        for edge, row in ((0.0, here[here[:, 1].argmin()]), (width, here[here[:, 1].argmax()])):
+            if row[1] != edge:
+                carried.append([x, edge, row[2]])
+    _write(into / "bed.csv", "x,y,z", np.vstack([bed, np.array(carried).reshape(-1, 3)]))
     _write(into / "levels.csv", "x,y,level,level_se", blocks)
     seen, unseen = (vertical[np.isin(vertical[:, 0], part)] for part in (sections[::2], sections[1::2]))
+    setting = {"discharge": {"upstream": "discharge", "side": "side_discharge"}, "level": "outlet_level"}
+    levels = observed("level", f"{into.name}/levels.csv", EXPERIMENT)
     return {
         "name": case_name(target.stem),
         "title": "Open-channel confluence, measured by others",
@@ -93,10 +133,10 @@ def case_from_confluence(folder: Path, target: Path) -> Tree:
         },
         "outlet": {},
         "eddy_viscosity": "eddy_viscosity",
-        "experiments": {EXPERIMENT: _setting()},
+        "experiments": {EXPERIMENT: setting},
         "parameters": _priors(seen, blocks, width),
-        "observations": [*_velocities(into, "velocities", seen), _observation("level", into, "levels")],
-        **validated({EXPERIMENT: _setting()}, _velocities(into, "held_out", unseen)),
+        "observations": [*_velocities(into, "velocities", seen), levels],
+        **validated({EXPERIMENT: {**setting}}, _velocities(into, "held_out", unseen)),
         "numerics": {"film_depth": 0.002},
         **FIRST_LOOK,
     }
@@ -138,41 +178,17 @@ def _priors(vertical: Array, blocks: Array, width: float) -> Tree:
     level = float(blocks[blocks[:, 0] > blocks[:, 0].max() - 0.5 * width, 2].mean())
     return {
         "discharge": normal_prior(
-            _rounded(before), _rounded(UPSTREAM * before), "m3/s", "Q", "discharge from upstream"
+            round(before, 5), round(UPSTREAM * before, 5), "m3/s", "Q", "discharge from upstream"
         ),
         "side_discharge": normal_prior(
-            _rounded(side), _rounded(SIDE * side), "m3/s", "Q_s", "discharge from the side, which is not stated",
-            low=_rounded(0.02 * side), high=_rounded(3.0 * side),
+            round(side, 5), round(SIDE * side, 5), "m3/s", "Q_s", "discharge from the side, which is not stated",
+            low=round(0.02 * side, 5), high=round(3.0 * side, 5),
         ),
-        "outlet_level": normal_prior(_rounded(level), OUTLET, "m", "z_out", "water level at the outlet"),
+        "outlet_level": normal_prior(round(level, 5), OUTLET, "m", "z_out", "water level at the outlet"),
         "n_b": bed_prior(0.005, 0.05),
         "n_w": wall_prior(WALL),
         "eddy_viscosity": loguniform_prior(3e-5, 1e-2, "m2/s", "ν", "eddy viscosity"),
     }  # fmt: skip
-
-
-def _across(path: Path) -> Array:
-    """V (vertical,) [m/s], NaN where none was measured. Errors: InputError, naming the row, for what is no number."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        texts = [row.get("V_depthavg_ms") or "nan" for row in csv.DictReader(file)]
-    return np.array([_number(path, row, text) for row, text in enumerate(texts, 2)])
-
-
-def _number(path: Path, row: int, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        complaint = f"expected a number or nothing in column V_depthavg_ms, got {text!r}; correct it"
-        raise InputError(f"{shown_path(path)}, row {row}: {complaint}.") from None
-
-
-def _angle(vertical: Array, v: Array) -> float:
-    """Where the water heads in the mouth of the tributary, y <= 0, from downstream [degrees]; 90 where none was
-    measured.
-    """
-    inside = (vertical[:, 1] <= 0.0) & ~np.isnan(v)
-    along, across = vertical[inside, 3].sum(), v[inside].sum()
-    return round(float(np.degrees(np.arctan2(across, along))), 1) if across > 0.0 else 90.0
 
 
 def _grid(bed: Array, vertical: Array, width: float) -> Tree:
@@ -184,23 +200,11 @@ def _grid(bed: Array, vertical: Array, width: float) -> Tree:
     coarse = 4.0 * CELL
     low = max(np.floor((vertical[:, 0].min() - 0.5 * width) / coarse), np.ceil(bed[:, 0].min() / coarse - 1e-9))
     high = min(np.ceil(vertical[:, 0].max() / coarse) + 1, np.floor(bed[:, 0].max() / coarse + 1e-9))
-    rows = even(width / CELL)
     return {
         "x": [round(float(low) * coarse, 6), round(float(high) * coarse, 6)],
         "y": [0.0, width],
-        "cell": [CELL, _rounded(width / rows, 9)],
+        "cell": [CELL, round(width / even(width / CELL), 9)],
     }
-
-
-def _to_the_walls(bed: Array, width: float) -> Array:
-    """The map, with the outermost level of each cross-section carried on to the walls."""
-    added = []
-    for x in np.unique(bed[:, 0]):
-        here = bed[bed[:, 0] == x]
-        for edge, row in ((0.0, here[here[:, 1].argmin()]), (width, here[here[:, 1].argmax()])):
-            if row[1] != edge:
-                added.append([x, edge, row[2]])
-    return np.vstack([bed, np.array(added).reshape(-1, 3)])
 
 
 def _blocks(level: Array, grid: Tree, width: float) -> Array:
@@ -218,45 +222,95 @@ def _blocks(level: Array, grid: Tree, width: float) -> Array:
     return np.array(found)
 
 
-def _stations(vertical: Array) -> list[list[float | str]]:
-    """Rows section, x, y, u and its error; a small turn of the probe changes u by its square only."""
-    return [[f"x{x:+.2f}", x, y, u, float(np.hypot(RULE * u, BESIDES))] for x, y, _, u, _, _ in vertical.tolist()]
-
-
-def _stations_across(vertical: Array) -> list[list[float | str]]:
-    """Rows section, x, y, v and its error, which has a share of u; not all verticals have v."""
-    return [
-        [f"x{x:+.2f}", x, y, v, float(np.linalg.norm([RULE * v, BESIDES, TURN * u]))]
-        for x, y, _, u, _, v in vertical[~np.isnan(vertical[:, 5])].tolist()
-    ]
-
-
-def _setting() -> Tree:
-    return {"discharge": {"upstream": "discharge", "side": "side_discharge"}, "level": "outlet_level"}
-
-
 def _velocities(into: Path, name: str, vertical: Array) -> list[Tree]:
-    """Velocities along, and across if there are any, written and named."""
-    _write(into / f"{name}.csv", "section,x,y,u,u_se", _stations(vertical))
-    found = [_observation("velocity", into, name)]
-    if across := _stations_across(vertical):
+    """Velocities along, and across if there are any, written and named.
+
+    A small turn of the probe changes u by its square only; the error of v has a share of u. Not all verticals have v.
+    """
+    along: list[list[float | str]] = []
+    across: list[list[float | str]] = []
+    for x, y, _, u, _, v in vertical.tolist():
+        along.append([f"x{x:+.2f}", x, y, u, float(np.hypot(RULE * u, BESIDES))])
+        if not np.isnan(v):
+            across.append([f"x{x:+.2f}", x, y, v, float(np.linalg.norm([RULE * v, BESIDES, TURN * u]))])
+    _write(into / f"{name}.csv", "section,x,y,u,u_se", along)
+    found = [observed("velocity", f"{into.name}/{name}.csv", EXPERIMENT)]
+    if across:
         _write(into / f"{name}_across.csv", "section,x,y,v,v_se", across)
-        found.append(_observation("velocity_across", into, f"{name}_across"))
+        found.append(observed("velocity_across", f"{into.name}/{name}_across.csv", EXPERIMENT))
     return found
-
-
-def _observation(kind: str, into: Path, name: str) -> Tree:
-    return observed(kind, f"{into.name}/{name}.csv", EXPERIMENT)
 
 
 def _columns(path: Path, *names: str) -> Array:
     return np.asarray(read_table(path, (), names).to_numpy(), dtype=np.float64)
 
 
-def _rounded(value: float, digits: int = 5) -> float:
-    return round(value, digits)
-
-
 def _write(path: Path, heading: str, rows: Sequence[Sequence[float | str]] | Array) -> None:
     lines = [",".join(cell if isinstance(cell, str) else f"{cell:.5f}" for cell in row) for row in rows]
-    write_text(path, "\n".join([heading, *lines]) + "\n", "give another place by --to")
+    write_text(path, "\n".join([heading, *lines]) + "\n", ANOTHER_PLACE)
+
+
+def tables_of_mat(source: Path, into: Path) -> Path:
+    """Write bed.csv, water_level.csv and depth_averaged.csv of the MATLAB files; returns their folder.
+
+    InputError for a file that is none of the set; StorageError.
+    """
+    maps = load_matlab(source / MAPS_OF_THE_SET, OF_THE_SET, ("Xtopo", "Ytopo", "Ztopo", "Xwl", "Ywl", "Zwl"))
+    bed, level = (_points([maps[f"{axis}{name}"] for axis in "XYZ"]) for name in ("topo", "wl"))
+    files = sorted(source.glob("section_uvw_x*.mat"))
+    sections = [load_matlab(path, OF_THE_SET, ("X", "Y", "Z", "U", "V")) for path in files]
+    if not sections:
+        raise InputError(f"{shown_path(source)}: expected files section_uvw_x*.mat, got none; add them.")
+    verticals = np.vstack([_verticals(section, bed, level) for section in sections])
+    verticals = verticals[np.lexsort((verticals[:, 1], verticals[:, 0]))]
+    thinned = {name: _points([maps[f"{axis}{name}"][::2, ::THINNED] for axis in "XYZ"]) for name in ("topo", "wl")}
+    heading = "x_m,y_m,h_m,U_depthavg_ms,V_depthavg_ms,bed_extrapolated"
+    for name, columns, rows in (
+        ("bed.csv", "x_m,y_m,z_bed_m", thinned["topo"]),
+        ("water_level.csv", "x_m,y_m,z_ws_m", thinned["wl"]),
+        ("depth_averaged.csv", heading, verticals),
+    ):
+        lines = [",".join("" if np.isnan(value) else f"{value:.6g}" for value in row) for row in rows]
+        write_text(into / name, "\n".join([columns, *lines]) + "\n", ANOTHER_PLACE)
+    return into
+
+
+def _points(axes: Sequence[Array]) -> Array:
+    known = ~np.isnan(axes[2])
+    return np.column_stack([axis[known] for axis in axes])
+
+
+def _verticals(section: dict[str, Array], bed: Array, level: Array) -> Array:
+    """Rows x, y, h, U, V and whether the bed lies beyond its map, of each vertical with points (verticals, 6).
+
+    U = (1/h) int_0^h u dz by trapezoids, zero at the bed, constant above the highest point.
+    """
+
+    def read_at(points: Array) -> tuple[Array, Array]:
+        """Levels of a map at the verticals, and whether they lie beyond it, where the nearest level holds."""
+        x, y = section["X"][0], section["Y"][0]
+        near = points[(points[:, 0] > x.min() - 0.2) & (points[:, 0] < x.max() + 0.2)]
+        inside = np.asarray(LinearNDInterpolator(near[:, :2], near[:, 2])(x, y))
+        nearest = np.asarray(NearestNDInterpolator(near[:, :2], near[:, 2])(x, y))
+        return np.where(np.isnan(inside), nearest, inside), np.isnan(inside)
+
+    def depth_average(height: Array, values: Array, depth: float) -> float:
+        order = np.argsort(height)[~np.isnan(values[np.argsort(height)])]
+        if not order.size:
+            return np.nan
+        below, known = height[order], values[order]
+        levels = np.concatenate([[0.0], below, [max(depth, below[-1])]])
+        return float(np.trapezoid(np.concatenate([[0.0], known, known[-1:]]), levels) / levels[-1])
+
+    surface, _ = read_at(level)
+    floor, beyond = read_at(bed)
+    rows = []
+    for column in range(section["X"].shape[1]):
+        z, u, v = (section[name][:, column] for name in ("Z", "U", "V"))
+        there = ~np.isnan(u) & (z > floor[column])
+        depth = surface[column] - floor[column]
+        if there.sum() < 2 or depth <= 0.0:
+            continue
+        means = [depth_average(z[there] - floor[column], values[there], depth) for values in (u, v)]
+        rows.append([section["X"][0, column], section["Y"][0, column], depth, *means, float(beyond[column])])
+    return np.array(rows).reshape(-1, 6)

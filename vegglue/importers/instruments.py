@@ -1,28 +1,54 @@
-"""Which reader a file of measurements needs: that of an instrument's export, or that of plain columns."""
+"""The one entry to files of measurements: which reader a file needs, that of an instrument or that of plain columns.
+
+A further instrument is a file with a reader (path, its options) -> `MeasuredRows`, and its place here.
+"""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.file_words import FileWords
-from vegglue.importers.flowtracker2 import ZIP_BEGINS, read_flowtracker2
-from vegglue.importers.loose_table import readable_text
-from vegglue.importers.matlab_exports import MAT_73_BEGINS, MAT_BEGINS, read_matlab
-from vegglue.importers.measured_rows import MeasuredRows
-from vegglue.importers.nortek import VECTOR_BEGINS, is_nortek, read_nortek, read_vector
-from vegglue.importers.pd0_transects import PD0_BEGINS, read_pd0
-from vegglue.importers.placed_tables import read_placed_rows
-from vegglue.importers.qrev_summary import is_qrev_summary, read_qrev_summary
-from vegglue.importers.tape_tables import is_tape_table, read_tape_table
-from vegglue.importers.winriver import is_winriver, read_winriver
+from vegglue.importers.file_options import FileOptions
+from vegglue.importers.gaugings import ZIP_BEGINS, is_gauging, read_flowtracker2, read_gauging
+from vegglue.importers.library_files import load_matlab, readable_text
+from vegglue.importers.measured_rows import MeasuredRows, read_placed_rows
+from vegglue.importers.nortek import (
+    PROFILER_VARIABLES,
+    VECTOR_BEGINS,
+    is_nortek,
+    read_nortek,
+    read_vector,
+    rows_of_profiler,
+)
+from vegglue.importers.qrev import QREV_VARIABLE, is_qrev_summary, read_qrev_summary, stations_of_qrev
+from vegglue.importers.riversurveyor import RIVERSURVEYOR_VARIABLES, stations_of_riversurveyor
+from vegglue.importers.table_parser import WORKBOOKS
+from vegglue.importers.teledyne import PD0_BEGINS, is_winriver, read_pd0, read_winriver
 
-# What reads a file of measurements: its path, and what the site file says of it -> its rows in SI, by role. Errors:
-# InputError, which begins with the file.
-FileReader = Callable[[Path, FileWords], MeasuredRows]
+# From the path of a file of measurements and its options to its rows in SI, by role; InputError begins with the file.
+FileReader = Callable[[Path, FileOptions], MeasuredRows]
 # Endings of files that instruments write for programs, beside those of tables.
 BINARY_ENDINGS = (".pd0", ".000", ".ft", ".vec", ".vno", ".ntk", ".ad2cp")
 # How binary records of Nortek begin that no kept reader has: those of the Vectrino, and those of the Signature.
 NORTEK_BEGINS = (b"\xa5\x05", b"\xa5\x0a")
+# How a MATLAB file begins: version 5, which all instruments write, and 7.3, which is HDF5.
+MAT_BEGINS, MAT_73_BEGINS = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
+
+
+def read_matlab(path: Path, options: FileOptions) -> MeasuredRows:
+    """What a MATLAB file of an instrument holds, known by its variables. InputError."""
+    parts = {name.strip("\0 "): part for name, part in load_matlab(path).items()}  # MIDAS fills its names up
+    if QREV_VARIABLE in parts:
+        return stations_of_qrev(path, parts, options)
+    if set(PROFILER_VARIABLES) <= parts.keys():
+        return rows_of_profiler(path, parts, options)
+    if set(RIVERSURVEYOR_VARIABLES) <= parts.keys():
+        return stations_of_riversurveyor(path, parts, options)
+    raise InputError(
+        f"{shown_path(path)}: expected a MATLAB file of RiverSurveyor Live, QRev or MIDAS (Vectrino Profiler), got "
+        f"one with {', '.join(name for name in parts if not name.startswith('__')) or 'nothing in it'}; export a table."
+    )
+
+
 # Readers of files that are no text, by how these begin.
 BY_BEGINNING: Mapping[bytes, FileReader] = {
     PD0_BEGINS: read_pd0,
@@ -31,41 +57,32 @@ BY_BEGINNING: Mapping[bytes, FileReader] = {
     MAT_BEGINS: read_matlab,
     MAT_73_BEGINS: read_matlab,
 }
-LONGEST_MARK = max(map(len, BY_BEGINNING))
 
 
 def reader_of(path: Path) -> FileReader:
-    """The reader that knows the file, told by how it begins. Errors: InputError for a record that none knows."""
-    if path.suffix.lower() in (".xlsx", ".xlsm"):
+    """The reader of a file, by how it begins. InputError for a record that none reads."""
+    if path.suffix.lower() in WORKBOOKS:
         return read_placed_rows
-    begin = _beginning(path)
+    try:
+        with path.open("rb") as file:
+            begin = file.read(max(map(len, BY_BEGINNING)))
+    except OSError as error:
+        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
     known = next((reader for mark, reader in BY_BEGINNING.items() if begin.startswith(mark)), None)
     if known is not None:
         return known
-    if begin.startswith(NORTEK_BEGINS) or path.suffix.lower() in BINARY_ENDINGS:
+    nortek = begin.startswith(NORTEK_BEGINS)
+    if nortek or path.suffix.lower() in BINARY_ENDINGS:
+        got = "a binary record of a Nortek instrument" if nortek else f"a record {path.suffix}"
         raise InputError(
-            f"{shown_path(path)}: expected an export as text, got {_binary_words(path, begin)}, which is not read; "
-            "convert it to ASCII in the maker's program (Nortek: .dat with .hdr, MIDAS: .mat; WinRiver: classic ASCII "
-            "output)."
+            f"{shown_path(path)}: expected an export as text, got {got}, which is not read; convert it to ASCII in the "
+            "maker's program (Nortek: .dat with .hdr, MIDAS: .mat; WinRiver: classic ASCII output)."
         )
     text = readable_text(path)
     if is_winriver(text):
         return read_winriver
     if is_qrev_summary(text):
         return read_qrev_summary
-    if is_tape_table(text):
-        return read_tape_table
+    if is_gauging(text):
+        return read_gauging
     return read_nortek if is_nortek(path, text) else read_placed_rows
-
-
-def _beginning(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            return file.read(LONGEST_MARK)
-    except OSError as error:
-        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
-
-
-def _binary_words(path: Path, begin: bytes) -> str:
-    nortek = begin.startswith(NORTEK_BEGINS)
-    return "a binary record of a Nortek instrument" if nortek else f"a record {path.suffix}"

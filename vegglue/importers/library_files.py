@@ -1,29 +1,61 @@
-"""Files that a library reads: workbooks, GeoTIFFs, shapefiles, MATLAB files. Whatever one of them makes of a damaged
-file, and however many numbers a small file unpacks to, the user reads one sentence.
+"""Files read within limits: text of any encoding, files of libraries, MATLAB files and raw records of instruments.
+
+Whatever a library makes of a damaged file, and however many numbers a small file unpacks to, the user reads one
+sentence.
 """
 
+import io
 import logging
 import struct
 import traceback
 import warnings
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from scipy.io import loadmat
+
+from vegglue.arrays import Array
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.errors import InputError, shown_path
+from vegglue.sandboxed_reader import why_unreadable
 
 COMPRESSED, AT_ONCE_UNPACKED = 15, 1 << 20  # type of an element of a MATLAB file; [bytes]
-LONGEST_COMPLAINT = 200  # letters of what a library says; some quote the file
+LONGEST_COMPLAINT = 200  # letters of a library's complaint; some quote the file
+MATLAB_READER = f"{__name__}:read_all_variables"  # as the process of its own knows it
+MATLAB_5 = "a MATLAB file of version 5"
+
+
+def readable_text(path: Path) -> str:
+    """The text of a file: UTF-8, UTF-16 with its mark, or what Windows in the west writes. InputError."""
+    try:
+        size = path.stat().st_size
+        raw = path.read_bytes() if size <= LARGEST_DATA else b""
+    except OSError as error:
+        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
+    refuse_larger(path, size)
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return raw.decode("utf-16", errors="replace")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", errors="replace")
+
+
+def refuse_larger(path: Path, size: int) -> None:
+    """InputError if what a file holds, packed or unpacked, is more than a file of data may be [bytes]."""
+    if size > LARGEST_DATA:
+        raise InputError(f"{shown_path(path)}: expected at most {LARGEST_DATA:,} bytes, got {size:,}; make it smaller.")
 
 
 @contextmanager
 def read_by_library(path: Path, kind: str, logger: str = "", advice: str = "save it anew") -> Iterator[None]:
-    """Within, a library reads a file: its warnings and its log are not shown, its errors are told as one.
+    """Within, a library reads a file: its warnings and its log are not shown, all its errors are one InputError.
 
-    kind: what the file should be, in words; advice: how its sentence ends. Errors: InputError when it is larger than a
-    file of data may be, or the library fails in whatever way.
+    kind: what the file should be; advice: how the message ends.
     """
     log = logging.getLogger(logger) if logger else None
     before = None if log is None else log.disabled
@@ -33,8 +65,11 @@ def read_by_library(path: Path, kind: str, logger: str = "", advice: str = "save
             log.disabled = True
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with _frames_cleared():
+            try:
                 yield
+            except Exception as error:  # what the library leaves open is closed while its warnings are not shown
+                traceback.clear_frames(error.__traceback__)
+                raise
     except (InputError, MemoryError):
         raise
     except Exception as error:  # on damaged files libraries raise anything
@@ -47,17 +82,41 @@ def read_by_library(path: Path, kind: str, logger: str = "", advice: str = "save
 
 
 @contextmanager
-def _frames_cleared() -> Iterator[None]:
-    """What a library that fails leaves open is closed at once, while nobody hears its warnings."""
+def importing(library: str, path: Path, what: str, extra: str, instead: str) -> Iterator[None]:
+    """Within, a library of an extra is imported. InputError, which names the extra, if it is not installed.
+
+    what: files it reads; instead: what else may be done.
+    """
     try:
         yield
-    except Exception as error:
-        traceback.clear_frames(error.__traceback__)
-        raise
+    except ImportError:
+        raise InputError(
+            f"{shown_path(path)}: {what} are read by {library}, which is not installed; run "
+            f"`pip install 'vegglue[{extra}]'`, or {instead}."
+        ) from None
 
 
-def refuse_larger_matlab(path: Path) -> None:
-    """Errors: InputError when the variables of a MATLAB file of version 5 unpack to more than a file of data may be.
+def load_matlab(path: Path, kind: str = MATLAB_5, names: Sequence[str] | None = None) -> dict[str, Any]:
+    """The variables of a MATLAB file of version 5, structures as objects; with `names` these alone, as arrays.
+
+    A process of its own reads the file to its end first. InputError for a file that is too large or damaged;
+    StorageError if no process can be started.
+    """
+    with read_by_library(path, kind):
+        _refuse_larger_matlab(path)
+        state = path.stat()
+    why = why_unreadable(path.absolute(), state.st_size, state.st_mtime_ns, by=MATLAB_READER)
+    if why is not None:
+        raise InputError(f"{shown_path(path)} cannot be read as {kind}: {why}; save it anew.")
+    with read_by_library(path, kind):
+        if names is None:
+            return dict(loadmat(path, struct_as_record=False, squeeze_me=True))
+        found = loadmat(path, variable_names=names)
+        return {name: np.asarray(found[name], dtype=np.float64) for name in names}
+
+
+def _refuse_larger_matlab(path: Path) -> None:
+    """InputError if the variables of a MATLAB file of version 5 unpack to more than a file of data may be.
 
     Format: MAT-File Format (MathWorks): a header of 128 bytes that ends in the order of bytes, then elements, each with
     its type and its size; those of type 15 are packed by deflate.
@@ -76,7 +135,41 @@ def refuse_larger_matlab(path: Path) -> None:
                 refuse_larger(path, total)
 
 
-def refuse_larger(path: Path, size: int) -> None:
-    """Errors: InputError when what a file holds, packed or unpacked, is more than a file of data may be [bytes]."""
-    if size > LARGEST_DATA:
-        raise InputError(f"{shown_path(path)}: expected at most {LARGEST_DATA:,} bytes, got {size:,}; make it smaller.")
+def read_all_variables(path: str) -> None:
+    """Load a MATLAB file and drop what comes; the next reader meets its errors, which harm nothing."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            loadmat(path, struct_as_record=False, squeeze_me=True)
+        except MemoryError:
+            raise
+        except Exception:  # on damaged files it raises anything
+            return
+
+
+@contextmanager
+def reading_structures(path: Path, kind: str, advice: str) -> Iterator[None]:
+    """Within, structures of a file are read: whatever they lack is one InputError. kind: what was expected."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (AttributeError, IndexError, ValueError, TypeError, KeyError) as error:
+        raise InputError(f"{shown_path(path)}: expected {kind}, got others ({error}); {advice}.") from None
+
+
+def numbers_of_variable(values: Any) -> Array:
+    """A variable as numbers, a single one as an array of one."""
+    return np.atleast_1d(np.asarray(values, dtype=np.float64))
+
+
+def open_raw(path: Path, instead: str, most: int | None = None) -> Any:
+    """The dataset that mhkit, which carries on dolfyn, makes of a raw file.
+
+    instead: what else may be exported; most: samples that the file can hold, where the reader's own guess is too small.
+    InputError without mhkit, and for what it cannot read.
+    """
+    with importing("mhkit", path, "raw files of instruments", "instruments", f"export {instead}"):
+        from mhkit import dolfyn
+    with redirect_stdout(io.StringIO()), read_by_library(path, "a raw file of an instrument", "", f"export {instead}"):
+        return dolfyn.read(str(path), userdata=False, nens=most)

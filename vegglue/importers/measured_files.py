@@ -1,6 +1,6 @@
 """The files of measurements in a folder: named as they are, or brought into the form that a case can name.
 
-What is brought into another form is written into a folder beside the config; the config says what was taken from where.
+What is brought into another form is written into a folder beside the config, which states what was taken from where.
 """
 
 import csv
@@ -17,22 +17,19 @@ from vegglue.case.text_files import unused
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import ROLES
 from vegglue.importers.config_parts import observed
-from vegglue.importers.field_site import FieldSite
-from vegglue.importers.file_words import FileWords, file_words
+from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
-from vegglue.importers.known_experiments import EXPERIMENTS, KnownExperiments
-from vegglue.importers.loose_table import readable_text
-from vegglue.importers.measured_rows import MeasuredRows, in_the_channel, joined_rows, taken_in_words, with_experiments
-from vegglue.importers.placement import Placement
-from vegglue.importers.point_heights import without_unused_depth
-from vegglue.importers.site_file import HELD_OUT, held_out_file, site_file
-from vegglue.importers.stations import StationTable, errors_of_rows, station_tables
+from vegglue.importers.library_files import readable_text
+from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, joined_rows, with_experiments
+from vegglue.importers.site_file import HELD_OUT, FieldSite, held_out_files, site_file
+from vegglue.importers.stations import EXPERIMENTS, KnownExperiments, StationTable, errors_of_rows, station_tables
+from vegglue.importers.table_parser import WORKBOOKS
 from vegglue.measurements.csv_table import read_table
-from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind, kind_of
+from vegglue.measurements.kinds import KINDS, STREAMWISE, kind_of
 
 # Endings of files that may hold measurements; others need an entry in `files`.
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".dis")
-ENDINGS = (*TEXT_ENDINGS, ".xlsx", ".xlsm", *BINARY_ENDINGS)
+ENDINGS = (*TEXT_ENDINGS, *WORKBOOKS, *BINARY_ENDINGS)
 # Files of a folder that are none of its measurements.
 OTHERS = ("answer.json", "readme.txt")
 # How names of files begin that programs leave beside a table: locks of workbooks, and what a Mac keeps of every file.
@@ -57,44 +54,44 @@ class MeasuredFiles:
 def measured_files(folder: Path, target: Path, site: FieldSite, place: Placement, used: Sequence[str]) -> MeasuredFiles:
     """All measurements of a folder. used: files that the site file names elsewhere, such as that of the bed.
 
-    Errors: InputError where there are none, or one cannot be read.
+    InputError if there are none, or one cannot be read.
     """
-    said = _entries(folder, site)
+    options = _options(folder, site)
     known = KnownExperiments(tuple(site.experiments), site_file(folder).name, EXPERIMENTS, tuple(site.holdout))
-    found = _read(_candidates(folder, said, used), said, target, place, known)
+    found = _read(_candidates(folder, options, used), options, target, place, known)
     if not found.observations:
         raise InputError(f"{shown_path(folder)}: {_nothing_measured(found)}")
     return found
 
 
-def _nothing_measured(found: MeasuredFiles) -> str:
-    """The end of a sentence about a folder without measurements: what its tables hold, where there are any."""
-    if found.imported:
-        held = " ".join(f"{one['name']}: {one['taken']}." for one in found.imported)
-        kinds = ", ".join(kind.words for kind in KINDS.values())
-        headings = "; ".join(
-            f"{kind.words} as {', '.join(ROLES[kind.column].names[:HEADINGS_SHOWN])}" for kind in KINDS.values()
-        )
-        return (
-            f"expected columns of {kinds}, got none that is known. {held} Name the column by what it holds, such as "
-            "`columns: {u: ...}` of its file in `files` of the site file, or give it a heading that is understood, "
-            f"among them {headings}."
-        )
-    files = ", ".join(kind.file for kind in KINDS.values())
-    return f"expected one of {files}, or other tables of measurements, got none; put what was measured there."
+def held_out_measurements(folder: Path, target: Path, site: FieldSite, place: Placement) -> MeasuredFiles:
+    """What is held out, read as all measurements are; nothing if no experiment is held out.
 
-
-def held_out_files(folder: Path, target: Path, site: FieldSite, place: Placement) -> MeasuredFiles:
-    """What is held out, read as all measurements are; nothing where no experiment is held out.
-
-    Errors: InputError where the file cannot be read, or nothing in it is a measurement.
+    InputError if the file cannot be read, or nothing in it is a measurement.
     """
-    paths = [path for path in (held_out_file(folder),) if path is not None and site.holdout]
+    paths = held_out_files(folder)[:1] if site.holdout else []
     known = KnownExperiments(tuple(site.holdout), site_file(folder).name, HELD_OUT, tuple(site.experiments))
-    found = _read(paths, _entries(folder, site), target, place, known)
+    found = _read(paths, _options(folder, site), target, place, known)
     if paths and not found.observations:
         raise InputError(f"{shown_path(folder)}: of what is held out, {_nothing_measured(found)}")
     return found
+
+
+def _nothing_measured(found: MeasuredFiles) -> str:
+    """The end of a message about a folder without measurements: what its tables hold, if there are any."""
+    if not found.imported:
+        files = ", ".join(kind.file for kind in KINDS.values())
+        return f"expected one of {files}, or other tables of measurements, got none; put what was measured there."
+    held = " ".join(f"{one['name']}: {one['taken']}." for one in found.imported)
+    kinds = ", ".join(kind.words for kind in KINDS.values())
+    headings = "; ".join(
+        f"{kind.words} as {', '.join(ROLES[kind.column].names[:HEADINGS_SHOWN])}" for kind in KINDS.values()
+    )
+    return (
+        f"expected columns of {kinds}, got none that is known. {held} Name the column by what it holds, such as "
+        "`columns: {u: ...}` of its file in `files` of the site file, or give it a heading that is understood, "
+        f"among them {headings}."
+    )
 
 
 def texts_of_tables(target: Path, tables: Sequence[StationTable]) -> dict[Path, str]:
@@ -107,57 +104,22 @@ def texts_of_tables(target: Path, tables: Sequence[StationTable]) -> dict[Path, 
     return texts
 
 
-def _read(
-    paths: Sequence[Path], said: Mapping[Path, FileWords], target: Path, place: Placement, known: KnownExperiments
-) -> MeasuredFiles:
-    """Tables that a case can name stay where they are; others are brought into that form beside the config."""
-    found: list[Tree] = []
-    imported: list[Tree] = []
-    written: list[StationTable] = []
-    others = []
-    for path in paths:
-        kind = KIND_OF_FILE.get(path.name)
-        if kind is not None and path not in said and not place.turned and _is_plain(path, kind):
-            _check_plain(path, kind, known)
-            found.append(observed(kind.name, named_from(path, target)))
-        else:
-            others.append((path, said.get(path, FileWords())))
-    for group in _groups(others):
-        tables, records = _brought(group, place, known)
-        for table in tables:
-            name = _free_name(table.file, [one.file for one in written])
-            written.append(replace(table, file=name))
-            found += [one | {"file": f"{data_folder(target).name}/{name}"} for one in table.observations]
-        imported += records
-    return MeasuredFiles(found, imported, written)
-
-
-def _free_name(file: str, taken: Sequence[str]) -> str:
-    """Where gauge.csv and gauge.txt are both there, `gauge-level.csv` and `gauge-level-2.csv`; also of Gauge.txt."""
-    return f"{unused(file.removesuffix('.csv'), [name.removesuffix('.csv') for name in taken])}.csv"
-
-
 def data_folder(target: Path) -> Path:
     """Where what a config needs is written: <config>-data beside it."""
     return target.with_name(f"{target.stem}-data")
 
 
-def named_from(file: Path, target: Path) -> str:
-    """The path of a file as a config names it."""
-    return Path(os.path.relpath(file, target.resolve().parent)).as_posix()
-
-
-def record(path: Path, taken: MeasuredRows | None, said: str) -> Tree:
+def record(path: Path, taken: MeasuredRows | None, summary: str) -> Tree:
     """What a config keeps of a file that it was made from."""
-    tree: Tree = {"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "taken": said}
+    tree: Tree = {"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "taken": summary}
     if taken is not None:
         tree |= {"columns": dict(taken.columns), "units": dict(taken.units)}
     return tree
 
 
-def _entries(folder: Path, site: FieldSite) -> dict[Path, FileWords]:
-    """What the site file says about single files, by their paths, which may lead into folders of the folder."""
-    entries = {}
+def _options(folder: Path, site: FieldSite) -> dict[Path, FileOptions]:
+    """What the site file states about single files, by their paths, which may lead into folders of the folder."""
+    found = {}
     for name, given in site.files.items():
         if not (folder / name).is_file():
             raise InputError(f"{shown_path(folder)}: `files` names {name}, which is not there; correct it.")
@@ -165,90 +127,112 @@ def _entries(folder: Path, site: FieldSite) -> dict[Path, FileWords]:
             raise InputError(
                 f"{shown_path(folder)}: `files` names {name}, which leads out of the folder; copy the file into it."
             )
-        entries[folder / name] = file_words(given or {}, f"{shown_path(folder)}: `files.{name}`")
-    return entries
+        found[folder / name] = read_file_options(given or {}, f"{shown_path(folder)}: `files.{name}`")
+    return found
 
 
-def _candidates(folder: Path, said: Mapping[Path, FileWords], used: Sequence[str]) -> list[Path]:
+def _candidates(folder: Path, options: Mapping[Path, FileOptions], used: Sequence[str]) -> list[Path]:
     """Files of every kind in their order, then others by name; no raw record whose export lies beside it.
 
-    Of folders within the folder only those files that have words of their own.
+    Of folders within the folder only those files that have options of their own.
     """
     order = {kind.file: place for place, kind in enumerate(KINDS.values())}
     free = [
         path
         for path in folder.iterdir()
-        if path.is_file() and path.name not in used and (path in said or not path.name.startswith(OF_PROGRAMS))
+        if path.is_file() and path.name not in used and (path in options or not path.name.startswith(OF_PROGRAMS))
     ]
     texts = [path.stem for path in free if path.suffix.lower() in TEXT_ENDINGS]
-    paths = [
-        path
-        for path in free
-        if path.stem.lower() != HELD_OUT
-        and (path in said or (path.suffix.lower() in ENDINGS and path.name.lower() not in OTHERS))
-        and (path in said or not _is_raw_of(path, texts))
-    ]
-    within = [path for path in said if path.parent != folder and path not in {folder / name for name in used}]
+
+    def is_read(path: Path) -> bool:
+        if path.stem.lower() == HELD_OUT or path in options:
+            return path.stem.lower() != HELD_OUT
+        if path.suffix.lower() not in ENDINGS or path.name.lower() in OTHERS:
+            return False
+        exported = re.compile(rf"{re.escape(path.stem)}([^0-9A-Za-z]|$)")  # `mill_000_ASC` of `mill_000`
+        return path.suffix.lower() not in BINARY_ENDINGS or not any(map(exported.match, texts))
+
+    within = [path for path in options if path.parent != folder and path not in {folder / name for name in used}]
+    paths = filter(is_read, free)
     return sorted(paths, key=lambda path: (order.get(path.name, len(order)), path.name)) + sorted(within)
 
 
-def _is_raw_of(path: Path, texts: Sequence[str]) -> bool:
-    """Whether a file is the raw record that one of the texts was exported from: `mill_000` of `mill_000_ASC`."""
-    of_path = re.compile(rf"{re.escape(path.stem)}([^0-9A-Za-z]|$)")
-    return path.suffix.lower() in BINARY_ENDINGS and any(of_path.match(text) for text in texts)
+def _read(
+    paths: Sequence[Path],
+    options: Mapping[Path, FileOptions],
+    target: Path,
+    place: Placement,
+    known: KnownExperiments,
+) -> MeasuredFiles:
+    """Tables that a case can name stay where they are; others are brought into that form beside the config."""
+    found = MeasuredFiles([], [], [])
+    # Each file for itself, but records of one point together if they belong to one section.
+    groups: dict[object, list[tuple[Path, FileOptions]]] = {}
+    for path in paths:
+        if path not in options and not place.turned and _is_plain(path, known):
+            named = Path(os.path.relpath(path, target.resolve().parent)).as_posix()
+            found.observations.append(observed(KIND_OF_FILE[path.name].name, named))
+            continue
+        own = options.get(path, FileOptions())
+        key = path if own.position is None else (own.experiment, own.section, own.floor, own.surface)
+        groups.setdefault(key, []).append((path, own))
+    for group in groups.values():
+        tables, records = _converted(group, place, known)
+        for table in tables:
+            # If gauge.csv and gauge.txt are both there, `gauge-level.csv` and `gauge-level-2.csv`; also of Gauge.txt.
+            names = [one.file.removesuffix(".csv") for one in found.tables]
+            name = f"{unused(table.file.removesuffix('.csv'), names)}.csv"
+            found.tables.append(replace(table, file=name))
+            found.observations.extend(
+                one | {"file": f"{data_folder(target).name}/{name}"} for one in table.observations
+            )
+        found.imported.extend(records)
+    return found
 
 
-def _is_plain(path: Path, kind: Kind) -> bool:
-    """Whether a table is in the form that a case names as it is: commas, all columns by their own names, one kind."""
+def _is_plain(path: Path, known: KnownExperiments) -> bool:
+    """Whether a table is in the form that a case names as it is: commas, all columns by their own names, one kind.
+
+    InputError if such a table lacks a value, or is of another experiment.
+    """
+    if (kind := KIND_OF_FILE.get(path.name)) is None:
+        return False
     lines = readable_text(path).splitlines()
-    heading = [name.strip() for name in lines[0].split(",")] if lines else []
-    place = ("x", *(["y"] if kind.at_point else []), *(["section"] if kind.velocity else []))
-    of_others = {other.column for other in KINDS.values()} - {kind.column}
-    return {"experiment", kind.column, *place} <= set(heading) and not of_others & set(heading)
-
-
-def _check_plain(path: Path, kind: Kind, known: KnownExperiments) -> None:
-    """Errors: InputError where a table that stays where it is lacks a value, or is of another experiment."""
+    heading = {name.strip() for name in lines[0].split(",")} if lines else set()
     names = ("experiment", *(["section"] if kind.velocity else []))
     place = ("x", *(["y"] if kind.at_point else []))
+    of_others = {other.column for other in KINDS.values()} - {kind.column}
+    if not {kind.column, *names, *place} <= heading or of_others & heading:
+        return False
     rows = read_table(path, names, (*place, kind.column), (kind.error_column,))
     known.refuse_unknown(shown_path(path), rows.index.tolist(), rows["experiment"].tolist())
+    return True
 
 
-def _groups(files: Sequence[tuple[Path, FileWords]]) -> list[list[tuple[Path, FileWords]]]:
-    """Each file for itself, but records of one point together where they belong to one section."""
-    groups: dict[object, list[tuple[Path, FileWords]]] = {}
-    for path, words in files:
-        key = path if words.position is None else (words.experiment, words.section, words.floor, words.surface)
-        groups.setdefault(key, []).append((path, words))
-    return list(groups.values())
-
-
-def _brought(
-    group: Sequence[tuple[Path, FileWords]], place: Placement, known: KnownExperiments
+def _converted(
+    group: Sequence[tuple[Path, FileOptions]], place: Placement, known: KnownExperiments
 ) -> tuple[list[StationTable], list[Tree]]:
     """The tables of the files of a group, and what the config keeps of each file."""
-    for path, words in group:
-        if words.flip and place.line is not None and words.coordinates != "channel":
+    for path, options in group:
+        if options.flip and place.line is not None and options.coordinates != "channel":
             raise InputError(
                 f"{shown_path(path)}: expected no `flip` of places on the map of a centreline; where velocities run "
                 "upstream, draw the line from its other end: `reverse: true`, or its points upstream first."
             )
-    read = [with_experiments(reader_of(path)(path, words), known.names) for path, words in group]
-    placed = [in_the_channel(one, place, words) for one, (_, words) in zip(read, group, strict=True)]
-    path, words = group[0]
-    if len(group) > 1:
-        placed = [_with_own_errors(one, own) for one, (_, own) in zip(placed, group, strict=True)]
-        words = replace(words, standard_error={})
-    made = station_tables(joined_rows(placed), path.stem, words, known, place, shown_path(path))
-    told = [without_unused_depth(one) for one in placed]
-    said = [
-        f"{made.said if not number else 'with the above'}: {taken_in_words(one)}" for number, one in enumerate(told)
-    ]
-    return made.tables, [record(file, one, line) for (file, _), one, line in zip(group, told, said, strict=True)]
-
-
-def _with_own_errors(taken: MeasuredRows, words: FileWords) -> MeasuredRows:
-    """The rows of one file of a group with its own standard errors, NaN where neither it nor the site file has one."""
-    kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
-    return taken.having({kind.error_column: errors_of_rows(taken, kind, words) for kind in kinds})
+    read = [with_experiments(reader_of(path)(path, options), known.names) for path, options in group]
+    placed = [in_the_channel(one, place, options) for one, (_, options) in zip(read, group, strict=True)]
+    path, options = group[0]
+    if len(group) > 1:  # each file keeps standard errors of its own, NaN if neither it nor the site file has one
+        options = replace(options, standard_error={})
+        for number, (_, own) in enumerate(group):
+            kinds = [kind for kind in KINDS.values() if kind.column in placed[number].numbers]
+            errors = {kind.error_column: errors_of_rows(placed[number], kind, own) for kind in kinds}
+            placed[number] = placed[number].having(errors)
+    made = station_tables(joined_rows(placed), path.stem, options, known, place, shown_path(path))
+    records = []
+    for number, ((file, _), one) in enumerate(zip(group, placed, strict=True)):
+        # A depth of the water of which no height was made is not used: levels and the bed of the case are the depth.
+        uses_depth = "height" in one.numbers and "height" not in one.columns
+        used = one if uses_depth else one.not_reading("depth")
+        records.append(record(file, used, f"{'with the above' if number else made.taken}: {used.summary}"))
+    return made.tables, records

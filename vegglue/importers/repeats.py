@@ -1,95 +1,157 @@
-"""Values measured again at one place: their mean, and its standard error from a scatter pooled over many places.
+"""Values measured again at one place: their mean and its standard error, and columns that they are confounded with.
 
 The scatter of three values alone may come out ten times too small by chance, and that one place then outweighs all
-others: sums of squares of residuals have no mean with two degrees of freedom.
+others: sums of squares of residuals have no mean with two degrees of freedom. So it is pooled over many places.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from math import sqrt
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from vegglue.arrays import Array
+from vegglue.errors import InputError
 from vegglue.importers.measured_rows import MeasuredRows
-from vegglue.importers.serial_scatter import values_that_are_one
+from vegglue.wording.numbers import listed
 
-# Experiment, section, x, y of a place [m]; and a value with its stated standard error, NaN where there is none.
+# Experiment, section, x, y of a place [m]; and a value with its stated standard error, NaN if there is none.
 PlaceKey = tuple[str, str, float, float]
 RepeatedValue = tuple[float, float]
 # Of what counts as one: begins as the key of a place, and may go on.
 RepeatKey = Any
-# How much of a key names a place, its section and its experiment: the narrowest that has ENOUGH is asked.
+# How much of a key names a place, its section and its experiment: the narrowest that has ENOUGH is taken.
 NARROW_TO_WIDE = (4, 2, 1)
 # Degrees of freedom nu of a scatter. chi^2 is nu / (nu - 2) times too large on average with it: 7 % with 30. The whole
 # file may give fewer: with 10, a standard error is known to 1 / sqrt(2 nu), about a quarter.
 ENOUGH, LEAST_OF_FILE = 30, 10
 # Repeats that differ by so many of their errors do not by chance: of two, one pair in two million.
 BEYOND_ERRORS = 5.0
-Scatter = Mapping[tuple[object, ...], tuple[float, int]]
+# The lag-one correlation of n values without one is off by 1 / sqrt(n): beyond four of these it is one.
+OF_CHANCE = 4.0
+# Values of a series from which its correlations count: the mean of fewer takes much of them along.
+LEAST_OF_SERIES = 10
+DOWNSTREAM = ("u", "speed")
+# What a column must do to velocities before they are no repeats: more than chance would in one of a thousand, half of
+# their scatter or more, and 5 % of them, root mean square. Operators, days and probes of one flow make less of a
+# difference, flows and heights of their own more. Chosen, not measured.
+SIGNIFICANCE, SHARE_OF_SCATTER, SHARE_OF_VELOCITY = 1e-3, 0.5, 0.05
+MOST_TEXTS = 3  # of the texts of a column
+Gathered = Mapping[RepeatKey, Sequence[RepeatedValue]]
 
 
-def means_of_repeats(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> list[RepeatedValue]:
+def means_of_repeats(gathered: Gathered) -> list[RepeatedValue]:
     """Mean of each place and its standard error: from those stated, else s sqrt(tau / n), s at most; 0 for unknown.
 
-    tau: how many values in a row count as one, see `values_that_are_one`; s: root of sum (u - mean u)^2 / sum (n - 1),
+    tau: how many values in a row count as one, see `autocorrelation_time`; s: root of sum (u - mean u)^2 / sum (n - 1),
     of the values without stated errors of the narrowest of place, section and experiment that has ENOUGH degrees of
     freedom, else of all. One kind and one file.
     """
     unstated = {place: values for place, values in gathered.items() if not _stated(values)}
-    scatter, tau = _scatter(unstated), _in_a_row(unstated)
-    return [
-        (float(np.mean([one for one, _ in some])), _error(place, some, scatter, tau))
-        for place, some in gathered.items()
-    ]
+    tau = autocorrelation_time([one for one, _ in values] for values in unstated.values())
+    # Sum of squares about the means of the places, and degrees of freedom, by the beginning of their keys.
+    pooled: dict[tuple[object, ...], tuple[float, int]] = {}
+    for place, values in unstated.items():
+        squares, freedom = len(values) * float(np.var([one for one, _ in values])), len(values) - 1
+        for width in (*NARROW_TO_WIDE, 0):
+            before = pooled.get(place[:width], (0.0, 0))
+            pooled[place[:width]] = (before[0] + squares, before[1] + freedom)
+
+    def variance(place: RepeatKey) -> float:
+        for width in NARROW_TO_WIDE:
+            squares, freedom = pooled.get(place[:width], (0.0, 0))
+            if freedom >= ENOUGH:
+                return squares / freedom
+        squares, freedom = pooled.get((), (0.0, 0))
+        return squares / freedom if freedom >= LEAST_OF_FILE else 0.0
+
+    found = []
+    for place, values in gathered.items():
+        if _stated(values):
+            error = sqrt(sum(error**2 for _, error in values)) / len(values)
+        else:
+            error = sqrt(variance(place) * min(tau / len(values), 1.0))
+        found.append((float(np.mean([one for one, _ in values])), error))
+    return found
 
 
-def said_of_repeats(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> str:
-    """How many values were averaged, where they are too few for a standard error that is missing, and where they differ
-    by more than the errors that are stated.
+def _stated(values: Sequence[RepeatedValue]) -> bool:
+    return all(np.isfinite(error) for _, error in values)
+
+
+def autocorrelation_time(series: Iterable[Sequence[float]]) -> float:
+    """tau = 1 + 2 sum_k rho_k, up to the first rho_k that is not above 0 (k in values): the mean of n has the variance
+    s^2 tau / n, where s^2 is that of a value (e.g. Sokal 1997, Monte Carlo Methods in Statistical
+    Mechanics; not checked against it). 1 if neighbours are as alike as chance makes them.
+
+    series: each of one place, in the order of time; their autocovariances are added up, each about its own mean.
+    """
+    found = [np.asarray(one, dtype=np.float64) for one in series if len(one) >= LEAST_OF_SERIES]
+    longest = max((one.size for one in found), default=0)
+    covariance = np.zeros(longest)
+    for one in found:
+        spectrum = np.fft.rfft(one - one.mean(), 2 * one.size)
+        covariance[: one.size] += np.asarray(np.fft.irfft(np.abs(spectrum) ** 2)[: one.size])
+    if longest == 0 or covariance[0] <= 0.0:
+        return 1.0
+    rho = covariance / covariance[0]
+    if rho[1] <= OF_CHANCE / np.sqrt(sum(one.size for one in found)):
+        return 1.0
+    until = int(np.argmax(rho <= 0.0))  # sums of deviations are 0, so that some rho is below
+    return 1.0 + 2.0 * float(rho[1:until].sum())
+
+
+def note_on_repeats(gathered: Gathered) -> str:
+    """How many values were averaged, if they are too few for a standard error that is missing, and if they differ by
+    more than the errors that are stated.
     """
     unstated = {place: values for place, values in gathered.items() if not _stated(values)}
     repeats = sum(len(values) - 1 for values in gathered.values())
-    freedom = sum(len(values) - 1 for values in unstated.values())
-    too_few = f", too few for a standard error: {LEAST_OF_FILE} are needed" if 0 < freedom < LEAST_OF_FILE else ""
-    tau = _in_a_row(unstated)
-    alike = f", {tau:.2g} in a row as one, as neighbours are alike" if tau > 1.0 else ""
-    averaged = _single(gathered) if repeats == 1 else f", {repeats} repeats averaged{alike}" if repeats else ""
-    return averaged + too_few + _beyond_errors(gathered)
+    note = f", {repeats} repeats averaged" if repeats > 1 else ""
+    if repeats == 1:
+        place, values = next((place, values) for place, values in gathered.items() if len(values) > 1)
+        copied = " (the same value: take the row out if it was written twice)" if values[0][0] == values[1][0] else ""
+        note = f", 1 repeat averaged at x = {place[2]:g}, y = {place[3]:g} m{copied}"
+    elif repeats and (tau := autocorrelation_time([one for one, _ in values] for values in unstated.values())) > 1.0:
+        note += f", {tau:.2g} in a row as one, as neighbours are alike"
+    if 0 < sum(len(values) - 1 for values in unstated.values()) < LEAST_OF_FILE:
+        note += f", too few for a standard error: {LEAST_OF_FILE} are needed"
+
+    def times_error(values: Sequence[RepeatedValue]) -> float:
+        """Root of sum ((u - mean u) / se)^2 / (n - 1) [-]."""
+        u, error = np.array(values).T
+        return float(np.sqrt(np.sum(((u - u.mean()) / error) ** 2) / (u.size - 1)))
+
+    several = {place: times_error(some) for place, some in gathered.items() if len(some) > 1 and _stated(some)}
+    place = max(several, key=several.__getitem__, default=None)
+    if place is not None and several[place] > BEYOND_ERRORS:
+        note += (
+            f", which differ by {several[place]:.2g} times their stated errors at x = {place[2]:g}, y = {place[3]:g} m"
+            ": see whether they are repeats"
+        )
+    return note
 
 
-def _single(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> str:
-    """Where the only repeat is, and what to do if it is a row that was written twice."""
-    (place, values), *_ = ((place, values) for place, values in gathered.items() if len(values) > 1)
-    copied = " (the same value: take the row out if it was written twice)" if values[0][0] == values[1][0] else ""
-    return f", 1 repeat averaged at x = {place[2]:g}, y = {place[3]:g} m{copied}"
+def _mean_of_known(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else float("nan")
 
 
-def _beyond_errors(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> str:
-    """Where repeats differ most, by more than BEYOND_ERRORS times their stated errors; nothing where none do."""
-    several = {place: values for place, values in gathered.items() if len(values) > 1 and _stated(values)}
-    if not several:
-        return ""
-    place = max(several, key=lambda one: _times_error(several[one]))
-    times = _times_error(several[place])
-    where = f"at x = {place[2]:g}, y = {place[3]:g} m"
-    return (
-        f", which differ by {times:.2g} times their stated errors {where}: see whether they are repeats"
-        if times > BEYOND_ERRORS
-        else ""
-    )
-
-
-def _times_error(values: Sequence[RepeatedValue]) -> float:
-    """Root of sum ((u - mean u) / se)^2 / (n - 1) [-], of values with stated errors."""
-    u, error = np.array(values).T
-    return float(np.sqrt(np.sum(((u - u.mean()) / error) ** 2) / (u.size - 1)))
+# How what stands beside u is put together of repeats.
+TOGETHER: Mapping[str, Callable[[Array], float]] = {
+    "v": _mean_of_known,
+    "w": _mean_of_known,
+    "u_std": lambda values: float(np.sqrt(np.mean(values**2))),
+    "duration_s": lambda values: float(np.sum(values)),
+}
 
 
 def without_repeats(
     points: MeasuredRows, keys: Sequence[tuple[object, ...]], errors: Array
 ) -> tuple[MeasuredRows, str]:
-    """Each point once, where `keys` (rows,) say which rows are one, and what is said of it; errors (rows,) [m/s].
+    """Each point once, and a note; rows of equal `keys` (rows,) are one. errors (rows,) [m/s].
 
     u is the mean with its error, see `means_of_repeats`; v and w are means, u_std is the root of the mean square, and
     durations add up. Without repeats the points are as they were.
@@ -108,57 +170,61 @@ def without_repeats(
         if role in points.numbers
     }
     first = np.isin(np.arange(points.size), [some[0] for some in rows.values()])
-    return points.only(first).having({"u": value, "u_se": error, **together}), said_of_repeats(gathered)
+    return points.only(first).having({"u": value, "u_se": error, **together}), note_on_repeats(gathered)
 
 
-def _mean_of_known(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else float("nan")
+def refuse_confounded_replicates(taken: MeasuredRows, places: Sequence[Hashable], file: str) -> None:
+    """InputError if velocities of one place differ with a column of no role, or the discharge, alike at many places.
+
+    places (rows,): what is one if they are equal. A number of the repeat, or its time, makes no difference.
+    """
+    columns: dict[str, Sequence[str]] = dict(taken.others)
+    if (discharges := taken.numbers.get("discharge")) is not None:
+        stated = ["" if np.isnan(one) else f"{one:g} m3/s" for one in discharges.tolist()]
+        columns = {taken.columns["discharge"]: stated, **columns}
+    for role in DOWNSTREAM:
+        for heading, texts in columns.items() if role in taken.numbers else ():
+            u = taken.numbers[role]
+            rows = [row for row, text in enumerate(texts) if text.strip() and np.isfinite(u[row])]
+            names = [texts[row] for row in rows]
+            if _is_explained_by(u[rows], _numbered([places[row] for row in rows]), _numbered(names)):
+                known = list(dict.fromkeys(names))
+                more = [f"{len(known) - MOST_TEXTS} more"] if len(known) > MOST_TEXTS else []
+                raise InputError(
+                    f"{file}: expected repeats at one place to differ by chance, got velocities that differ with "
+                    f"{heading!r} ({listed([*known[:MOST_TEXTS], *more])}); name it in `columns` of this file in "
+                    "`files` of the site file, by what it holds (`experiment`, `section`, `y`, `z`, `height`, "
+                    "`below`), keep the rows of one, or take the column out where they are repeats of one flow."
+                )
 
 
-# How what stands beside u is put together of repeats.
-TOGETHER: Mapping[str, Callable[[Array], float]] = {
-    "v": _mean_of_known,
-    "w": _mean_of_known,
-    "u_std": lambda values: float(np.sqrt(np.mean(values**2))),
-    "duration_s": lambda values: float(np.sum(values)),
-}
+def _numbered(keys: Sequence[Hashable]) -> NDArray[np.int64]:
+    """A number for each key, the same for equal ones."""
+    numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+    return np.array([numbers[key] for key in keys], dtype=np.int64)
 
 
-def _stated(values: Sequence[RepeatedValue]) -> bool:
-    return all(np.isfinite(error) for _, error in values)
+def _is_explained_by(u: Array, place: NDArray[np.int64], name: NDArray[np.int64]) -> bool:
+    """Whether names explain what u (rows,) of one place differs by, beyond chance; place and name by their numbers.
 
+    d = u - mean u of its place, e = mean d of its name; F = (sum e^2 / (names - 1)) / (sum (d - e)^2 / (rows - places -
+    names + 1)), an analysis of variance in two ways without interaction (Scheffe 1959, The Analysis of Variance; not
+    checked against it), exact if each name stands once at each place.
+    """
 
-def _in_a_row(unstated: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> float:
-    return values_that_are_one([one for one, _ in values] for values in unstated.values())
+    def means(values: Array, group: NDArray[np.int64]) -> Array:
+        return np.asarray((np.bincount(group, values) / np.maximum(np.bincount(group), 1))[group])
 
-
-def _error(place: RepeatKey, values: Sequence[RepeatedValue], scatter: Scatter, tau: float) -> float:
-    if _stated(values):
-        return sqrt(sum(error**2 for _, error in values)) / len(values)
-    return sqrt(_variance(place, scatter) * min(tau / len(values), 1.0))
-
-
-def _variance(place: RepeatKey, scatter: Scatter) -> float:
-    """s^2 of one value at a place; 0 for unknown."""
-    for width in NARROW_TO_WIDE:
-        squares, freedom = scatter.get(place[:width], (0.0, 0))
-        if freedom >= ENOUGH:
-            return squares / freedom
-    squares, freedom = scatter.get((), (0.0, 0))
-    return squares / freedom if freedom >= LEAST_OF_FILE else 0.0
-
-
-def _scatter(gathered: Mapping[RepeatKey, Sequence[RepeatedValue]]) -> Scatter:
-    """Sum of squares about the means of the places, and degrees of freedom, by the beginning of their keys."""
-    found: dict[tuple[object, ...], tuple[float, int]] = {}
-    for place, values in gathered.items():
-        squares, freedom = len(values) * float(np.var([one for one, _ in values])), len(values) - 1
-        for group in _groups_of(place):
-            before = found.get(group, (0.0, 0))
-            found[group] = (before[0] + squares, before[1] + freedom)
-    return found
-
-
-def _groups_of(place: RepeatKey) -> Iterator[tuple[object, ...]]:
-    return (place[:width] for width in (*NARROW_TO_WIDE, 0))
+    several = np.bincount(place)[place] > 1 if u.size else np.zeros(0, dtype=bool)
+    u, place, name = u[several], place[several], name[several]
+    names, places = (np.unique(one).size for one in (name, place))
+    left = u.size - places - names + 1
+    if names < 2 or left < 1:
+        return False
+    off = u - means(u, place)
+    of_names = means(off, name)
+    whole, explained, rest = (float(np.sum(part**2)) for part in (off, of_names, off - of_names))
+    if explained < SHARE_OF_SCATTER * whole or explained < SHARE_OF_VELOCITY**2 * float(np.sum(u**2)):
+        return False
+    ratio = explained / (names - 1) / (rest / left) if rest > 0.0 else np.inf
+    return bool(fdtrc(names - 1, left, ratio) < SIGNIFICANCE)

@@ -1,21 +1,297 @@
-"""The site file of a field team, read and checked whole."""
+"""The site file of a field team: every key, in which unit, between which bounds; read and checked whole."""
 
+import difflib
 import json
+import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Self
 
-from pydantic import ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from vegglue.case.config import read_tree
+from vegglue.case.frame import Frame, in_metres
 from vegglue.case.messages import dotted, expected_in_words
+from vegglue.case.parts import Interval, Number, Polygon, Positive
+from vegglue.case.site_schema import CentrelineShape
 from vegglue.case.size_limits import LARGEST_CONFIG
-from vegglue.case.text_files import read_text
+from vegglue.case.text_files import read_text, unprintable
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.field_site import FieldSite
-from vegglue.importers.site_keys import OF_FLOW, about_stems, misspelt_key, unread_keys
+from vegglue.importers.column_names import UNITS, in_si
+from vegglue.importers.config_parts import VISCOSITY_FACTOR
 
-# What the file of measurements is called that no calibration sees, whatever its ending.
+# Name of the file of measurements that no calibration sees, whatever its ending.
 HELD_OUT = "holdout"
+ONE_DIRECTION = "either `angle` or `towards: [east, north]`"
+
+
+def _printable(name: str) -> str:
+    if (sign := unprintable(name)) is not None:
+        raise ValueError(f"a name without the sign {sign!a}")
+    return name
+
+
+def _with_unit(quantity: str) -> Callable[[Any], Any]:
+    """A text such as `42 l/s` as a number in SI; what is no text is left to the checks of numbers."""
+
+    def converted(value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return in_si(value, quantity, "")
+        except InputError:
+            units = f" with a unit among {', '.join(UNITS[quantity])}" if any(map(str.isdigit, value)) else ""
+            raise ValueError(f"a number{units}") from None
+
+    return converted
+
+
+def _one_or_more(experiments: dict[str, Any]) -> dict[str, Any]:
+    if not experiments:
+        raise ValueError("one or more, those that were measured")
+    return experiments
+
+
+# Bounds far beyond any stream; what lies outside is a slip of the pen or of the unit.
+PrintableName = Annotated[str, AfterValidator(_printable)]
+Length = Annotated[Number, Field(gt=0, le=1e6)]
+Level = Annotated[Number, Field(ge=-1e4, le=1e4)]
+
+
+class _SitePart(BaseModel):
+    """What the parts of a site share: keys without a meaning here are notes."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class Channel(_SitePart):
+    """A trapezoid, or with `walls` its floor alone; without a length as long as its centreline."""
+
+    length_m: Length | None = None
+    bottom_width_m: Annotated[Number, Field(gt=0, le=1e4)]
+    bank_slope_v_per_h: Annotated[Number, Field(ge=0.001, le=100)] | None = None
+    bed_slope: Annotated[Number, Field(gt=-1, lt=1)]
+
+
+class FlumeWalls(_SitePart):
+    """Vertical walls along both sides of the grid, as of a flume.
+
+    n: Manning's, about as known; glass 0.010, wood 0.012 (Chow 1959, table 5-6) [s m^(-1/3)].
+    """
+
+    n: Annotated[Number, Field(ge=0.001, le=0.1)] = 0.011
+
+
+def _walled(given: Any) -> Any:
+    """`walls: true` as walls of a usual n, false as none, and a number as their coefficient."""
+    if isinstance(given, bool):
+        return {} if given else None
+    return {"n": given} if isinstance(given, int | float) else given
+
+
+def _of_polygons(columns: dict[str, str]) -> dict[str, str]:
+    if not columns.keys() <= {"stems", "name"}:
+        raise ValueError("the headings of `stems` and `name`, such as `{stems: HEADING}`")
+    return columns
+
+
+class PlantedPatch(_SitePart):
+    """A rectangle of plants, or a polygon, in the channel; or a file of polygons."""
+
+    x: Interval | None = None
+    y: Interval | None = None
+    polygon: Polygon | None = None
+    file: PrintableName | None = None
+    name: PrintableName | None = None
+    columns: Annotated[dict[str, str], AfterValidator(_of_polygons)] = {}
+    stems_per_m2: Annotated[Number, Field(gt=0, le=1e7)] = 1.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_shape(cls, given: Any) -> Any:
+        """Errors: ValidationError of a rectangle that lacks a side, unless it is another shape."""
+        if isinstance(given, dict) and not given.keys() & {"polygon", "file"}:
+            _Rectangle.model_validate(given)
+        if isinstance(given, dict) and "columns" in given and "file" not in given:
+            raise ValueError("a `file` beside `columns`")
+        return given
+
+
+class _Rectangle(_SitePart):
+    x: Interval
+    y: Interval
+
+
+class MeasuredFlow(_SitePart):
+    """One experiment; its numbers may go by the names without a unit, and then hold one, such as 42 l/s."""
+
+    discharge_m3_s: Annotated[Number, BeforeValidator(_with_unit("discharge")), Field(gt=0, le=1e6)]
+    downstream_level_m: Annotated[Level, BeforeValidator(_with_unit("length"))]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_either_name(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        names = {"discharge": "discharge_m3_s", "level": "downstream_level_m"}
+        return {long: given[short] for short, long in names.items() if short in given} | given
+
+
+class FileOfSite(_SitePart):
+    """A file of the folder; other keys are options of its reader."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    file: PrintableName
+
+
+def _drawn(given: Any) -> Any:
+    """A centreline in a file, as a list of points, or as a case describes one."""
+    if isinstance(given, list):
+        return CentrelineShape.model_validate({"points": given})
+    if isinstance(given, dict):
+        return (FileOfSite if "file" in given else CentrelineShape).model_validate(given)
+    if given is not None:
+        raise ValueError("`points`, `parts` or a `file`")
+    return None
+
+
+class SiteGrid(_SitePart):
+    """The grid of the model, as far as it is not made of channel or survey, and the line that it follows; SI."""
+
+    x: Interval | None = None
+    y: Interval | None = None
+    cell: tuple[Positive, Positive] | None = None
+    centreline: Annotated[FileOfSite | CentrelineShape | None, BeforeValidator(_drawn)] = None
+
+
+class SiteFrame(_SitePart):
+    """Where the model lies on the map: its origin, and the angle of its x axis or a point further down that axis."""
+
+    origin: tuple[Number, Number] = (0.0, 0.0)
+    angle: Annotated[Number, BeforeValidator(_with_unit("angle"))] | None = None
+    towards: tuple[Number, Number] | None = None
+    crs: Annotated[PrintableName, AfterValidator(in_metres)] | None = None
+
+    @model_validator(mode="after")
+    def _one_direction(self) -> Self:
+        if self.angle is not None and self.towards is not None:
+            raise ValueError(ONE_DIRECTION)
+        if self.towards == self.origin:
+            raise ValueError("`towards` a point further down the x axis, another one than `origin`")
+        return self
+
+    @property
+    def frame(self) -> Frame:
+        """As a case keeps it."""
+        angle = self.angle
+        if self.towards is not None:
+            east, north = (end - begin for end, begin in zip(self.towards, self.origin, strict=True))
+            angle = round(math.degrees(math.atan2(north, east)), 6)
+        return Frame(origin=self.origin, angle=angle or 0.0, crs=self.crs)
+
+
+def _as_list(given: Any) -> Any:
+    """A single file of patches as a list of one."""
+    return [given] if isinstance(given, dict) else given
+
+
+class FieldSite(_SitePart):
+    """All that a site file states; SI."""
+
+    channel: Channel | None = None
+    bed: FileOfSite | None = None
+    grid: SiteGrid | None = None
+    frame: SiteFrame | None = None
+    classes: FileOfSite | None = None
+    walls: Annotated[FlumeWalls | None, BeforeValidator(_walled)] = None
+    files: dict[PrintableName, dict[str, Any] | None] = {}
+    experiments: Annotated[dict[PrintableName, MeasuredFlow], AfterValidator(_one_or_more)]
+    holdout: dict[PrintableName, MeasuredFlow] = {}
+    patches: Annotated[tuple[PlantedPatch, ...], BeforeValidator(_as_list)] = ()
+    canopy_height_guess_m: Annotated[Number, Field(ge=0.01, le=100)] = 0.8
+    eddy_viscosity_m2_s: Annotated[Number, Field(gt=0, le=1e3)] = 0.01
+    eddy_viscosity_factor: Annotated[Number, Field(ge=1, le=100)] | None = None
+
+    @property
+    def viscosity_factor(self) -> float:
+        """Factor to within which the eddy viscosity is known; one that is stated alone is taken for right."""
+        if self.eddy_viscosity_factor is not None:
+            return self.eddy_viscosity_factor
+        return 1.0 if "eddy_viscosity_m2_s" in self.model_fields_set else VISCOSITY_FACTOR
+
+    @model_validator(mode="before")
+    @classmethod
+    def _whole_ground(cls, given: Any) -> Any:
+        """ValidationError for a channel or a frame that lacks what its site needs."""
+        if not isinstance(given, dict):
+            return given
+        if "bed" not in given:
+            _Ground.model_validate(given)
+        straight = not (isinstance(given.get("grid"), dict) and given["grid"].get("centreline"))
+        needed: list[tuple[str, type[BaseModel]]] = [("channel", _Straight), ("frame", _StraightlyPlaced)]
+        needed = (needed if straight else []) + ([] if given.get("walls") else [("channel", _Banked)])
+        for key, model in needed:
+            if isinstance(given.get(key), dict):
+                model.model_validate(given)
+        return given
+
+
+class _Ground(_SitePart):
+    channel: Channel
+
+
+class _StraightChannel(_SitePart):
+    length_m: Length
+
+
+class _Straight(_SitePart):
+    channel: _StraightChannel
+
+
+class _ChannelWithBanks(_SitePart):
+    bank_slope_v_per_h: Annotated[Number, Field(ge=0.001, le=100)]
+
+
+class _Banked(_SitePart):
+    channel: _ChannelWithBanks
+
+
+class _WholeFrame(_SitePart):
+    origin: tuple[Number, Number]
+    angle: Any = None
+    towards: Any = None
+
+    @model_validator(mode="after")
+    def _one_direction(self) -> Self:
+        if (self.angle is None) == (self.towards is None):
+            raise ValueError(ONE_DIRECTION)
+        return self
+
+
+class _StraightlyPlaced(_SitePart):
+    frame: _WholeFrame
+
+
+SITE_PARTS: dict[str, type[BaseModel]] = {"channel": Channel, "grid": SiteGrid, "frame": SiteFrame, "walls": FlumeWalls}
+# Keys of an experiment, each by either name.
+OF_FLOW = (("discharge", "discharge_m3_s"), ("level", "downstream_level_m"))
+# How alike two words are that are one misspelt [-], and letters of a word cut short: `stems` for `stems_per_m2`.
+MISSPELT, CUT_SHORT = 0.8, 4
+
+# Other names of keys, in a config of a case or elsewhere.
+OTHER_WORDS = {
+    "plants": "patches", "vegetation": "patches", "density": "stems_per_m2", "stem_density": "stems_per_m2",
+    "canopy_height": "canopy_height_guess_m", "q": "discharge", "width": "bottom_width_m", "slope": "bed_slope",
+    "viscosity": "eddy_viscosity_m2_s",
+}  # fmt: skip
+# What takes the place of two things that are often counted.
+THICK_STEMS = (
+    "Diameters of stems have no key: the drag phi = C_d m D h of the densest patch is calibrated, with the diameter D "
+    "in it. Where it differs from patch to patch, write stems times diameter [1/m] as `stems_per_m2` of all of them: "
+    "only their ratio counts. Where you know D, narrow the prior of phi in the config."
+)
+COUNTED_STEMS = "The number of stems in a patch has no key: write it over the area of the patch, as `stems_per_m2`."
 
 
 def site_file(folder: Path) -> Path:
@@ -23,53 +299,52 @@ def site_file(folder: Path) -> Path:
     return folder / "site.yaml" if (folder / "site.yaml").is_file() else folder / "site.json"
 
 
-def held_out_file(folder: Path) -> Path | None:
-    """The file of measurements that a folder holds out: holdout.csv, else the first other table of that name."""
-    return next(iter(_held_out_files(folder)), None)
-
-
-def _held_out_files(folder: Path) -> list[Path]:
+def held_out_files(folder: Path) -> list[Path]:
+    """The files of measurements that a folder holds out: holdout.csv first, then other tables of that name."""
     found = (path for path in folder.iterdir() if path.is_file() and path.stem.lower() == HELD_OUT)
     return sorted(found, key=lambda path: (path.name != "holdout.csv", path.name))
 
 
 def read_site(path: Path) -> FieldSite:
-    """The site in a file. Errors: InputError, naming file and key, for what is missing, no number or beyond bounds."""
+    """The site in a file. InputError, which names file and key, for what is missing, no number or beyond bounds."""
     if not path.exists():
         what = "none in it" if path.parent.is_dir() else "a file" if path.parent.exists() else "no such folder"
         raise InputError(
             f"{shown_path(path.parent)}: expected a folder with site.yaml, or site.json, and tables of measurements, "
             f"got {what}; `vegglue new NAME` makes one to begin with."
         )
-    given = _given(path)
-    if (misspelt := misspelt_key(given)) is not None:
-        place, known = misspelt
-        raise InputError(f"{shown_path(path)}: `{place}` is not a known key: did you mean `{known}`?")
+    given = _read_keys(path)
+    if (misspelt := _misspelt_key(given)) is not None:
+        raise InputError(f"{shown_path(path)}: `{misspelt[0]}` is not a known key: did you mean `{misspelt[1]}`?")
     try:
         site = FieldSite.model_validate(given)
     except ValidationError as error:
-        raise InputError(f"{shown_path(path)}: {_sentence(error)}") from None
-    _refuse_some_uncounted(path, site)
-    return site
-
-
-def _refuse_some_uncounted(path: Path, site: FieldSite) -> None:
-    """Errors: InputError when stems were counted in some patches only: the others would seem all but bare."""
+        problem = error.errors()[0]
+        place = dotted(tuple(key for key in problem["loc"] if key != "[key]")) or "site.json"
+        if problem["type"] == "missing":  # `experiments.May.level`: as it may be written with a unit of its own
+            before, dot, last = place.rpartition(".")
+            short = {long: name for name, long in OF_FLOW}.get(last, last)
+            raise InputError(f"{shown_path(path)}: `{before}{dot}{short}` is missing; add it.") from None
+        expected = expected_in_words(problem)
+        expected = expected.replace("valid number", "number").replace("valid string", "text in quotes")
+        got = repr(problem["input"])[:80]
+        raise InputError(f"{shown_path(path)}: `{place}` expected {expected}, got {got}; correct it.") from None
     counted = ["stems_per_m2" in one.model_fields_set for one in site.patches if one.file is None]
-    if any(counted) and not all(counted):
+    if any(counted) and not all(counted):  # the others would seem all but bare
         raise InputError(
             f"{shown_path(path)}: expected `stems_per_m2` of every patch or of none, got none of "
             f"`patches[{counted.index(False)}]`; add it there."
         )
+    return site
 
 
-def left_open(folder: Path) -> list[str]:
-    """What the site file of a folder does not say and `import` assumes, and what it says that nobody reads.
+def assumptions_of_site(folder: Path) -> list[str]:
+    """What `import` assumes because the site file does not state it, and what in the folder is not read.
 
-    Errors: InputError as those of `read_site`.
+    InputError as `read_site`.
     """
     path = site_file(folder)
-    site, given = read_site(path), _given(path)
+    site, given = read_site(path), _read_keys(path)
     assumed = []
     if "eddy_viscosity_m2_s" not in site.model_fields_set:
         within = f" (standard deviation: a factor of {site.viscosity_factor:g})" if site.viscosity_factor > 1 else ""
@@ -81,46 +356,72 @@ def left_open(folder: Path) -> list[str]:
         assumed.append("plants equally dense in all patches that have no file")
     if not site.patches:
         assumed.append("no plants")
-    unread = unread_keys(given)
+    unread = [place + key for place, key, _ in _unknown_keys(given)]
     if site.walls is not None and site.channel is not None and site.channel.bank_slope_v_per_h is not None:
         unread.append("channel.bank_slope_v_per_h, as there are walls")
-    told = [f"{path.name} does not say, and so is assumed: {', '.join(assumed)}."] if assumed else []
-    told += [f"{path.name}: taken as notes, and not read: {', '.join(unread)}."] if unread else []
-    told += about_stems(unread)
-    if (held_out := held_out_file(folder)) is not None and not site.holdout:
-        told.append(f"{held_out.name} is not read: {path.name} names no experiment under `holdout`.")
-    first, *others = _held_out_files(folder) or [path]
-    told += [f"{other.name} is not read, as {first.name} is: put the rows of both into one." for other in others]
-    return told
+    lines = [f"{path.name} does not say, and so is assumed: {', '.join(assumed)}."] if assumed else []
+    lines += [f"{path.name}: taken as notes, and not read: {', '.join(unread)}."] if unread else []
+    of_patches = [key.rpartition(".")[2].lower() for key in unread if key.startswith("patches")]
+    if any("diam" in word or "thick" in word for word in of_patches):
+        lines.append(THICK_STEMS)
+    if any("stem" in word and ("number" in word or "count" in word) for word in of_patches):
+        lines.append(COUNTED_STEMS)
+    held_out = held_out_files(folder)
+    if held_out and not site.holdout:
+        lines.append(f"{held_out[0].name} is not read: {path.name} names no experiment under `holdout`.")
+    for other in held_out[1:]:
+        lines.append(f"{other.name} is not read, as {held_out[0].name} is: put the rows of both into one.")
+    return lines
 
 
-def _given(path: Path) -> Any:
-    """What a site file says, not checked. Errors: InputError."""
+def _read_keys(path: Path) -> Any:
+    """Keys and values of a site file, not checked. InputError."""
     if path.suffix == ".yaml":
         return read_tree(path)
+    text = read_text(path, LARGEST_CONFIG, "a folder to import has one")
     try:
-        return json.loads(read_text(path, LARGEST_CONFIG, "a folder to import has one"))
-    except InputError:
-        raise
+        return json.loads(text)
     except RecursionError:
         raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
     except ValueError as error:
         raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
 
 
-def _by_short_name(place: str) -> str:
-    """`experiments.May.level` of `experiments.May.downstream_level_m`: as it may be written with a unit of its own."""
-    short = {long: name for name, long in OF_FLOW}
-    before, dot, last = place.rpartition(".")
-    return f"{before}{dot}{short.get(last, last)}"
+def _misspelt_key(given: Any) -> tuple[str, str] | None:
+    """The first unknown key, with its place, that is all but a known one which is not given, and that one."""
+    for place, key, missing in _unknown_keys(given):
+        close = next(iter(difflib.get_close_matches(key, missing, n=1, cutoff=MISSPELT)), None)
+        if close is None and OTHER_WORDS.get(key.lower()) in missing:
+            close = OTHER_WORDS[key.lower()]
+        if close is None and len(key) >= CUT_SHORT:
+            close = next((known for known in missing if known.startswith(key)), None)
+        if close is not None:
+            return place + key, close
+    return None
 
 
-def _sentence(error: ValidationError) -> str:
-    problem = error.errors()[0]
-    place = dotted(tuple(key for key in problem["loc"] if key != "[key]")) or "site.json"
-    if problem["type"] == "missing":
-        return f"`{_by_short_name(place)}` is missing; add it."
-    expected = expected_in_words(problem)
-    for said, meant in (("valid number", "number"), ("valid string", "text in quotes")):
-        expected = expected.replace(said, meant)
-    return f"`{place}` expected {expected}, got {repr(problem['input'])[:80]}; correct it."
+def _unknown_keys(given: Any) -> Iterator[tuple[str, str, list[str]]]:
+    """Of each unknown key: the place it stands at, its name, and the known keys that are not given there."""
+    if not isinstance(given, dict):
+        return
+
+    def names(model: type[BaseModel]) -> list[tuple[str, ...]]:
+        return [(name,) for name in model.model_fields]
+
+    # The parts of a site file: where each stands, what is given there, and its known keys, each by all its names.
+    parts: list[tuple[str, Any, list[tuple[str, ...]]]] = [("", given, names(FieldSite))]
+    parts += [(f"{name}.", given.get(name), names(model)) for name, model in SITE_PARTS.items()]
+    for name in ("experiments", "holdout"):
+        flows = given.get(name)
+        for experiment, flow in flows.items() if isinstance(flows, dict) else ():
+            parts.append((f"{name}.{experiment}.", flow, [*OF_FLOW]))
+    patches = given.get("patches")
+    if isinstance(patches, dict):
+        parts.append(("patches.", patches, names(PlantedPatch)))
+    for number, patch in enumerate(patches) if isinstance(patches, list) else ():
+        parts.append((f"patches[{number}].", patch, names(PlantedPatch)))
+    for place, part, known in parts:
+        if isinstance(part, dict):
+            missing = [name for names_ in known if not set(names_) & part.keys() for name in names_]
+            of_part = {name for names_ in known for name in names_}
+            yield from ((place, str(key), missing) for key in part if key not in of_part)

@@ -1,29 +1,34 @@
 """Measured rows as tables that a case names: points in the vertical, or stations of each kind."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
 from vegglue.errors import InputError
-from vegglue.importers.column_names import is_in_degrees, words_of
-from vegglue.importers.columns_of_table import NO_DEGREES
+from vegglue.importers.column_names import is_in_degrees, unit_stated, words_of
+from vegglue.importers.column_roles import NO_DEGREES
 from vegglue.importers.config_parts import observed
-from vegglue.importers.file_words import FileWords
-from vegglue.importers.gauged_discharges import levels_once, whole_discharges
-from vegglue.importers.known_experiments import KnownExperiments
-from vegglue.importers.lost_places import numbers_of, refuse_lost_places
-from vegglue.importers.measured_rows import MeasuredRows
-from vegglue.importers.nameless_sections import ONE_PLACE, section_at, sections_by_place
-from vegglue.importers.placement import Placement
-from vegglue.importers.point_heights import refuse_lost_heights, vertical_role
-from vegglue.importers.repeats import PlaceKey, RepeatedValue, means_of_repeats, said_of_repeats, without_repeats
-from vegglue.importers.told_apart_repeats import refuse_told_apart
+from vegglue.importers.file_options import FileOptions
+from vegglue.importers.measured_rows import MeasuredRows, Placement, vertical_role
+from vegglue.importers.repeats import (
+    PlaceKey,
+    RepeatedValue,
+    means_of_repeats,
+    note_on_repeats,
+    refuse_confounded_replicates,
+    without_repeats,
+)
+from vegglue.importers.site_file import HELD_OUT
+from vegglue.importers.table_parser import numbers_of
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
 from vegglue.wording.numbers import listed, so_many
 
+EXPERIMENTS = "experiments"
+VELOCITIES = ("u", "v", "speed")
 # Share of places with several heights from which a table is of verticals [-]. Chosen, not measured: less may be places
 # that were read again, with another level of the bed or of the probe beside it.
 VERTICALS = 0.2
@@ -34,166 +39,311 @@ NOT_AVERAGES = (
     "they are that about 0.4 of the depth above the bed only, and not among plants; correct others, or state errors "
     "that hold the difference"
 )
-# By how much verticals are moved to the line of their section before it is said [m].
+# By how much verticals are moved to the line of their section before a note says so [m].
 NEAR_LINE = 0.01
-# Names of a column that a message lists.
-OTHER_NAMES_SHOWN = 4
-Row = list[str]
+OTHER_NAMES_SHOWN = 4  # names of a column that a message lists
+# Places nearer than this are one [m]; what is measured by tape is known to a centimetre.
+ONE_PLACE = 0.001
+# Number of x over that of places, up to which places stand on lines across the channel [-]. Chosen, not measured.
+ON_LINES = 2.0 / 3.0
+# Stations of one section lie within so much of one another along the channel [m].
+SECTION_GAP = 0.25
+# Values of one discharge are alike to so much [-]: those of one are copied, not measured again.
+COPIED = 1e-6
+# Words of headings that mean how high or deep: `rel. depth`, `z/h`, `Messtiefe`; or where from: `dist. to bed`.
+HEIGHT_WORDS = {
+    "z", "depth", "height", "below", "above", "surface", "hohe", "tiefe", "profondeur", "hauteur", "profundidad",
+    "diepte", "profondita", "profundidade", "altura", "hoogte", "altezza", "hoehe", "messhohe", "bed", "bottom",
+    "sohle", "grund", "fond", "lecho", "fondo", "bodem",
+}  # fmt: skip
+# Heights at one place differ by such a factor [-]; depths of the water that were read again do not.
+APART = 1.5
+
+
+@dataclass(frozen=True)
+class KnownExperiments:
+    """names: those that the rows of a file may have; site: the site file; key: where in it they stand; others: those
+    under its other key.
+    """
+
+    names: tuple[str, ...]
+    site: str
+    key: str
+    others: tuple[str, ...]
+
+    def refuse_unknown(self, file: str, rows: Sequence[int], names: Sequence[str]) -> None:
+        """InputError for the first of the names (rows,) that is not known, with the file and its row."""
+        for row, name in zip(rows, names, strict=True):
+            if name not in self.names:
+                raise InputError(f"{file}, row {row}: {self.remedy(name)}.")
+
+    def remedy(self, name: str) -> str:
+        """What is wrong with a name that is not known, and what to do."""
+        if not name:
+            return f"expected an experiment, one of {', '.join(self.names)}, got nothing; fill it in"
+        if name in self.others:
+            held = self.key == EXPERIMENTS
+            other, place = (HELD_OUT, "a file called `holdout`") if held else (EXPERIMENTS, "another file")
+            return f"experiment `{name}` is under `{other}` in {self.site}: put its rows into {place}, or take them out"
+        return f"experiment `{name}` is not in {self.site}: add it under `{self.key}`, or take its rows out"
 
 
 @dataclass(frozen=True)
 class StationTable:
-    """One table to be written: name of its file, columns, rows; the observations that name it; what is said of it."""
+    """One table to be written: name of its file, columns, rows; the observations that name it; what was taken."""
 
     file: str
     heading: tuple[str, ...]
-    rows: list[Row]
+    rows: list[list[str]]
     observations: tuple[Tree, ...]
-    said: str
+    taken: str
 
 
 @dataclass(frozen=True)
 class StationTables:
-    """The tables of one file; left_out: what they lack, how many of its rows are in none of them and why, in words."""
+    """The tables of one file; left_out: what they lack, and how many of its rows are in none of them and why."""
 
     tables: list[StationTable]
     left_out: tuple[str, ...]
 
     @property
-    def said(self) -> str:
+    def taken(self) -> str:
         """What was made of the rows."""
-        made = [table.said for table in self.tables] or ["no measurement, left out"]
+        made = [table.taken for table in self.tables] or ["no measurement, left out"]
         return ", ".join([*made, *self.left_out])
 
 
 def station_tables(
-    taken: MeasuredRows, stem: str, words: FileWords, known: KnownExperiments, place: Placement, file: str
+    taken: MeasuredRows, stem: str, options: FileOptions, known: KnownExperiments, place: Placement, file: str
 ) -> StationTables:
-    """The tables of what was taken from one file. Errors: InputError, which begins with `file`."""
+    """The tables of what was taken from one file. InputError, which begins with `file`."""
     at = [role for role in ("x", "y") if role in taken.numbers]
-    no_place = (*_lacking(taken, at, np.all), *_without_section(taken, words))
-    named = _named(taken, words, known.names, f"{file}:")
-    taken, shares = whole_discharges(named)
-    taken, once = levels_once(taken)
+    without_place = _lacking(taken, at, np.all)
+    names = taken.texts.get("section", ()) if options.section is None else ()
+    unnamed = sum(not name for name in names)
+    if 0 < unnamed < len(names):  # below a merged cell, say
+        lacking = "1 row lacks its name" if unnamed == 1 else f"{unnamed:,} rows lack their names"
+        without_place = (*without_place, f"sections told by x, as {lacking}")
+    named = _named(taken, options, known.names, f"{file}:")
+    taken, shares = _whole_discharges(named)
+    taken, once = _levels_once(taken)
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else ("y = 0 for want of a column",)
-    _refuse_unknown(taken, [kind.column for kind in kinds], words, known, file)
+    if options.experiment is not None and options.experiment not in known.names:
+        raise InputError(f"{file}: {known.remedy(options.experiment)}; or correct `experiment` of this file.")
+    if kinds and taken.lines:
+        measured = taken.only(np.any([np.isfinite(taken.numbers[kind.column]) for kind in kinds], axis=0))
+        known.refuse_unknown(file, measured.lines, measured.texts["experiment"])
     if _in_verticals(taken):
-        refuse_told_apart(named, _heights(named), file)
+        refuse_confounded_replicates(named, _heights(named), file)
         beside = tuple(f"{kind.words} beside points left out" for kind in kinds if not kind.velocity)
-        lacking = (*on_axis, *no_place, *_lacking(taken, ["u", str(vertical_role(taken))], np.all), *beside)
-        return StationTables([_points(taken, stem, words)], lacking)
-    refuse_lost_heights(taken, _places(taken), file)
-    refuse_told_apart(named, _places(named), file)
-    found = [_stations(taken, stem, words, kind, place) for kind in kinds]
-    no_value = _lacking(taken, [kind.column for kind in kinds], np.any)
-    left_out = (*on_axis, *no_place, *no_value, *shares, *once, *_at_one_height(taken))
+        lacking_points = _lacking(taken, ["u", str(vertical_role(taken))], np.all)
+        return StationTables([_points(taken, stem, options)], (*on_axis, *without_place, *lacking_points, *beside))
+    _refuse_lost_heights(taken, _places(taken), file)
+    refuse_confounded_replicates(named, _places(named), file)
+    found = [_stations(taken, stem, options, kind, place) for kind in kinds]
+    without_value = _lacking(taken, [kind.column for kind in kinds], np.any)
+    left_out = (*on_axis, *without_place, *without_value, *shares, *once, *_at_one_height(taken))
     return StationTables([table for table in found if table.rows], left_out)
 
 
-def _refuse_unknown(
-    taken: MeasuredRows, columns: Sequence[str], words: FileWords, known: KnownExperiments, file: str
-) -> None:
-    """Errors: InputError where a row that holds a value, or the entry of its file, names another experiment."""
-    if words.experiment is not None and words.experiment not in known.names:
-        raise InputError(f"{file}: {known.remedy(words.experiment)}; or correct `experiment` of this file.")
-    if columns and taken.lines:
-        measured = taken.only(np.any([np.isfinite(taken.numbers[column]) for column in columns], axis=0))
-        known.refuse_unknown(file, measured.lines, measured.texts["experiment"])
-
-
 def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[str, ...]:
-    """`2 rows left out for want of x or y`, where all or any of the roles are needed; nothing where no row is."""
+    """`2 rows left out for want of x or y`, if all or any of the roles are needed; nothing if no row is."""
     if not roles:
         return ()
     lacking = int((~needed([np.isfinite(taken.numbers[role]) for role in roles], axis=0)).sum())
     return (f"{so_many(lacking, 'row')} left out for want of {' or '.join(roles)}",) if lacking else ()
 
 
-def _without_section(taken: MeasuredRows, words: FileWords) -> tuple[str, ...]:
-    """That names of sections are not used, where some rows have none: below a merged cell, say."""
-    names = taken.texts.get("section", ()) if words.section is None else ()
-    unnamed = sum(not name for name in names)
-    lacking = "1 row lacks its name" if unnamed == 1 else f"{unnamed:,} rows lack their names"
-    return (f"sections told by x, as {lacking}",) if 0 < unnamed < len(names) else ()
-
-
-def _named(taken: MeasuredRows, words: FileWords, experiments: Sequence[str], where: str) -> MeasuredRows:
+def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str], where: str) -> MeasuredRows:
     """Every row with an experiment and a section, and with a place; rows without a place are left out."""
     place = [role for role in ("x", "y") if role in taken.numbers]
+    # Headings that hold the name of an experiment: `12 mei`, `level low`, `12 mei [m+NAP]`.
+    words = [name for one in experiments if (name := words_of(one))]
+    wide = [heading for heading in taken.others if any(f" {name} " in f" {words_of(heading)} " for name in words)]
+    written_long = (
+        f"{where} expected a row for each place and experiment, with the name of the experiment "
+        f"({', '.join(experiments)}) in one column and the value in another, got a column of values for each, "
+        f"{listed(wide) if wide else ''}; write them one below the other, levels of gauges in the columns gauge, x, y, "
+        "experiment and level."
+    )
     if "x" not in place:
-        headings = ", ".join([*taken.columns.values(), *taken.others])
+        headings = ", ".join(taken.headings)
         if any(map(is_in_degrees, taken.others)):
             raise InputError(f"{where} expected a column of x in metres, got places in {NO_DEGREES}")
         if [kind.column for kind in KINDS.values() if kind.column in taken.numbers] == ["discharge"]:
-            raise InputError(_discharge_of_no_place(where, headings, experiments))
-        if "level" not in taken.numbers and (wide := _side_by_side(taken, experiments)):
-            raise InputError(_written_long(where, experiments, wide))
+            raise InputError(
+                f"{where} expected a column of x beside the discharges, got none in {headings}; write the discharge of "
+                f"each experiment into the site file, `experiments: {{{experiments[0]}: {{discharge: 620 l/s, level: "
+                "...}}`, and move this file out of the folder; only discharges measured at sections have x, in a "
+                "column, or as `x: 12 m` of this file in `files`."
+            )
+        if "level" not in taken.numbers and wide:
+            raise InputError(written_long)
         raise InputError(
             f"{where} expected a column of x, got none in {headings}; name it by `columns: {{x: ...}}` of this file in "
             "`files` of the site file, or give there `x: 12 m` of all rows, `line` of a tape or `position` of a probe."
         )
     taken = taken.only(np.all([np.isfinite(taken.numbers[role]) for role in place], axis=0))
-    names = _experiments(taken, words, experiments, where)
-    sections = [words.section] * taken.size if words.section is not None else taken.texts.get("section")
+    if options.experiment is not None:
+        names = [options.experiment] * taken.size
+    elif "experiment" in taken.texts:
+        names = list(taken.texts["experiment"])
+    elif len(experiments) == 1:
+        names = [experiments[0]] * taken.size
+    elif wide:
+        raise InputError(written_long)
+    else:
+        file = where.removesuffix(":").rpartition("/")[2]
+        alike = ""  # an unread column of repeated words may hold the experiments by other names
+        for heading, texts in taken.others.items():
+            known = list(dict.fromkeys(text for text in texts if text))
+            if 1 < len(known) < len(texts) and numbers_of(texts) is None:
+                more = ["..."] if len(known) > OTHER_NAMES_SHOWN else []
+                shown = ", ".join([*known[:OTHER_NAMES_SHOWN], *more])
+                alike = f", but {heading!r} with {shown} (write the names of the site file there)"
+                break
+        raise InputError(
+            f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none{alike}; "
+            f"add one, or say in the site file, under `files`, `{file}: {{experiment: {experiments[0]}}}` of all rows."
+        )
+    sections = [options.section] * taken.size if options.section is not None else taken.texts.get("section")
     if sections is None or "" in sections:
         x, y = taken.numbers["x"], taken.numbers.get("y", np.zeros(taken.size))
         of_one_tape = "tape" in taken.columns and "tape" not in taken.numbers
-        sections = [section_at(x)] * taken.size if of_one_tape else sections_by_place(x, y)
+        sections = [_section_at(x)] * taken.size if of_one_tape else _sections_by_place(x, y)
     named = replace(taken, texts={**taken.texts, "experiment": names, "section": sections})
-    refuse_lost_places(named, where.removesuffix(":"))
+    _refuse_lost_places(named, where.removesuffix(":"))
     return named if "y" in place else named.having({"y": np.zeros(named.size)})
 
 
-def _experiments(taken: MeasuredRows, words: FileWords, experiments: Sequence[str], where: str) -> list[str]:
-    """The experiment of each row."""
-    if words.experiment is not None:
-        return [words.experiment] * taken.size
-    if "experiment" in taken.texts:
-        return list(taken.texts["experiment"])
-    if len(experiments) == 1:
-        return [experiments[0]] * taken.size
-    file = where.removesuffix(":").rpartition("/")[2]
-    if side_by_side := _side_by_side(taken, experiments):
-        raise InputError(_written_long(where, experiments, side_by_side))
-    raise InputError(
-        f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none{_alike(taken)}"
-        f"; add one, or say in the site file, under `files`, `{file}: {{experiment: {experiments[0]}}}` of all rows."
-    )
+def _section_at(x: Array) -> str:
+    """x12.50, the name of a section of stations at x (n,) [m]."""
+    return f"x{np.median(x):.2f}"
 
 
-def _side_by_side(taken: MeasuredRows, experiments: Sequence[str]) -> list[str]:
-    """Headings that hold the name of an experiment: `12 mei`, `level low`, `12 mei [m+NAP]`."""
-    names = [name for one in experiments if (name := words_of(one))]
-    return [heading for heading in taken.others if any(f" {name} " in f" {words_of(heading)} " for name in names)]
+def _sections_by_place(x: Array, y: Array) -> list[str]:
+    """x12.50 for each of the stations (n,) that stand together there, from their places x and y (n,) [m].
+
+    Sections begin where stations are further apart than SECTION_GAP; what reaches further along the channel than across
+    it is no section, and stands as it is.
+    """
+
+    def groups_along(gap: float) -> NDArray[np.int_]:
+        """A number for each station (n,), the same as long as no gap along the channel is wider [m]."""
+        order = np.argsort(x, kind="stable")
+        group = np.zeros(x.size, dtype=int)
+        group[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > gap)])
+        return group
+
+    places = np.unique(np.round(np.column_stack([x, y]), 3), axis=0)
+    # Equal x of many places are sections as they are, however near; scattered ones are joined.
+    scattered = np.unique(places[:, 0]).size > ON_LINES * len(places)
+    apart, group = groups_along(ONE_PLACE), groups_along(SECTION_GAP if scattered else ONE_PLACE)
+    for one in np.unique(group):
+        here = group == one
+        if np.ptp(x[here]) > np.ptp(y[here]):
+            group[here] = x.size + apart[here]
+    names = {number: _section_at(x[group == number]) for number in np.unique(group)}
+    return [names[number] for number in group]
 
 
-def _written_long(where: str, experiments: Sequence[str], side_by_side: Sequence[str]) -> str:
-    return (
-        f"{where} expected a row for each place and experiment, with the name of the experiment ("
-        f"{', '.join(experiments)}) in one column and the value in another, got a column of values for each, "
-        f"{listed(side_by_side)}; write them one below the other, levels of gauges in the columns gauge, x, y, "
-        "experiment and level."
-    )
+def _refuse_lost_places(taken: MeasuredRows, file: str) -> None:
+    """InputError if velocities of one x differ by a length without a role: they are no repeats on the axis.
 
-
-def _discharge_of_no_place(where: str, headings: str, experiments: Sequence[str]) -> str:
-    return (
-        f"{where} expected a column of x beside the discharges, got none in {headings}; write the discharge of each "
-        f"experiment into the site file, `experiments: {{{experiments[0]}: {{discharge: 620 l/s, level: ...}}}}`, and "
-        "move this file out of the folder; only discharges measured at sections have x, in a column, or as `x: 12 m` "
-        "of this file in `files`."
-    )
-
-
-def _alike(taken: MeasuredRows) -> str:
-    """What an unread column of repeated words holds, which may be experiments by other names; else nothing."""
+    Lengths are readings along a tape, depths of a stated unit, and columns without a role headed by a unit of length
+    or, as `y/B`, by y. What differs by no length, such as the time, may be repeats.
+    """
+    if "y" in taken.numbers or not taken.numbers.keys() & set(VELOCITIES):
+        return
+    lengths = {taken.columns["tape"]: taken.numbers["tape"]} if "tape" in taken.numbers else {}
+    depth = taken.columns.get("depth", "")
+    lengths |= {depth: taken.numbers["depth"]} if unit_stated(depth, "length") else {}
     for heading, texts in taken.others.items():
-        names = list(dict.fromkeys(text for text in texts if text))
-        if 1 < len(names) < len(texts) and numbers_of(texts) is None:
-            shown = ", ".join([*names[:OTHER_NAMES_SHOWN], *(["..."] if len(names) > OTHER_NAMES_SHOWN else [])])
-            return f", but {heading!r} with {shown} (write the names of the site file there)"
-    return ""
+        if unit_stated(heading, "length") or "y" in words_of(heading).split():
+            lengths |= {heading: numbers} if (numbers := numbers_of(texts)) is not None else {}
+    for heading, values in lengths.items():
+        seen: dict[tuple[str, str, float], float] = {}
+        places = zip(taken.texts["experiment"], taken.texts["section"], taken.numbers["x"].tolist(), strict=True)
+        for place, length in zip(places, values.tolist(), strict=True):
+            if np.isfinite(length) and seen.setdefault(place, length) != length:
+                raise InputError(
+                    f"{file}: expected where across the channel each velocity was measured, got no column of y, and "
+                    f"velocities at x = {place[2]:g} m that differ in {heading!r}; name it by "
+                    "`columns: {y: ...}` of this file in `files` of the site file, with `flip: y` and `zero: [0, 2.5]` "
+                    "where it counts from a left bank 2.5 m off the axis (or by `height` or `z`, if it is one), or "
+                    "take it out where they are repeats at one place."
+                )
+
+
+def _refuse_lost_heights(taken: MeasuredRows, places: Sequence[Hashable], file: str) -> None:
+    """InputError if velocities of one place differ in a depth or a height without a role: they are no repeats.
+
+    places (rows,): what is one if they are equal.
+    """
+    if "u" not in taken.numbers:
+        return
+    unread = {taken.columns[role]: taken.numbers[role] for role in ("below", "depth") if role in taken.numbers}
+    for heading, texts in taken.others.items():
+        if HEIGHT_WORDS & set(words_of(heading).split()):
+            unread |= {heading: numbers} if (numbers := numbers_of(texts)) is not None else {}
+    for heading, heights in unread.items():
+        seen: dict[Hashable, float] = {}
+        for place, height, u in zip(places, np.abs(heights).tolist(), taken.numbers["u"].tolist(), strict=True):
+            if not np.isfinite([height, u]).all():
+                continue
+            low, high = sorted((seen.setdefault(place, height), height))
+            if high > APART * low:
+                raise InputError(
+                    f"{file}: expected how high above the bed each velocity was measured, got several at one place "
+                    f"that differ in {heading!r}; name it in `columns` of this file in `files` of the site file, as "
+                    "`z` (a level), `height` (above the bed) or `below` (the surface, beside `depth` of the water), "
+                    "or take it out where they are repeats."
+                )
+
+
+def _rows_of_sections(taken: MeasuredRows, role: str) -> list[list[int]]:
+    """The rows with a number of that role of each section of each experiment."""
+    rows: dict[tuple[str, str], list[int]] = {}
+    for row in np.flatnonzero(np.isfinite(taken.numbers[role])).tolist():
+        rows.setdefault((taken.texts["experiment"][row], taken.texts["section"][row]), []).append(row)
+    return list(rows.values())
+
+
+def _whole_discharges(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ...]]:
+    """The rows with the discharge of a section once, without shares of it by verticals, and a note on these.
+
+    Several values at one y are repeats, and stay.
+    """
+    if not {"y", "discharge"} <= taken.numbers.keys():
+        return taken, ()
+    found = taken.numbers["discharge"].copy()
+    shares = 0
+    for rows in _rows_of_sections(taken, "discharge"):
+        if np.ptp(taken.numbers["y"][rows]) == 0.0:
+            continue
+        values = found[rows]
+        alike = np.allclose(values, values[0], rtol=COPIED, atol=0.0)
+        found[rows[1:] if alike else rows] = np.nan
+        shares += 0 if alike else len(rows)
+    note = f"{so_many(shares, 'discharge')} left out, as those of one section differ: shares of its verticals"
+    return taken.having({"discharge": found}), (note,) if shares else ()
+
+
+def _levels_once(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ...]]:
+    """The rows with a level that all verticals of a section repeat once, and a note on it.
+
+    Gauges on both banks are two readings, even if they agree.
+    """
+    if not {"y", "level"} <= taken.numbers.keys() or not taken.numbers.keys() & set(VELOCITIES):
+        return taken, ()
+    found, across = taken.numbers["level"].copy(), taken.numbers["y"]
+    sections = [rows for rows in _rows_of_sections(taken, "level") if len(set(across[rows])) > 2]
+    repeated = [rows for rows in sections if np.ptp(found[rows]) == 0.0]
+    for rows in repeated:
+        found[rows[1:]] = np.nan
+    note = f"levels of {so_many(len(repeated), 'section')} once, as all rows repeat them"
+    return taken.having({"level": found}), (note,) if repeated else ()
 
 
 def _in_verticals(taken: MeasuredRows) -> bool:
@@ -211,7 +361,7 @@ def _in_verticals(taken: MeasuredRows) -> bool:
 
 
 def _at_one_height(taken: MeasuredRows) -> tuple[str, ...]:
-    """That heights of velocities are not used, where few places have several; and what that asks of them."""
+    """That heights of velocities are not used, as few places have several, and what that asks of them."""
     role = vertical_role(taken)
     if role is None or "u" not in taken.numbers or not np.isfinite(taken.numbers[role]).any():
         return ()
@@ -233,42 +383,16 @@ def _heights(taken: MeasuredRows) -> list[tuple[object, ...]]:
     return [(*place, height) for place, height in zip(_places(taken), z, strict=True)]
 
 
-def _points(taken: MeasuredRows, stem: str, words: FileWords) -> StationTable:
-    """Points in the vertical; a section is a case of the file, at the middle of its x."""
-    kept, said = _at_their_heights(taken, words)
-    optional = _beside_u(kept, words)
-    names = [
-        f"{experiment}/{section}"
-        for experiment, section in zip(kept.texts["experiment"], kept.texts["section"], strict=True)
-    ]
-    devices = kept.texts.get("device", ["ADV"] * kept.size)
-    upward = str(vertical_role(kept))
-    places = [kept.numbers[role] for role in ("x", "y", upward)]
-    columns = [
-        *(map(_place, one) for one in places),
-        *(map(_value, one) for one in (kept.numbers["u"], *optional.values())),
-    ]
-    rows = [
-        [name, device or "ADV", *texts]
-        for name, device, texts in zip(names, devices, zip(*columns, strict=True), strict=True)
-    ]
-    v = optional.get("v", np.full(kept.size, np.nan))
-    across = {name for name, value in zip(names, v.tolist(), strict=True) if np.isfinite(value)}
-    observations = tuple(
-        _section_observation(f"{stem}.csv", name, words, name in across) for name in dict.fromkeys(names)
-    )
-    heading = ("case", "device", "x", "y", upward, "u", *optional)
-    return StationTable(
-        f"{stem}.csv",
-        heading,
-        rows,
-        observations,
-        f"{len(rows)} points of {so_many(len(observations), 'section')}{said}",
-    )
+def errors_of_rows(taken: MeasuredRows, kind: Kind, options: FileOptions) -> Array:
+    """Standard errors (rows,): of their column, else the one of the site file; NaN if neither has one, or 0."""
+    stated = np.full(taken.size, options.standard_error.get(kind.unit, np.nan))
+    column = taken.numbers.get(kind.error_column, stated)
+    errors = np.where(np.isfinite(column) & (column != 0.0), column, stated)
+    return np.where(errors == 0.0, np.nan, errors)
 
 
-def _at_their_heights(taken: MeasuredRows, words: FileWords) -> tuple[MeasuredRows, str]:
-    """The points with their sections at the middle of their x, each height of a place once, and what is said of it."""
+def _points(taken: MeasuredRows, stem: str, options: FileOptions) -> StationTable:
+    """Points in the vertical; a section is a case of the file, at the middle of its x, each height of a place once."""
     upward = str(vertical_role(taken))
     kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers[upward]))
     sections = list(zip(kept.texts["experiment"], kept.texts["section"], strict=True))
@@ -278,50 +402,45 @@ def _at_their_heights(taken: MeasuredRows, words: FileWords) -> tuple[MeasuredRo
         x[here] = np.median(x[here])
     moved = float(np.abs(x - kept.numbers["x"]).max(initial=0.0))
     kept = kept.having({"x": x})
-    kept, said = without_repeats(kept, _heights(kept), errors_of_rows(kept, KINDS[STREAMWISE], words))
-    return kept, f"{said}, moved to the middle x of their section by up to {moved:.2g} m" if moved > NEAR_LINE else said
-
-
-def _beside_u(points: MeasuredRows, words: FileWords) -> dict[str, Array]:
-    """What else is known of points: v and w where any has it, standard errors with 0 for unknown, and what all have."""
-    numbers = points.numbers
-    found = {role: numbers[role] for role in ("v", "w") if role in numbers and np.isfinite(numbers[role]).any()}
-    errors = np.nan_to_num(errors_of_rows(points, KINDS[STREAMWISE], words))
-    found |= {"u_se": errors} if errors.any() else {}
-    return found | {
+    kept, note = without_repeats(kept, _heights(kept), errors_of_rows(kept, KINDS[STREAMWISE], options))
+    note += f", moved to the middle x of their section by up to {moved:.2g} m" if moved > NEAR_LINE else ""
+    # Beside u: v and w if any has it, standard errors with 0 for unknown, and what all have.
+    numbers = kept.numbers
+    optional = {role: numbers[role] for role in ("v", "w") if role in numbers and np.isfinite(numbers[role]).any()}
+    errors = np.nan_to_num(errors_of_rows(kept, KINDS[STREAMWISE], options))
+    optional |= {"u_se": errors} if errors.any() else {}
+    optional |= {
         role: numbers[role] for role in ("u_std", "duration_s") if role in numbers and np.isfinite(numbers[role]).all()
     }
+    names = [f"{one}/{other}" for one, other in zip(kept.texts["experiment"], kept.texts["section"], strict=True)]
+    devices = kept.texts.get("device", ["ADV"] * kept.size)
+    places = [map(_place, numbers[role]) for role in ("x", "y", upward)]
+    values = [map(_value, one) for one in (numbers["u"], *optional.values())]
+    rows = [
+        [name, device or "ADV", *texts]
+        for name, device, texts in zip(names, devices, zip(*places, *values, strict=True), strict=True)
+    ]
+    v = optional.get("v", np.full(kept.size, np.nan))
+    across = {name for name, value in zip(names, v.tolist(), strict=True) if np.isfinite(value)}
+    file = f"{stem}.csv"
+    levels = {key: level for key in ("floor", "surface") if (level := getattr(options, key)) is not None}
+    observations = []
+    for name in dict.fromkeys(names):
+        experiment, section = name.split("/", 1)
+        tree = {"kind": "adv", "file": file, "experiment": experiment, "section": section, "case": name}
+        observations.append({**tree, "average": "profile", **levels, **({"across": True} if name in across else {})})
+    heading = ("case", "device", "x", "y", upward, "u", *optional)
+    points = f"{len(rows)} points of {so_many(len(observations), 'section')}{note}"
+    return StationTable(file, heading, rows, tuple(observations), points)
 
 
-def errors_of_rows(taken: MeasuredRows, kind: Kind, words: FileWords) -> Array:
-    """Standard errors (rows,): of their column, else the one of the site file; NaN where neither says one, or 0."""
-    stated = np.full(taken.size, words.standard_error.get(kind.unit, np.nan))
-    column = taken.numbers.get(kind.error_column, stated)
-    errors = np.where(np.isfinite(column) & (column != 0.0), column, stated)
-    return np.where(errors == 0.0, np.nan, errors)
-
-
-def _section_observation(file: str, name: str, words: FileWords, across: bool) -> Tree:
-    experiment, section = name.split("/", 1)
-    levels = {key: value for key, value in (("floor", words.floor), ("surface", words.surface)) if value is not None}
-    tree = {
-        "kind": "adv",
-        "file": file,
-        "experiment": experiment,
-        "section": section,
-        "case": name,
-        "average": "profile",
-    }
-    return tree | levels | ({"across": True} if across else {})
-
-
-def _stations(taken: MeasuredRows, stem: str, words: FileWords, kind: Kind, channel: Placement) -> StationTable:
-    """Stations of one kind; values at one place are averaged, and their scatter gives errors where none is stated.
+def _stations(taken: MeasuredRows, stem: str, options: FileOptions, kind: Kind, channel: Placement) -> StationTable:
+    """Stations of one kind; values at one place are averaged, and their scatter gives errors if none is stated.
 
     What was measured at a point stands on the map of its centreline, as a case reads it.
     """
     kept = taken.only(np.isfinite(taken.numbers[kind.column]))
-    errors = errors_of_rows(kept, kind, words)
+    errors = errors_of_rows(kept, kind, options)
     gathered: dict[PlaceKey, list[RepeatedValue]] = {}
     for place, value, error in zip(_places(kept), kept.numbers[kind.column].tolist(), errors.tolist(), strict=True):
         gathered.setdefault(place, []).append((value, error))
@@ -332,9 +451,9 @@ def _stations(taken: MeasuredRows, stem: str, words: FileWords, kind: Kind, chan
         for place, mean, *at in zip(gathered, means_of_repeats(gathered), x.tolist(), y.tolist(), strict=True)
     ]
     file = f"{stem}-{kind.name}.csv"
-    said = f"{len(rows)} of {kind.words}{said_of_repeats(gathered)}"
     heading = ("experiment", "section", "x", "y", kind.column, kind.error_column)
-    return StationTable(file, heading, rows, (observed(kind.name, file),), said)
+    taken_in_words = f"{len(rows)} of {kind.words}{note_on_repeats(gathered)}"
+    return StationTable(file, heading, rows, (observed(kind.name, file),), taken_in_words)
 
 
 def _place(length: float) -> str:

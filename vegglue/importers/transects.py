@@ -1,6 +1,6 @@
 """A boat's transect as stations: profiles averaged over the depth, and along the section."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.file_words import FileWords
+from vegglue.importers.file_options import FileOptions
 from vegglue.importers.measured_rows import MeasuredRows
 
 # Exponent of the profile by which measured cells are carried on to bed and surface, the one of the maker's programs.
 PROFILE_POWER = 1.0 / 6.0
-# Stations along a section, and the fewest ensembles whose scatter says how well a station is known.
+# Stations along a section, and the fewest ensembles whose scatter shows how well a station is known.
 STATIONS, FEWEST_ENSEMBLES = 15, 4
 LEAST_ERROR_OF_MEAN = 0.005  # m/s; the boat's own velocity is known no better
 
@@ -30,30 +30,29 @@ class BoatProfile:
     velocity: Array
 
 
-def stations_of_transect(path: Path, words: FileWords, profiles: Iterable[BoatProfile], form: str) -> MeasuredRows:
+def stations_of_transect(path: Path, options: FileOptions, profiles: Sequence[BoatProfile], form: str) -> MeasuredRows:
     """Stations along the straight line that fits the transect, each the mean of the ensembles around it.
 
-    `start` of the file, in the coordinates of the site, is where the boat started. Errors: InputError naming the file.
+    `start` of the file, in the coordinates of the site, is where the boat started. InputError.
     """
-    if words.start is None:
+    if options.start is None:
         raise InputError(
             f"{shown_path(path)}: expected where the boat started, `start: [x, y]`, as the file counts from there; "
             "add it to this file in `files`."
         )
-    ensembles = list(profiles)
-    means = [(one, *depth_mean(one)) for one in ensembles if one.depth > 0.0 and one.height.size]
-    if len(means) < FEWEST_ENSEMBLES:
-        raise InputError(f"{shown_path(path)}: expected ensembles with velocities, got {len(means)}; export it anew.")
-    places = np.array([one.place for one, *_ in means]) + np.array(words.start)
-    velocities = np.array([velocity for _, *velocity in means])
+    used = [one for one in profiles if one.depth > 0.0 and one.height.size]
+    if len(used) < FEWEST_ENSEMBLES:
+        raise InputError(f"{shown_path(path)}: expected ensembles with velocities, got {len(used)}; export it anew.")
+    places = np.array([one.place for one in used]) + np.array(options.start)
+    velocities = np.array([depth_mean(one) for one in used])
     x, y, mean, error = _along_the_section(places, velocities)
     numbers = {"x": x, "y": y, "east_velocity": mean[:, 0], "north_velocity": mean[:, 1]}
     numbers |= {"u_se": error[:, 0], "v_se": error[:, 1]}
-    dropped = len(ensembles) - len(means)
-    said = (f"{form}, {len(means)} ensembles" + (f", {dropped} without velocities left out" if dropped else ""),)
+    dropped = len(profiles) - len(used)
+    note = f"{form}, {len(used)} ensembles" + (f", {dropped} without velocities left out" if dropped else "")
     columns = {"x": "distance east", "y": "distance north", "east_velocity": "east", "north_velocity": "north"}
     units = dict.fromkeys(columns, "m") | {"east_velocity": "m/s", "north_velocity": "m/s"}
-    return MeasuredRows(numbers, {}, columns, units, said)
+    return MeasuredRows(numbers, {}, columns, units, (note,))
 
 
 def depth_mean(ensemble: BoatProfile) -> tuple[float, float]:

@@ -18,10 +18,16 @@ from vegglue.case.text_files import write_text
 from vegglue.diagnosis.channel_and_plants import remarks_on_unnamed_banks
 from vegglue.diagnosis.ensemble_and_priors import refused_for_errors
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.confluence import NOT_STATED, case_from_confluence, flat_bed, holds_confluence
-from vegglue.importers.confluence_mat import mat_folder, tables_of_mat
+from vegglue.importers.confluence import (
+    NOT_STATED,
+    case_from_confluence,
+    flat_bed,
+    holds_confluence,
+    mat_folder,
+    tables_of_mat,
+)
 from vegglue.importers.field_folder import case_from_folder
-from vegglue.importers.site_file import left_open, site_file
+from vegglue.importers.site_file import assumptions_of_site, site_file
 from vegglue.measurements.observations import read_observations
 
 ANOTHER_FILE = "give another file by --to"
@@ -60,7 +66,7 @@ def assumptions_of(folder: Path | str) -> list[str]:
     """What `import` assumes of a folder because nobody said it, and what it does not read."""
     folder = Path(folder)
     if site_file(folder).is_file():
-        return left_open(folder)
+        return assumptions_of_site(folder)
     return list(NOT_STATED) if holds_confluence(folder) or mat_folder(folder) is not None else []
 
 

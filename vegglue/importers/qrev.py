@@ -1,0 +1,105 @@
+"""Measurements that QRev saved: ADCP transects in *_QRev.mat, and the discharge in *_QRev.xml.
+
+Formats: what QRev of the U.S. Geological Survey writes. MATLAB (Python2Matlab of its published source):
+`meas_struct.transects` holds for each transect velocities east and north over ground (wVel, cells by ensembles; what is
+no measurement, but was filled up, is not valid), depths of the bed and of the cells, the boat and durations, in SI.
+XML: ChannelSummary with Discharge/Total and its unit, and Uncertainty/Total, that of 95 % in percent.
+"""
+
+import re
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import si_factor
+from vegglue.importers.file_options import FileOptions
+from vegglue.importers.library_files import numbers_of_variable, readable_text, reading_structures
+from vegglue.importers.measured_rows import MeasuredRows
+from vegglue.importers.transects import BoatProfile, stations_of_transect
+from vegglue.wording.numbers import so_many
+
+QREV_VARIABLE = "meas_struct"  # of such a file
+STANDARD_ERRORS = 2.0  # in an uncertainty of 95 %, as QRev has it
+DECLARED = re.compile(r"^\s*<\?xml[^>]*\?>")  # the bytes are decoded already
+ENTITIES = re.compile(r"<!(DOCTYPE|ENTITY)")  # QRev writes none, and some unpack to more than the memory
+
+
+def stations_of_qrev(path: Path, parts: dict[str, Any], options: FileOptions) -> MeasuredRows:
+    """Stations of all transects together that QRev used for the discharge. InputError."""
+    with reading_structures(path, "the transects of a measurement saved by QRev", "save it anew in QRev"):
+        used = [one for one in np.atleast_1d(parts[QREV_VARIABLE].transects) if bool(one.checked)]
+        profiles = [profile for one in used for profile in _profiles(path, one, str(used[0].startEdge))]
+    return stations_of_transect(path, options, profiles, f"QRev, {so_many(len(used), 'transect')}")
+
+
+def _profiles(path: Path, transect: Any, first_bank: str) -> list[BoatProfile]:
+    """One profile for each ensemble within a transect.
+
+    x_i = x_(i-1) + u_i dt_i east and north [m], as QRev sums it up; places count from the end of the transect at
+    `first_bank`, where the boat of the first transect started.
+    """
+    bed, water = getattr(transect.depths, str(transect.depths.selected)), transect.wVel
+    if str(water.coordSys) != "Earth":
+        raise InputError(
+            f"{shown_path(path)}: expected velocities in earth coordinates, got them in {water.coordSys}; choose a "
+            "navigation reference in QRev, and save it again."
+        )
+    inside = np.atleast_1d(transect.inTransectIdx).astype(int) - 1
+    boat = getattr(transect.boatVel, str(transect.boatVel.selected))
+    steps = numbers_of_variable(transect.dateTime.ensDuration_sec)
+    moved = (numbers_of_variable(one) * steps for one in (boat.uProcessed_mps, boat.vProcessed_mps))
+    places = np.column_stack([np.nancumsum(one) for one in moved])[inside]
+    places = places - (places[0] if str(transect.startEdge) == first_bank else places[-1])
+    depth = numbers_of_variable(bed.depthProcessed_m)[inside]
+    below, east, north = (
+        np.atleast_2d(numbers_of_variable(one))[:, inside]
+        for one in (bed.depthCellDepth_m, water.uProcessed_mps, water.vProcessed_mps)
+    )
+    good = np.atleast_2d(np.asarray(water.validData)[..., 0].astype(bool))[:, inside]
+    good = good & np.isfinite(east) & np.isfinite(north) & (below < depth)
+    found = []
+    for i, (x, y) in enumerate(places.tolist()):
+        velocity = np.column_stack([east[good[:, i], i], north[good[:, i], i]])
+        deep = float(np.nan_to_num(depth[i]))  # 0 if no beam found the bed: such an ensemble is left out
+        found.append(BoatProfile((x, y), deep, deep - below[good[:, i], i], velocity))
+    return found
+
+
+def is_qrev_summary(text: str) -> bool:
+    """Whether a text is a summary of QRev."""
+    return "<Channel QRev" in text[:500]
+
+
+def read_qrev_summary(path: Path, options: FileOptions) -> MeasuredRows:
+    """The discharge of all transects and its standard error, at `start`. InputError."""
+    if options.start is None:
+        raise InputError(
+            f"{shown_path(path)}: expected where the boat started, `start: [x, y]`, which no summary holds; add it to "
+            "this file in `files`."
+        )
+    text = readable_text(path)
+    try:
+        if ENTITIES.search(text):
+            raise ValueError("definitions of entities")
+        summary = ElementTree.fromstring(DECLARED.sub("", text))
+        total = summary.find("ChannelSummary/Discharge/Total")
+        if total is None:
+            raise ValueError("none")
+        unit = total.get("unitsCode", "cms")
+        discharge = float(total.text or "")
+        share = float(summary.findtext("ChannelSummary/Uncertainty/Total") or "nan") / 100.0
+    except (ElementTree.ParseError, ValueError) as error:
+        raise InputError(
+            f"{shown_path(path)}: expected ChannelSummary/Discharge/Total of a summary by QRev, got {error}; save it "
+            "anew in QRev."
+        ) from None
+    discharge *= si_factor(unit, "discharge", shown_path(path))
+    standard_error = abs(discharge) * share / STANDARD_ERRORS
+    x, y = options.start
+    numbers = {"x": x, "y": y, "discharge": discharge, "discharge_se": standard_error}
+    columns, units = {"discharge": "ChannelSummary/Discharge/Total"}, {"discharge": unit}
+    note = (f"QRev summary, standard error {standard_error:.2g} m3/s",)
+    return MeasuredRows({role: np.array([one]) for role, one in numbers.items()}, {}, columns, units, note)

@@ -1,0 +1,351 @@
+"""The one parser of tables: text with any separator, a decimal comma, comments, a title, a row of units; or XLSX."""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from datetime import datetime
+from itertools import groupby
+from math import gcd
+from pathlib import Path
+from zipfile import ZipFile
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import is_unit, role_of
+from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_larger
+from vegglue.wording.numbers import listed, so_many
+
+WORKBOOKS = (".xlsx", ".xlsm")
+COMMENTS = ("#", "%", "//", "!", "$")
+# In the order of trust: a comma may also be decimal, and a space stand in a name.
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
+# Lines from the end of a file that decide on its separator: titles stand at its head.
+LOOKED_AT = 200
+# Share of the lines [-] by which a separator further back in that order has to cut more of them to be taken.
+MORE_LINES_CUT = 0.2
+# `U [m/s]` in a heading parted by spaces is one field; in a row of units none has a name before it.
+UNIT_BEHIND_NAME = re.compile(r"(?<=[^\s\])])\s+([\[(][^\s\[\]()]+[\])])")
+BYTES_OF_CELL = 8  # bytes that a cell of a workbook takes at least, empty or not
+# Equal rows may be repeats that agree in the few digits of a table: four pairs in ten do where their scatter is 0.7 of
+# the last digit. Those of five places then all agree in one table of a hundred, of ten in a row in one of ten thousand.
+FEWEST_ROWS, FEWEST_IN_A_ROW = 5, 10
+NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?")
+# Thousands apart by one sign, decimals by another, which is thereby known: 1.236,00 and 1,236.00 and 1 236,00.
+GROUPED = re.compile(r"[-+]?\d{1,3}(?P<apart>[.,'’\s])\d{3}((?P=apart)\d{3})*(?!(?P=apart))(?P<decimal>[.,])\d*")
+# The minus of mathematics, hyphens and dashes that word processors write.
+DASHES = str.maketrans(dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d", "-"))
+MISSING_WORDS = (
+    "", "-", "--", "---", "nan", "na", "n/a", "n.a.", "n.d.", "k.a.", "k. a.", "null", "none", "nodata", "no data",
+    "missing", "inf", "-inf", "+inf", "nd", "s/d",
+)  # fmt: skip
+# What a workbook shows for a formula without a value, in any language: #DIV/0!, #N/A, #WERT!, #NOMBRE?
+OF_FORMULA = re.compile(r"#[^\W_]+(/[^\W_]+)?[!?]?")
+Line = tuple[int, list[str]]  # number in the file, from 1, and fields
+
+
+def is_number(text: str) -> bool:
+    """Whether a field is a number, however it is written."""
+    plain = text.strip().translate(DASHES)
+    return NUMBER.fullmatch(plain) is not None or GROUPED.fullmatch(plain) is not None
+
+
+def number_in(text: str, decimal_comma: bool) -> float | None:
+    """A field as a number; None for a mark of no value. Errors: ValueError, with what to do."""
+    plain = text.strip().translate(DASHES)
+    if plain.lower() in MISSING_WORDS or OF_FORMULA.fullmatch(plain):
+        return None
+    sign = "," if decimal_comma else "."
+    if (written := _decimal_sign(plain)) and written != sign:
+        raise ValueError(f"write it with a decimal {'comma' if decimal_comma else 'point'}, as most numbers here")
+    if GROUPED.fullmatch(plain):
+        plain = re.sub(rf"[^-+\d{sign}]", "", plain)
+    try:
+        return float(re.sub("[dD]", "e", plain.replace(",", ".")))
+    except ValueError:
+        raise ValueError("mend or remove the row") from None
+
+
+def has_decimal_comma(fields: Iterable[str]) -> bool:
+    """Whether more of these numbers are written with a decimal comma than with a point."""
+    signs = [sign for field in fields if (sign := _decimal_sign(field.strip().translate(DASHES)))]
+    return signs.count(",") > signs.count(".")
+
+
+def _decimal_sign(plain: str) -> str:
+    """The sign before the decimals of a number, '' if there is none."""
+    if (grouped := GROUPED.fullmatch(plain)) is not None:
+        return grouped["decimal"]
+    return next((sign for sign in ",." if sign in plain), "") if NUMBER.fullmatch(plain) else ""
+
+
+def numbers_of(texts: Sequence[str]) -> Array | None:
+    """A column of numbers, NaN for none; None for a column that has words."""
+    if not all(is_number(text) for text in texts if text.strip()):
+        return None
+    values = (number_in(text, decimal_comma="," in text) for text in texts)
+    return np.array([np.nan if value is None else value for value in values])
+
+
+@dataclass(frozen=True)
+class ParsedTable:
+    """Headings (columns,), units (columns,) with '' if none is stated, rows of texts (rows, columns) and the number of
+    each in the file (rows,). decimal_comma: whether numbers have one; form: how the table was read.
+    """
+
+    headings: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: tuple[Sequence[str], ...]
+    row_numbers: tuple[int, ...]
+    decimal_comma: bool
+    form: str
+
+    def texts(self, column: int) -> list[str]:
+        """The fields of a column (rows,)."""
+        return [row[column] for row in self.rows]
+
+    def numbers(self, path: Path, column: int) -> Array:
+        """A column as numbers (rows,), NaN for none. InputError, which names file, row and column."""
+        values = np.full(len(self.rows), np.nan)
+        for i, text in enumerate(self.texts(column)):
+            try:
+                number = number_in(text, self.decimal_comma)
+            except ValueError as error:
+                again = (
+                    "the heading stands there again: put what is said above each block, such as its place, in a column"
+                )
+                raise InputError(
+                    f"{shown_path(path)}, row {self.row_numbers[i]}: expected a number in column "
+                    f"{self.headings[column]}, got {text!r}; {again if text == self.headings[column] else error}."
+                ) from None
+            values[i] = np.nan if number is None else number
+        return values
+
+    def without(self, left_out: set[int], why: str) -> "ParsedTable":
+        """The table without the rows at some places, and why, in its form."""
+        kept = [place for place in range(len(self.rows)) if place not in left_out]
+        return replace(
+            self,
+            rows=tuple(self.rows[place] for place in kept),
+            row_numbers=tuple(self.row_numbers[place] for place in kept),
+            form=f"{self.form}, {why}",
+        )
+
+
+def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
+    """The table of numbers in a text file or a workbook.
+
+    Parameters
+    ----------
+    path
+        The file; a workbook by its ending.
+    sheet
+        That of a workbook; its first one if not given.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or holds no table of numbers with two columns or more.
+    """
+    if path.suffix.lower() in WORKBOOKS:
+        fields, form = _lines_of_sheet(path, sheet)
+        return _table(path, fields, form, "", False)
+    there = [(number, text) for number, text in enumerate(readable_text(path).splitlines(), 1) if text.strip(" \t;,")]
+    lines = [(number, text) for number, text in there if not text.lstrip().startswith(COMMENTS)]
+    comments = len(there) - len(lines)
+    separator = _separator([text for _, text in lines])
+    fields = [(number, _fields(text, separator)) for number, text in lines]
+    comma = separator != "," and has_decimal_comma(field for _, row in fields for field in row)
+    words = [SEPARATORS[separator], *(["decimal comma"] if comma else [])]
+    words += [so_many(comments, "comment line")] if comments else []
+    return _table(path, fields, ", ".join(words), separator, comma)
+
+
+def _separator(lines: Sequence[str]) -> str:
+    """The separator that cuts most lines into equally many fields, two or more; titles are not cut.
+
+    A row of numbers is cut amiss if most of its fields are none any more: `155020,7;463045,2` by its commas.
+    """
+
+    def is_cut_well(fields: Sequence[str]) -> bool:
+        """Half of the fields are numbers, marks for none or words behind them, and not half of them several numbers."""
+        values = [field if is_number(field) or field.lower() not in MISSING_WORDS else "0" for field in fields]
+        several = [field for field in fields if " " in field and not is_number(field)]
+        joined = sum(all(map(is_number, field.split())) for field in several)
+        return any(map(is_number, fields)) and _is_half_numbers(values) and joined * 2 < len(fields)
+
+    found, best = " ", 0.0
+    cut = {one: [_without_empty_end(_fields(line, one)) for line in lines[-LOOKED_AT:]] for one in SEPARATORS}
+    well = {one: [is_cut_well(fields) for fields in rows] for one, rows in cut.items()}
+    of_words = [not any(one) for one in zip(*well.values(), strict=True)]
+    for separator, rows in cut.items():
+        sound = [one or words for one, words in zip(well[separator], of_words, strict=True)]
+        counts = Counter(len(fields) for fields, kept in zip(rows, sound, strict=True) if kept and len(fields) > 1)
+        share = max(counts.values(), default=0) / len(rows) if rows else 0.0
+        if share > best + MORE_LINES_CUT:
+            found, best = separator, share
+    return found
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return UNIT_BEHIND_NAME.sub(lambda found: found[1] if is_unit(found[1]) else found[0], line).split()
+    return [field.strip() for field in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+
+
+def _without_empty_end(fields: list[str]) -> list[str]:
+    """The fields without empty ones behind them: lines may end in separators."""
+    return fields[: next((place for place in range(len(fields), 1, -1) if fields[place - 1]), 1)]
+
+
+def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_comma: bool) -> ParsedTable:
+    """The longest stretch of rows of numbers, with the heading and the units above it."""
+    lines = [(number, _without_empty_end(fields)) for number, fields in whole]
+    numeric = _rows_of_numbers(lines, separator)
+    if not any(numeric):
+        raise InputError(
+            f"{shown_path(path)}: expected a table of numbers, got none; check the file, or move it out of the folder "
+            "if it holds no measurements."
+        )
+    width = _usual_width(lines, numeric)
+    first = next(i for i, (_, fields) in enumerate(lines) if numeric[i] and len(fields) == width)
+    begin = first - next((i for i, row in enumerate(reversed(numeric[:first])) if not row), first)
+    if begin > 0 and len(lines[begin - 1][1]) > 1:  # below words, first rows may lack or have a field
+        first = begin
+    head, of_units = first - 1, False
+    if head > 0 and not numeric[head] and all(map(is_unit, lines[head][1])):
+        form, head, of_units = f"{form}, a row of units", head - 1, True
+    named = head >= 0 and len(lines[head][1]) >= min(width, 2) and not numeric[head]
+    rows = [line for line in lines[first:] if len(line[1]) > 1]
+    room = len(whole[head][1]) if named else width
+    for number, fields in rows if named else lines[begin:]:
+        # A comma may be that of a number, wherever it stands; elsewhere words behind the last column are a remark.
+        if len(fields) > room and (separator == "," or any(map(is_number, fields[room:]))):
+            advice = (
+                "if numbers have a decimal comma, part fields by semicolons or tabs, and put text with commas in quotes"
+                if separator == ","
+                else "mend the row, or give each of its fields a heading"
+            )
+            raise InputError(
+                f"{shown_path(path)}, row {number}: expected {room} fields as in {'the heading' if named else 'others'}"
+                f", got {len(fields)}; {advice}."
+            )
+    width = max(width, min(room, max(len(fields) for _, fields in rows)))
+
+    def padded(fields: list[str]) -> list[str]:
+        return (fields + [""] * width)[:width]
+
+    headings = padded(lines[head][1]) if named else [str(number) for number in range(1, width + 1)]
+    lone = len(lines) - first - len(rows)
+    form += ("" if named else ", no heading") + (f", {so_many(lone, 'line')} of one field left out" if lone else "")
+    return ParsedTable(
+        headings=tuple(headings),
+        units=tuple(padded(lines[first - 1][1] if of_units else [])),
+        rows=tuple(padded(fields) for _, fields in rows),
+        row_numbers=tuple(number for number, _ in rows),
+        decimal_comma=decimal_comma,
+        form=form,
+    )
+
+
+def _rows_of_numbers(lines: Sequence[Line], separator: str) -> list[bool]:
+    """Which lines are rows of the table, and neither a title nor a heading: half of the fields are numbers.
+
+    Marks for no value count as numbers beside two of these. Words behind the last number are a remark, and not counted
+    below the heading; above it they are the unit of what a title says, as between spaces they may be those of a title.
+    A line below names of columns is a row if it holds a number and no name.
+    """
+    found = []
+    for _, fields in lines:
+        values = sum(map(is_number, fields))
+        marks = sum(field.lower() in MISSING_WORDS for field in fields if field) if values > 1 else 0
+        found.append((values + marks) * 2 >= len(fields) > 1)
+    width = _usual_width(lines, found)
+    first = next((i for i, (_, fields) in enumerate(lines) if found[i] and len(fields) == width), len(lines))
+    of_names = (
+        i
+        for i, (_, fields) in enumerate(lines[:first])
+        if len(fields) > 1 and any(map(role_of, fields)) and not any(map(is_number, fields))
+    )
+    heading = max(of_names, default=-1)
+    for i, (_, fields) in enumerate(lines[heading + 1 :], heading + 1):
+        if found[i] or all(map(is_unit, fields)):
+            continue
+        has_remark = separator != " " and _is_half_numbers(fields)
+        is_thin = len(fields) > 1 and any(map(is_number, fields)) and not any(map(role_of, fields))
+        found[i] = has_remark or (heading >= 0 and is_thin)
+    return found
+
+
+def _usual_width(lines: Sequence[Line], numeric: Sequence[bool]) -> int:
+    """The commonest number of fields of rows of numbers, 0 if there are none."""
+    widths = Counter(len(fields) for (_, fields), row in zip(lines, numeric, strict=True) if row)
+    return widths.most_common(1)[0][0] if widths else 0
+
+
+def _is_half_numbers(fields: Sequence[str]) -> bool:
+    """Whether half of the fields up to the last number are numbers; a number in front alone is none."""
+    numbers = [is_number(field) for field in fields]
+    last = max((place for place, number in enumerate(numbers, 1) if number), default=0)
+    return sum(numbers) * 2 >= last > 1
+
+
+def _lines_of_sheet(path: Path, name: str | None) -> tuple[list[Line], str]:
+    """The rows of a sheet that hold something, and which of several it is."""
+    with importing("openpyxl", path, "workbooks", "field", "save the sheet as CSV"):
+        import openpyxl
+    with read_by_library(path, "a workbook"), ZipFile(path) as packed:
+        refuse_larger(path, sum(part.file_size for part in packed.infolist()))
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        with closing(book):
+            if name is not None and name not in book.sheetnames:
+                raise InputError(f"{shown_path(path)}: expected the sheet {name!r}, got {', '.join(book.sheetnames)}.")
+            chosen = book[name] if name is not None else book.worksheets[0]
+            others = [sheet.title for sheet in book.worksheets if sheet.title != chosen.title]
+            only = f" (only sheet {chosen.title}; measurements of {listed(others)} need a file of their own)"
+            lines, size = [], 0
+            for number, row in enumerate(chosen.iter_rows(values_only=True), 1):
+                if any(cell is not None for cell in row):
+                    size += BYTES_OF_CELL * len(row)  # few bytes may have a last column 16,384 cells to the right
+                    refuse_larger(path, size)
+                    lines.append((number, ["" if cell is None else _text_of_cell(cell) for cell in row]))
+            return lines, "workbook" + (only if others and name is None else "")
+
+
+def _text_of_cell(cell: object) -> str:
+    """A cell as text: a date without the time of day that a workbook adds, a number typed as text with a point."""
+    text = str(cell).strip()
+    if isinstance(cell, datetime):
+        return text.removesuffix(" 00:00:00")
+    return text.replace(",", ".") if isinstance(cell, str) and is_number(text) and "." not in text else text
+
+
+def without_copies(table: ParsedTable) -> ParsedTable:
+    """The table with rows that were pasted twice counted once.
+
+    Rows are copies only if they agree in the text of every column, and either the whole table stands there k times
+    (every row k times, or a multiple of that, and five rows or more that differ: of each the k-th part is kept), or a
+    stretch of ten rows or more, no two alike, stands there again in the same order. All other equal rows are repeats.
+    """
+    rows = [tuple(fields) for fields in table.rows]
+    counts = Counter(rows)
+    times = gcd(*counts.values())
+    copied: set[int] = set()
+    if times > 1 and len(counts) >= FEWEST_ROWS:
+        met: Counter[tuple[str, ...]] = Counter()
+        for place, row in enumerate(rows):
+            met[row] += 1
+            if met[row] > counts[row] // times:
+                copied.add(place)
+    else:
+        first: dict[tuple[str, ...], int] = {}
+        behind = [place - first.setdefault(row, place) for place, row in enumerate(rows)]
+        for shift, stretch in groupby(range(len(rows)), key=behind.__getitem__):
+            places = list(stretch)
+            if shift and len(places) >= FEWEST_IN_A_ROW:
+                copied.update(places)
+    return table.without(copied, f"{len(copied):,} rows are copies of others and count once") if copied else table

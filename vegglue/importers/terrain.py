@@ -1,0 +1,376 @@
+"""Grid, bed and friction of a surveyed site: GeoTIFF and ESRI ASCII grids, scattered points, and cross-sections."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RegularGridInterpolator
+from scipy.spatial import QhullError
+
+from vegglue.arrays import Array, Mask
+from vegglue.case.grid import Grid, centres
+from vegglue.case.resolved_config import Tree
+from vegglue.case.size_limits import MOST_CELLS
+from vegglue.case.terrain import Raster, read_raster
+from vegglue.case.text_files import case_name
+from vegglue.case.zones import beyond_slope_break, slope
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import role_of, words_of
+from vegglue.importers.config_parts import MANNING_BED, even
+from vegglue.importers.file_options import FileOptions, read_file_options
+from vegglue.importers.library_files import importing, read_by_library, refuse_larger
+from vegglue.importers.measured_files import data_folder, record
+from vegglue.importers.measured_rows import Placement, in_the_channel, read_rows
+from vegglue.importers.site_file import FieldSite, FileOfSite, SiteGrid
+from vegglue.importers.stations import ONE_PLACE
+from vegglue.importers.table_parser import parse_table
+from vegglue.importers.vector_files import note_on_units, read_polygons
+from vegglue.wording.numbers import in_digits
+
+# Endings of files of levels on a grid.
+RASTERS = (".tif", ".tiff", ".asc", ".grd")
+# How a geometry of HEC-RAS begins (.g01 and on), of which no reader is kept here.
+GEOMETRY_OF_RAS = b"Geom Title="
+# Tags of a GeoTIFF: size of a pixel, a point of it and its place on the map, keys, and, of GDAL, what marks no data.
+PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA = 33550, 33922, 34735, 42113
+# Among the keys, in fours from the fifth number on: the one of the type of raster, and its value if a place on the map
+# is that of the middle of a pixel, not of its corner.
+TYPE_OF_RASTER, OF_POINTS = 1025, 2
+SEPARATE = 2  # of a TIFF whose bands lie one behind the other, not pixel by pixel
+# Levels of a raster that are sought along a centreline to know how far it reaches, for a message.
+MOST_FOR_EXTENT = 5000
+# What is read of a file of points; columns of anything else are not read.
+ROLES_OF_BED = {"x", "y", "z", "section"}
+# Points of a cross-section without a name lie within so much of the next one along the channel [m], as surveyed in a
+# stream, unless most points share their x: a tape, or a flume.
+SPREAD_OF_SECTION = 1.0
+# Cells across the survey, and how much longer than wide a cell is, as for a straight channel.
+SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0
+NO_LEVEL = -9999
+MOST_LEVELS = 10 * MOST_CELLS  # of some eight bytes each; a case reads no larger file
+BANK = "bank"
+BANK_CLASS = {"law": "keulegan", "k_s": "k_s"}
+
+
+@dataclass(frozen=True)
+class Ground:
+    """tree: keys grid, bed and friction of a case; imported: what was taken from which file; texts: of files to be
+    written beside the config, by their paths.
+    """
+
+    tree: Tree
+    imported: list[Tree]
+    texts: Mapping[Path, str]
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Levels of a survey in the channel. level: from x and y (n,) to z (n,) [m], NaN beyond the survey; extent: least
+    and largest x, then y, of the survey [m]; taken: what was taken from which columns.
+    """
+
+    level: Callable[[Array, Array], Array]
+    extent: tuple[float, float, float, float]
+    taken: str
+
+
+def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placement) -> Ground:
+    """The ground of a site whose `bed` names a file: `{file: dtm.tif}`, `{file: sections.csv, sections: true}`.
+
+    `grid` (x, y, cell in m, in the frame of the model) is that of the site file, as far as it is given, and made of the
+    extent of the survey. The bed belongs into the folder beside the config: as bed.asc, and as points along a
+    centreline. InputError.
+    """
+    path = _file_of(folder, site.bed, "bed")
+    given = dict(site.bed.model_extra or {}) if site.bed is not None else {}
+    sections = bool(given.pop("sections", False))
+    options = read_file_options(given, f"{shown_path(folder)}: `bed`")
+    terrain = read_terrain(path, place, options, sections)
+    grid = _grid_of(path, terrain, site.grid or SiteGrid(), place)
+    kind, file = ("raster", "bed.asc") if place.line is None else ("points", "bed.csv")
+    text, beyond = _bed_text(terrain, grid, place)
+    taken = f"bed: {terrain.taken}"
+    if beyond > 0.0:
+        taken += f"; {100.0 * beyond:.0f} % of the grid lies beyond it, with the nearest level"
+    friction: Tree = {"classes": {"bed": MANNING_BED}, "default": "bed"}
+    imported: list[Tree] = []
+    if site.classes is not None:  # classes share one coefficient until the user parts them
+        classes = _file_of(folder, site.classes, "classes")
+        polygons = read_polygons(classes, place.frame)
+        zones = []
+        for polygon in polygons:
+            name = case_name(polygon.friction_class or polygon.name)
+            friction["classes"].setdefault(name, MANNING_BED)
+            zones.append({"class": name, "polygon": [list(corner) for corner in polygon.corners]})
+        note = "; ".join([f"friction classes: {len(zones)} polygons", *note_on_units(polygons)])
+        friction = friction | {"zones": zones}
+        imported.append(record(classes, None, note))
+    steeper = slope_of_banks(site)
+    if steeper is not None and site.channel is not None and BANK not in friction["classes"]:
+        (west, east), (south, north), (dx, dy) = grid["x"], grid["y"], grid["cell"]
+        along, across = centres(west, dx, round((east - west) / dx)), centres(south, dy, round((north - south) / dy))
+        cells = Grid(along, across, dx, dy, place.line)
+        at = (part.ravel() for part in np.meshgrid(along, across, indexing="ij"))
+        level = filled(terrain, *at).reshape(along.size, across.size)
+        banks = beyond_slope_break(slope(level, cells) > steeper, level)
+        if banks.any():
+            floor = float(np.mean((~banks).sum(axis=1)) * dy)
+            friction = with_banks(friction, steeper)
+            taken += (
+                f"; banks lie beyond a slope of {steeper:g}, half the stated one, and leave a floor of "
+                f"{in_digits(floor)} m ({in_digits(site.channel.bottom_width_m)} m stated)"
+            )
+        else:
+            taken += f"; no bank, as it is nowhere steeper than {steeper:g}, half the stated slope of the banks"
+    tree = {"grid": grid, "bed": [{kind: f"{data_folder(target).name}/{file}"}], "friction": friction}
+    return Ground(tree, [record(path, None, taken), *imported], {data_folder(target) / file: text})
+
+
+def slope_of_banks(site: FieldSite) -> float | None:
+    """Half of the stated slope of the banks [-], in the middle between floor and bank; None if none is stated.
+
+    Nearer to the floor, a surveyor's errors of some centimetres would end the floor.
+    """
+    if site.walls is not None or site.channel is None or site.channel.bank_slope_v_per_h is None:
+        return None
+    return round(0.5 * site.channel.bank_slope_v_per_h, 4)
+
+
+def with_banks(friction: Tree, steeper: float) -> Tree:
+    """Friction with banks beyond such a slope [-]; zones that are there already win over them."""
+    zones = [{"class": BANK, "beyond_slope_break": steeper}, *friction.get("zones", [])]
+    return friction | {"classes": friction["classes"] | {BANK: BANK_CLASS}, "zones": zones}
+
+
+def _file_of(folder: Path, given: FileOfSite | None, key: str) -> Path:
+    name = given.file if given is not None else None
+    if name is None or not (folder / name).is_file():
+        raise InputError(
+            f"{shown_path(folder)}: `{key}.file` expected a file of this folder, got {name!r}; correct it."
+        )
+    return folder / name
+
+
+def _grid_of(path: Path, terrain: Terrain, given: SiteGrid, place: Placement) -> Tree:
+    """The grid of the site file, else of the extent of the survey; along a centreline no further than the line goes."""
+    west, east, south, north = terrain.extent
+    if place.line is not None:
+        west, east = max(west, 0.0), min(east, float(place.line.s[-1]))
+        if given.y is None and path.suffix.lower() in RASTERS:
+            raise InputError(
+                f"{shown_path(path)}: expected `grid.y`, how far the grid reaches to the right and to the left of its "
+                "centreline, as a raster lies on both sides of it; add it."
+            )
+    x = list(given.x or (round(west, 4), round(east, 4)))
+    y = list(given.y or (round(south, 4), round(north, 4)))
+    for key, (low, high) in (("x", x), ("y", y)):
+        if not high > low:
+            raise InputError(
+                f"{shown_path(path)}: expected a bed that reaches along and across the channel, got one from {key} = "
+                f"{low:g} to {high:g} m ({terrain.taken}); say `grid.{key}` in the site file, or name sections by a "
+                "column `section`."
+            )
+    dy = (y[1] - y[0]) / SURVEYED_ROWS
+    columns = max(even((x[1] - x[0]) / (dy * LENGTH_OF_CELLS)), 4)
+    cell = list(given.cell or ((x[1] - x[0]) / columns, dy))
+    levels = (x[1] - x[0]) / min(cell) * (y[1] - y[0]) / min(cell)
+    if levels > MOST_LEVELS:
+        raise InputError(
+            f"{shown_path(path)}: expected a bed of at most {MOST_LEVELS:,} levels on squares as small as the cells, "
+            f"got {levels:.3g}; say larger cells by `grid.cell` in the site file, or less of the bed by `grid.x` and "
+            "`grid.y`."
+        )
+    return {"x": x, "y": y, "cell": cell}
+
+
+def _bed_text(terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> tuple[str, float]:
+    """Levels on squares as small as the cells of the grid, and the share of the grid without a known level."""
+    size = float(min(grid["cell"]))
+    (west, east), (south, north) = grid["x"], grid["y"]
+    x = centres(west - size, size, int(np.ceil((east - west) / size)) + 2)
+    y = centres(south - size, size, int(np.ceil((north - south) / size)) + 2)
+    at_x, at_y = (part.ravel() for part in np.meshgrid(x, y, indexing="ij"))
+    level = filled(terrain, at_x, at_y)
+    inside = (at_x > west) & (at_x < east) & (at_y > south) & (at_y < north)
+    if place.line is None:
+        head = {"ncols": x.size, "nrows": y.size, "xllcorner": x[0] - 0.5 * size, "yllcorner": y[0] - 0.5 * size}
+        head |= {"cellsize": size, "nodata_value": NO_LEVEL}
+        rows = [" ".join(f"{value:.4f}" for value in row) for row in level.reshape(x.size, y.size).T[::-1]]
+        text = "\n".join([f"{key} {float(value):.12g}" for key, value in head.items()] + rows) + "\n"
+    else:
+        points = np.column_stack([*place.to_case(at_x, at_y), level])
+        text = "x,y,z\n" + "".join(f"{at[0]:.4f},{at[1]:.4f},{at[2]:.4f}\n" for at in points.tolist())
+    return text, float(np.isnan(terrain.level(at_x[inside], at_y[inside])).mean()) if inside.any() else 0.0
+
+
+def filled(terrain: Terrain, x: Array, y: Array) -> Array:
+    """Levels at x and y (n,) [m], that of the nearest known one beyond the survey."""
+    level = terrain.level(x, y)
+    known = ~np.isnan(level)
+    if not known.any():
+        raise InputError(
+            f"The bed ({terrain.taken}) lies at x = {terrain.extent[0]:.6g} to {terrain.extent[1]:.6g}, y = "
+            f"{terrain.extent[2]:.6g} to {terrain.extent[3]:.6g} m, none of it in the grid; check `frame` and `grid`."
+        )
+    nearest = NearestNDInterpolator(np.column_stack([x[known], y[known]]), level[known])
+    return np.where(known, level, nearest(x, y))
+
+
+def read_terrain(path: Path, place: Placement, options: FileOptions, sections: bool) -> Terrain:
+    """The bed in a file. sections: whether its points stand in cross-sections. InputError."""
+    ending = path.suffix.lower()
+    if ending in RASTERS:
+        raster = read_geotiff(path) if ending in (".tif", ".tiff") else read_raster(path)
+        reader = RegularGridInterpolator((raster.x, raster.y), raster.values, bounds_error=False, fill_value=np.nan)
+        known = np.argwhere(~np.isnan(raster.values))
+        shown = known if place.line is None else known[:: max(len(known) // MOST_FOR_EXTENT, 1)]
+        along, across = place.to_channel(raster.x[shown[:, 0]], raster.y[shown[:, 1]])
+        return Terrain(
+            lambda x, y: np.asarray(reader(np.column_stack(place.to_map(x, y)))),
+            _extent(along, across),
+            f"grid of {len(known):,} levels, {raster.size:g} m apart",
+        )
+    with path.open("rb") as file:
+        of_ras = file.read(len(GEOMETRY_OF_RAS)) == GEOMETRY_OF_RAS
+    if of_ras:
+        raise InputError(
+            f"{shown_path(path)}: expected a table or a grid, got a geometry of HEC-RAS; write its cross-sections into "
+            "a table with the columns section, x, y and z, x from upstream and y from the middle to the left."
+        )
+    points, names, taken = _points(path, place, options)
+    if sections:
+        return _of_sections(_cross_sections(path, points, names), taken)
+    try:
+        surface = LinearNDInterpolator(points[:, :2], points[:, 2])
+    except (QhullError, ValueError):
+        raise InputError(
+            f"{shown_path(path)}: expected at least three points that are not on one line, got {len(points)}."
+        ) from None
+    return Terrain(lambda x, y: np.asarray(surface(x, y)), _extent(points[:, 0], points[:, 1]), taken)
+
+
+def _extent(x: Array, y: Array) -> tuple[float, float, float, float]:
+    return float(x.min()), float(x.max()), float(y.min()), float(y.max())
+
+
+def read_geotiff(path: Path) -> Raster:
+    """The first band of a GeoTIFF whose rows run along the map. InputError for another or a turned one."""
+    with importing("tifffile", path, "GeoTIFFs", "field", "save it as an ESRI ASCII grid"):
+        import tifffile
+    with read_by_library(path, "a GeoTIFF", "tifffile"), tifffile.TiffFile(path) as file:
+        page = file.pages.first
+        refuse_larger(path, page.nbytes)  # before they are unpacked
+        known = (PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA)
+        tags = {code: page.tags[code].value for code in known if code in page.tags}
+        if PIXEL_SCALE not in tags or TIE_POINT not in tags or not 0.0 < tags[PIXEL_SCALE][0] == tags[PIXEL_SCALE][1]:
+            raise InputError(
+                f"{shown_path(path)}: expected a GeoTIFF with square pixels along the map (tags ModelPixelScale and "
+                "ModelTiepoint), got another; warp it to its own coordinate system first."
+            )
+        values = np.asarray(page.asarray())
+        if values.ndim == 3:
+            values = values[0] if page.planarconfig == SEPARATE else values[..., 0]
+        levels = values.astype(np.float64)
+        if NO_DATA in tags:
+            mark = np.float64(str(tags[NO_DATA]).strip("\x00 "))
+            if np.issubdtype(values.dtype, np.floating):  # rounded as they are: none of float32 is -99999.9 itself
+                with np.errstate(over="ignore"):  # the largest of float64 is a usual mark, too
+                    mark = np.float64(mark.astype(values.dtype))
+            levels = np.where(levels == mark, np.nan, levels)
+        size = tags[PIXEL_SCALE][0]
+        column, row, _, east, north, _ = tags[TIE_POINT][:6]
+        keys = tags.get(KEYS, ())
+        of_points = (TYPE_OF_RASTER, OF_POINTS) in zip(keys[4::4], keys[7::4], strict=False)
+        middle = 0.0 if of_points else 0.5
+        x = np.array(east + (np.arange(levels.shape[1]) + middle - column) * size)
+        y = np.array(north - (np.arange(levels.shape[0]) + middle - row) * size)
+        if not (np.diff(x) > 0.0).all() or not (np.diff(y) < 0.0).all():
+            raise ValueError(f"pixels of {size:g} m at {east:g}, {north:g} m have no places of their own")
+        return Raster(x, y[::-1].copy(), size, levels[::-1].T)
+
+
+def _points(path: Path, place: Placement, options: FileOptions) -> tuple[Array, list[str], str]:
+    """x, y, z (points, 3) [m], the section of each if a column names it, and what was taken.
+
+    Three columns without a heading are x, y and z.
+    """
+    bare = {"x": "1", "y": "2", "z": "3"}
+    unnamed = not options.columns and parse_table(path, options.sheet).headings == tuple(bare.values())
+    taken = read_rows(path, replace(options, columns=bare) if unnamed else options)
+    if not {"x", "y", "z"} <= taken.numbers.keys():
+        headings = taken.headings
+        roles = {known[0] for heading in headings if (known := role_of(heading)) is not None}
+        deep = {"depth", "below"} & roles or any("depth" in words_of(heading).split() for heading in headings)
+        advice = (
+            "take depths off the level of the water above them, and call that z (or off the datum that they count from)"
+            if deep and "z" not in roles
+            else "name them in its entry of the site file, `bed: {file: ..., columns: {x: Chainage, y: Station, z: "
+            "Elevation}}` (1, 2 and 3 where there is no heading), with `flip: [x, y]` and `zero: [40, 5]` where x "
+            "counts upstream from an end at 40 m and y from a left bank 5 m off the axis"
+        )
+        raise InputError(f"{shown_path(path)}: expected columns of x, y and z, got {', '.join(headings)}; {advice}.")
+    taken = in_the_channel(taken, place, options)
+    points = np.column_stack([taken.numbers[role] for role in "xyz"])
+    there: Mask = np.asarray(np.isfinite(points).all(axis=1))
+    if not there.any():
+        raise InputError(f"{shown_path(path)}: expected points with x, y and z, got none; check the columns.")
+    summary = taken.not_reading(*(taken.columns.keys() - ROLES_OF_BED)).summary
+    return points[there], list(taken.only(there).texts.get("section", [])), summary
+
+
+def _cross_sections(path: Path, points: Array, names: list[str]) -> list[Array]:
+    """The points (n, 3) of each cross-section, along the channel, and in each one from the right to the left [m].
+
+    As a column names them; else those of one x, if most points share theirs, or those within SPREAD_OF_SECTION.
+    InputError for a section without a width, and for two at one place along the channel.
+    """
+    ordered = np.argsort(points[:, 0], kind="stable")
+    if names and all(names):
+        parts = [points[np.array(names) == name] for name in dict.fromkeys(names)]
+    else:
+        steps = np.diff(points[ordered, 0])
+        gap = ONE_PLACE if 2 * ((steps > ONE_PLACE).sum() + 1) <= len(points) else SPREAD_OF_SECTION
+        parts = np.split(points[ordered], np.flatnonzero(steps > gap) + 1)
+    parts.sort(key=lambda part: float(part[:, 0].mean()))
+    for part in parts:
+        if not np.ptp(part[:, 1]) > 0.0:
+            raise InputError(
+                f"{shown_path(path)}: expected two or more points across in each cross-section, got one at x = "
+                f"{part[0, 0]:.6g} m; name sections by a column `section`, or take it out."
+            )
+    middles = np.array([part[:, 0].mean() for part in parts])
+    if (np.diff(middles) <= ONE_PLACE).any():
+        raise InputError(
+            f"{shown_path(path)}: expected cross-sections at places of their own along the channel, got two at x = "
+            f"{middles[:-1][np.diff(middles) <= ONE_PLACE][0]:.6g} m; give both one name, or take one out."
+        )
+    return [part[np.argsort(part[:, 1], kind="stable")] for part in parts]
+
+
+def _of_sections(sections: Sequence[Array], taken: str) -> Terrain:
+    """z(x, eta) linear along the channel between neighbouring sections, at one share eta of their widths.
+
+    eta = (y - y_left) / (y_right - y_left); so that a thalweg is carried on from one section to the next, where a
+    triangulation would make steps of it.
+    """
+    along = np.array([section[:, 0].mean() for section in sections])
+    ends = np.array([[section[0, 1], section[-1, 1]] for section in sections])
+    shares = [(section[:, 1] - section[0, 1]) / (section[-1, 1] - section[0, 1]) for section in sections]
+
+    def level(x: Array, y: Array) -> Array:
+        low, high = (np.interp(x, along, ends[:, side]) for side in (0, 1))
+        share = (y - low) / (high - low)
+        each = np.array([np.interp(share, own, section[:, 2]) for own, section in zip(shares, sections, strict=True)])
+        one = len(along) == 1
+        after = np.zeros(x.size, int) if one else np.clip(np.searchsorted(along, x), 1, len(along) - 1)
+        before = np.maximum(after - 1, 0)
+        span = np.where(after > before, along[after] - along[before], 1.0)
+        weight = np.clip((x - along[before]) / span, 0.0, 1.0) * (after > before)
+        cells = np.arange(x.size)
+        found = (1.0 - weight) * each[before, cells] + weight * each[after, cells]
+        return np.where((share >= 0.0) & (share <= 1.0), found, np.nan)
+
+    extent = (float(along.min()), float(along.max()), float(ends[:, 0].min()), float(ends[:, 1].max()))
+    return Terrain(level, extent, f"{taken}, in {len(sections)} cross-sections")

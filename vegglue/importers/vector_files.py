@@ -1,0 +1,462 @@
+"""Polygons of patches and friction classes, and the line of a bend: GeoJSON, shapefiles, and tables of corners."""
+
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from vegglue.case.centreline import Centreline, centreline_of
+from vegglue.case.frame import Frame
+from vegglue.case.resolved_config import Tree
+from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import UNITS, names_without_unit, role_of, words_of
+from vegglue.importers.column_roles import columns_of_table, taken_as_si
+from vegglue.importers.file_options import FileOptions, read_file_options
+from vegglue.importers.library_files import importing, read_by_library, readable_text
+from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, read_rows, rows_of_table
+from vegglue.importers.site_file import FileOfSite
+from vegglue.importers.table_parser import WORKBOOKS, is_number, parse_table
+from vegglue.wording.numbers import in_digits, listed, so_many
+
+MAP_FILES = (".geojson", ".json", ".shp")
+TABLES = (".csv", ".txt", ".tsv", ".dat", *WORKBOOKS)
+# No longitude and no latitude is further from 0 [degrees].
+LARGEST_LONGITUDE, LARGEST_LATITUDE = 360.0, 90.0
+# Degrees on the map that a whole reach spans at most: what is so small, in a file of a map program, lies in degrees.
+SPAN_OF_DEGREES = 0.5
+# Headings of a density, as words: `stems`, `Stems/m2`, `stem density per ft2`; plain ones are of 1/m2.
+DENSITY = re.compile(
+    r"(?:(?:stem|plant)s?(?: density)?|density|shoots|stengels?|stengeldichtheid|halme|halmdichte|stangel|stangeldichte"
+    r"|tiges|tallos|steli|caules)(?: (?:per|par|por|pro))?(?: (m2|ft2))?"
+)
+# What a heading of a density may hold, and words of one that is rather of something else.
+LIKE_DENSITY = re.compile(r"dens|dicht|stem|steng|stang|halm|tige|tallo|shoot|(?:per|par|por|pro) (?:m2|ft2)$")
+NO_DENSITY = re.compile(r"diam|thick|height|hoog|hohe|haut|length|lengt|area|mass|(?:^| )(?:mm|cm|m)$")
+CLASSES = ("class", "friction class", "friction", "roughness", "type", "landuse")
+NAMES = ("name", "id", "patch", "fid")
+MOST_STEMS = 1e7  # 1/m2, as in the site file
+FEWEST_CORNERS = 3
+# Points of a line that a case can hold; a curve through a few dozen has less of what they jitter.
+MOST_POINTS = 1000
+NONE_NAMED: Mapping[str, str] = MappingProxyType({})
+Ring = list[tuple[float, float]]
+Properties = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class NamedPolygon:
+    """Corners in the channel [m]; density [1/m2] and class if the file has them; density_from: its heading;
+    unread: headings of its other properties, like_density: those that may be a density; unitless: which of x and y have
+    no stated unit, and are taken as m.
+    """
+
+    name: str
+    corners: Ring
+    density: float | None
+    friction_class: str | None
+    density_from: str | None = None
+    unread: tuple[str, ...] = ()
+    like_density: tuple[str, ...] = ()
+    unitless: tuple[str, ...] = ()
+
+
+def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = NONE_NAMED) -> list[NamedPolygon]:
+    """All polygons of a file, each part of one for itself.
+
+    Parameters
+    ----------
+    path
+        GeoJSON, a shapefile, or a table with a row for each corner.
+    frame
+        Of the model on the map.
+    columns
+        Headings of `stems` and `name`, if these are not usual ones.
+
+    Raises
+    ------
+    InputError
+        For another file, for degrees, and for a heading that is not there.
+    """
+    unitless: tuple[str, ...] = ()
+    if path.suffix.lower() in TABLES:
+        features, unitless = _polygons_of_table(path, columns)
+    elif path.suffix.lower() == ".shp":
+        with shapes_and_records(path, "POLYGON") as found:
+            features = [
+                (ring, one.record.as_dict()) for one in found for ring in _outlines(one.shape.__geo_interface__)
+            ]
+    else:
+        features = _polygons_of_geojson(path, frame)
+    if not features:
+        raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
+    _refuse_degrees(path, frame, [ring for ring, _ in features])
+    named = _columns_named(
+        path, columns, list(dict.fromkeys(str(key) for _, properties in features for key in properties))
+    )
+    polygons = []
+    for number, (ring, properties) in enumerate(features, 1):
+        of_density = next(
+            (one for one in properties if DENSITY.fullmatch(words_of(one)) and _holds(properties[one])), None
+        )
+        if "stems" in named:
+            of_density = named["stems"] if _holds(properties.get(named["stems"])) else None
+        of_name = _first_heading(properties, NAMES)
+        if "name" in named:
+            of_name = named["name"] if _holds(properties.get(named["name"])) else None
+        of_class = _first_heading(properties, CLASSES)
+        unread = {str(one): value for one, value in properties.items() if one not in (of_density, of_class, of_name)}
+        words = {heading: words_of(heading) for heading, value in unread.items() if _is_number(value)}
+        density = None
+        if of_density is not None:
+            try:
+                density = float(properties[of_density]) * UNITS["density"][f"1/{_area_named(of_density) or 'm2'}"]
+            except (ValueError, TypeError, OverflowError):
+                got = str(properties[of_density])[:40]
+                raise InputError(
+                    f"{shown_path(path)}: expected a number of stems in 1/m2, got {got!r}; correct it."
+                ) from None
+        polygons.append(
+            NamedPolygon(
+                name=str(properties[of_name]) if of_name is not None else f"p{number}",
+                corners=[_rounded(*(frame.to_model(*corner) if frame is not None else corner)) for corner in ring],
+                density=density,
+                friction_class=str(properties[of_class]) if of_class is not None else None,
+                density_from=of_density,
+                unread=tuple(unread),
+                like_density=tuple(
+                    one for one, text in words.items() if LIKE_DENSITY.search(text) and not NO_DENSITY.search(text)
+                ),
+                unitless=unitless,
+            )
+        )
+    return polygons
+
+
+def planted_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = NONE_NAMED) -> list[NamedPolygon]:
+    """Polygons of plants. InputError as `read_polygons`, and for one without stems among others that have."""
+    found = read_polygons(path, frame, columns)
+    counted = any(one.density is not None for one in found)
+    for one in found:
+        if counted and not (one.density is not None and 0.0 < one.density <= MOST_STEMS):
+            got = "none" if one.density is None else f"{one.density:g}"
+            raise InputError(
+                f"{shown_path(path)}: expected stems of polygon {one.name} above 0, up to {MOST_STEMS:g} 1/m2, got "
+                f"{got}; correct them, or take it out where nothing grows."
+            )
+    return found
+
+
+def summary_of_plants(found: Sequence[NamedPolygon]) -> str:
+    """`2 patches: stems from Density; not read: d_mm`."""
+    known = dict.fromkeys(one.density_from for one in found if one.density_from is not None)
+    unread = dict.fromkeys(heading for one in found for heading in one.unread)
+    stems = f"stems from {listed(list(known))}" if known else "no stems, and so equally dense"
+    clauses = [f"{so_many(len(found), 'patch', 'patches')}: {stems}", *note_on_units(found)]
+    clauses += [f"not read: {listed(list(unread))}"] if unread else []
+    alike = dict.fromkeys(heading for one in found for heading in one.like_density)
+    if alike and not known:
+        clauses.append(
+            f"{listed(list(alike))} may be their density: where it is, write "
+            f"`patches: {{file: ..., columns: {{stems: {next(iter(alike))}}}}}`"
+        )
+    return "; ".join(clauses)
+
+
+def note_on_units(found: Sequence[NamedPolygon]) -> list[str]:
+    """`no unit given of x and y, taken as m`, and the same of densities, taken as 1/m2; nothing if all are given."""
+    lengths = [*dict.fromkeys(axis for one in found for axis in one.unitless)]
+    headings = dict.fromkeys(one.density_from for one in found if one.density_from is not None)
+    plain = [heading for heading in headings if not _area_named(heading)]
+    taken = [f"{listed(names)}, taken as {unit}" for names, unit in ((lengths, "m"), (plain, "1/m2")) if names]
+    return [f"no unit given of {', and of '.join(taken)}"] if taken else []
+
+
+def _area_named(heading: str) -> str:
+    """`m2` of `stems_m2`, '' if a heading ends in no area."""
+    last = words_of(heading).rpartition(" ")[2]
+    return last if last in ("m2", "ft2") else ""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) or (isinstance(value, str) and is_number(value))
+
+
+def _holds(value: Any) -> bool:
+    return value not in (None, "")
+
+
+def _first_heading(properties: Properties, names: Iterable[str]) -> str | None:
+    """The heading that is the first of these names and holds something; None if there is none."""
+    known = {words_of(heading): heading for heading in properties if _holds(properties[heading])}
+    return next((known[name] for name in names if name in known), None)
+
+
+def _columns_named(path: Path, columns: Mapping[str, str], headings: Sequence[str]) -> dict[str, str]:
+    """The headings that the site file names, with or without their unit. InputError for one that is not there."""
+    found: dict[str, str] = {}
+    for what, named in columns.items():
+        alike = [one for one in headings if named in names_without_unit(one)]
+        if named not in headings and len(alike) != 1:
+            raise InputError(
+                f"{shown_path(path)}: expected {named!r} for {what} of each polygon, got "
+                f"{', '.join(headings) or 'none'}; correct `columns` of this file in `patches`."
+            )
+        found[what] = named if named in headings else alike[0]
+    return found
+
+
+def _polygons_of_table(path: Path, columns: Mapping[str, str]) -> tuple[list[tuple[Ring, Properties]], tuple[str, ...]]:
+    """Corners [m] and properties, those of its first row, of each name, of all rows if no column names polygons; and
+    which of x and y have no stated unit.
+
+    InputError for a table without x and y, a corner that lacks one, and fewer corners than a triangle has.
+    """
+    table = parse_table(path)
+    if not {"x", "y"} <= {known[0] for heading in table.headings if (known := role_of(heading)) is not None}:
+        raise InputError(
+            f"{shown_path(path)}: expected columns of x and y, with a row for each corner of a patch, got "
+            f"{', '.join(table.headings)}; rectangles may stand in the site file, "
+            "`patches: [{x: [20, 24], y: [0, 1.5], stems_per_m2: 22}]`."
+        )
+    taken = rows_of_table(path, table, FileOptions())
+    headings = _columns_named(path, columns, table.headings)
+    texts = {**{taken.columns[role]: words for role, words in taken.texts.items()}, **taken.others}
+    rows = [{heading: column[row].strip() for heading, column in texts.items()} for row in range(taken.size)]
+    first_of_words = next((taken.columns[role] for role in taken.texts), None)
+    named = headings.get("name") or _first_heading(rows[0], NAMES) or first_of_words
+    places = np.column_stack([taken.numbers["x"], taken.numbers["y"]])
+    found: dict[str, tuple[Ring, Properties]] = {}
+    for line, properties, place in zip(taken.lines, rows, places.tolist(), strict=True):
+        if not np.isfinite(place).all():
+            raise InputError(f"{shown_path(path)}, row {line}: expected x and y of a corner, got none; add them.")
+        name = properties.get(named or "", "")
+        found.setdefault(name, ([], properties))[0].append((place[0], place[1]))
+    for name, (corners, _) in found.items():
+        if len(corners) < FEWEST_CORNERS:
+            raise InputError(
+                f"{shown_path(path)}: expected three corners or more of patch {name!r}, got {len(corners)}; add them, "
+                "a row each, or write a rectangle into the site file, `patches: [{x: [20, 24], y: [0, 1.5]}]`."
+            )
+    assumed = taken_as_si(table, columns_of_table(path, table, FileOptions()), FileOptions())
+    return list(found.values()), tuple(one for one in ("x", "y") if one in assumed)
+
+
+def _polygons_of_geojson(path: Path, frame: Frame | None) -> list[tuple[Ring, Properties]]:
+    with geojson_features(path, "polygons", frame) as features:
+        found: list[tuple[Ring, Properties]] = []
+        for number, feature in enumerate(features, 1):
+            properties = dict(feature.get("properties") or {})
+            geometry = feature["geometry"]
+            if geometry is None or geometry["type"] not in ("Polygon", "MultiPolygon"):
+                got = "one of no place" if geometry is None else f"a {str(geometry['type'])[:40]}"
+                raise InputError(
+                    f"{shown_path(path)}: expected polygons alone, got {got} as feature {number}; take it out, or save "
+                    "it as the area that it stands for."
+                )
+            found += [(ring, properties) for ring in _outlines(geometry)]
+        return found
+
+
+def _outlines(geometry: Mapping[str, Any]) -> Iterator[Ring]:
+    """One outline of each part of a geometry of GeoJSON, with its holes; nothing of what is no area.
+
+    The outer ring is joined to each hole by a line there and back: a ray crosses such lines twice, or never. Holes run
+    the other way round, so that their areas are taken off.
+    """
+
+    def area(ring: Ring) -> float:
+        """A = sum((x_i - x_0) (y_(i+1) - y_0) - (x_(i+1) - x_0) (y_i - y_0)) / 2, above 0 counterclockwise."""
+        x, y = (np.array(ring) - ring[0]).T
+        return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+    parts = {"Polygon": [geometry["coordinates"]], "MultiPolygon": geometry["coordinates"]}
+    for part in parts.get(geometry["type"], []):
+        if part:
+            rings: list[Ring] = [[(float(corner[0]), float(corner[1])) for corner in ring] for ring in part]
+            outer, *holes = [ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring for ring in rings]
+            outline = list(outer)
+            for hole in holes:
+                turned = hole[::-1] if (area(hole) > 0.0) == (area(outer) > 0.0) else hole
+                outline += [outer[0], *turned, turned[0]]
+            yield outline
+
+
+@contextmanager
+def geojson_features(path: Path, what: str, frame: Frame | None = None) -> Iterator[list[Any]]:
+    """The features of a GeoJSON file, or its one geometry; what: it should hold.
+
+    InputError if it is none, names another system than the frame does, or lacks what is read of it within.
+    """
+    try:
+        tree = json.loads(readable_text(path))
+        given = _epsg_number(json.dumps(tree.get("crs")))
+        own = _epsg_number(frame.crs or "" if frame is not None else "")
+        if given and own and given != own:
+            raise InputError(
+                f"{shown_path(path)}: expected coordinates in EPSG:{own}, the `crs` of `frame`, got EPSG:{given}; save "
+                "it in that system, or take its `crs` out where both are the same."
+            )
+        yield tree["features"] if tree["type"] == "FeatureCollection" else [tree]
+    except InputError:  # a ValueError, too
+        raise
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
+        raise InputError(
+            f"{shown_path(path)}: expected GeoJSON with {what}, got another file ({error}); save it as GeoJSON."
+        ) from None
+
+
+def _epsg_number(crs: str) -> str:
+    """`28992` of `EPSG:28992` and `urn:ogc:def:crs:EPSG::28992`; '' if there is none."""
+    found = re.search(r"EPSG:(?:[\d.]*:)?(\d+)", crs, re.IGNORECASE)
+    return found[1] if found else ""
+
+
+@contextmanager
+def shapes_and_records(path: Path, kind: str) -> Iterator[list[Any]]:
+    """Those of a shapefile whose type begins with a kind, such as POLYGON. InputError if it is none."""
+    with importing("pyshp", path, "shapefiles", "field", "save it as GeoJSON"):
+        import shapefile
+    with read_by_library(path, "a shapefile"), shapefile.Reader(str(path)) as reader:
+        yield [one for one in reader.shapeRecords() if one.shape.shapeTypeName.startswith(kind)]
+
+
+def _rounded(x: float, y: float) -> tuple[float, float]:
+    """A place to a tenth of a millimetre [m]."""
+    return round(x, 4), round(y, 4)
+
+
+def _may_be_degrees(places: Iterable[tuple[float, float]]) -> bool:
+    """Whether all places (east, north) are small enough for degrees."""
+    return all(abs(x) <= LARGEST_LONGITUDE and abs(y) <= LARGEST_LATITUDE for x, y in places)
+
+
+def _refuse_degrees(path: Path, frame: Frame | None, lines: Sequence[Sequence[tuple[float, float]]]) -> None:
+    """InputError if all points are degrees and those of the frame are metres.
+
+    They are if its origin lies further from 0 than degrees do, or if it names a system and the points, all of them, lie
+    nearer together than those of a reach in metres.
+    """
+    if frame is None or not (places := [place for line in lines for place in line]):
+        return
+    spans = [max(of_axis) - min(of_axis) for of_axis in zip(*places, strict=True)]
+    small = frame.crs is not None and max(spans) < SPAN_OF_DEGREES
+    if (small or max(map(abs, frame.origin)) > LARGEST_LONGITUDE) and _may_be_degrees(places):
+        raise InputError(
+            f"{shown_path(path)}: expected coordinates in m like those of `frame`, got degrees; save it in the "
+            f"projected system of the survey{f', {frame.crs}' if frame.crs else ''}."
+        )
+
+
+@dataclass(frozen=True)
+class DrawnCentreline:
+    """shape: as a case keeps it, in the frame; line: what it makes; columns, units: of a table; taken: a summary."""
+
+    shape: Tree
+    line: Centreline
+    columns: Tree
+    units: Tree
+    taken: str
+
+
+def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: Frame | None) -> DrawnCentreline:
+    """The centreline of a site file, brought from the map into the frame: of a file, points, or parts and arcs.
+
+    A file is a table of x and y, a line of GeoJSON, or of a shapefile; upstream first. InputError for a file that is
+    not there, or holds no line.
+    """
+    columns: Tree = {}
+    units: Tree = {}
+    how = "as the site file says"
+    if isinstance(given, CentrelineShape):
+        shape = given
+        if frame is not None and shape.points is not None:
+            shape = shape.model_copy(update={"points": tuple(_rounded(*frame.to_model(*one)) for one in shape.points)})
+        elif frame is not None:
+            start, heading = _rounded(*frame.to_model(*shape.start)), round(shape.heading - frame.angle, 6)
+            shape = shape.model_copy(update={"start": start, "heading": heading})
+    else:
+        path = folder / given.file
+        if not path.is_file():
+            raise InputError(
+                f"{shown_path(folder)}: `grid.centreline.file` names {given.file}, which is not there; correct it."
+            )
+        keys = dict(given.model_extra or {})
+        reverse = bool(keys.pop("reverse", False))
+        options = read_file_options(keys, f"{shown_path(folder)}: `grid.centreline`")
+        taken = read_line(path, frame) if path.suffix.lower() in MAP_FILES else read_rows(path, options)
+        points = _points_of_line(path, in_the_channel(taken, Placement(frame), options))
+        places = list(zip(taken.numbers["x"].tolist(), taken.numbers["y"].tolist(), strict=True))
+        _refuse_degrees(path, frame, [places])
+        shape = CentrelineShape(points=tuple(points[::-1] if reverse else points))
+        taken = taken.not_reading(*(taken.columns.keys() - {"x", "y"}))
+        columns, units = dict(taken.columns), dict(taken.units)
+        how = f"{taken.summary}{', the last one first' if reverse else ''}"
+    line = centreline_of(shape)
+
+    def as_lists(value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return [as_lists(one) for one in value]
+        is_tree = isinstance(value, dict)
+        return {key: as_lists(one) for key, one in value.items() if one is not None} if is_tree else value
+
+    kept = {key: as_lists(value) for key, value in shape.model_dump(exclude_defaults=True, exclude_none=True).items()}
+    turn = np.degrees(line.heading[-1] - line.heading[0])
+    side = "left" if turn > 0.0 else "right"
+    sharpest = float(np.abs(np.gradient(line.heading, line.s)).max())
+    radius = f", radius {in_digits(1.0 / sharpest)} m at least" if sharpest > 0.0 else ""
+    summary = f"centreline of {in_digits(line.s[-1], 4)} m, {abs(turn):.0f} degrees to the {side}{radius}: {how}"
+    return DrawnCentreline(kept, line, columns, units, summary)
+
+
+def _points_of_line(path: Path, taken: MeasuredRows) -> list[tuple[float, float]]:
+    """Places of the line, each once. InputError without two of them, or with too many."""
+    if not {"x", "y"} <= taken.numbers.keys():
+        raise InputError(
+            f"{shown_path(path)}: expected columns of x and y, got {', '.join(taken.columns.values())}; name them by "
+            "`columns` of `grid.centreline`."
+        )
+    places = np.column_stack([taken.numbers["x"], taken.numbers["y"]])
+    found: list[tuple[float, float]] = []
+    for place in places[np.isfinite(places).all(axis=1)].tolist():
+        point = _rounded(*place)
+        if not found or math.dist(point, found[-1]) >= NEAREST_POINTS:
+            found.append(point)
+    if not 2 <= len(found) <= MOST_POINTS:
+        raise InputError(
+            f"{shown_path(path)}: expected a line of 2 to {MOST_POINTS:,} points, got {len(found):,}; a few dozen do, "
+            "simplify it in the map program."
+        )
+    return found
+
+
+def read_line(path: Path, frame: Frame | None = None) -> MeasuredRows:
+    """The one line in a file of a map program."""
+    if path.suffix.lower() == ".shp":
+        with shapes_and_records(path, "POLYLINE") as records:
+            shapes = [one.shape for one in records]
+            ends = [list(zip(one.parts, [*one.parts[1:], len(one.points)], strict=True)) for one in shapes]
+            found = [one.points[a:b] for one, parts in zip(shapes, ends, strict=True) for a, b in parts]
+    else:
+        with geojson_features(path, "a line", frame) as features:
+            geometries = [feature.get("geometry", feature) for feature in features]
+            lines = [[one["coordinates"]] for one in geometries if one["type"] == "LineString"]
+            lines += [one["coordinates"] for one in geometries if one["type"] == "MultiLineString"]
+            found = [[(float(point[0]), float(point[1])) for point in line] for part in lines for line in part]
+    if len(found) != 1:
+        raise InputError(f"{shown_path(path)}: expected one line, got {len(found)}; save the centreline alone.")
+    places = np.array(found[0], dtype=np.float64)
+    if places.ndim != 2 or not np.isfinite(places).all():
+        raise InputError(f"{shown_path(path)}: expected a line of points with numbers, got another; draw it anew.")
+    x, y = places[:, :2].T
+    if max(np.ptp(x), np.ptp(y)) < SPAN_OF_DEGREES and _may_be_degrees(zip(x.tolist(), y.tolist(), strict=True)):
+        raise InputError(f"{shown_path(path)}: expected coordinates in m, got degrees; save it in a projected system.")
+    note = (f"line of {path.suffix[1:]}",)
+    return MeasuredRows({"x": x, "y": y}, {}, {"x": "east", "y": "north"}, {"x": "m", "y": "m"}, note)
