@@ -13,15 +13,22 @@ from vegglue.arrays import Array
 from vegglue.effects.definition import ADDED, Effect, Stage
 from vegglue.errors import InputError
 
-# What numpy says of an array that nobody may write into.
+# What numpy's message about writing into a read-only array contains.
 READ_ONLY = "read-only"
 
 
 @dataclass(frozen=True)
 class ActiveEffect:
-    """An effect at work: values (m,) of its parameters by name, and where it acts when not everywhere.
+    """An effect at work in m members.
 
-    sections, devices: what a sensor effect is limited to; empty for all.
+    Parameters
+    ----------
+    effect
+        What acts.
+    values
+        Values (m,) of its amplitude and shapes by name, in their units.
+    sections, devices
+        What a sensor effect is limited to; empty: all.
     """
 
     effect: Effect
@@ -38,52 +45,87 @@ class ActiveEffect:
 def applied(
     effects: tuple[ActiveEffect, ...], stage: Stage, surroundings: Any, neutral: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """What a stage hands on, by name, after all effects that act there, in the order given.
+    """What a stage hands on after all effects that act there, in the order given.
 
-    surroundings: what the effects of this stage see (`surroundings`); neutral: what is handed on without any effect.
-    Where the amplitude of a member is at its off value, nothing of the effect reaches it, not even a rounding.
+    Nothing of an effect reaches a member whose amplitude is off, not even a rounding.
+
+    Parameters
+    ----------
+    effects
+        Effects of all stages.
+    stage
+        Only effects of this stage act.
+    surroundings
+        What effects of this stage see, see `surroundings`.
+    neutral
+        What the stage hands on without any effect, by name; shapes and units as in `definition`.
+
+    Returns
+    -------
+    dict
+        Arrays by the names of `neutral`.
+
+    Raises
+    ------
+    InputError
+        If an effect from a user's file fails, or returns what its stage does not hand on.
     """
-    added = ADDED.get(stage, ())
-    now = dict(neutral)
+    added, now = ADDED.get(stage, ()), dict(neutral)
     for active in effects:
         if active.effect.stage != stage or not active.on.any():
             continue
-        on = active.on
-        change = _change(active, surroundings, now)
+        on, everywhere = active.on, active.on.all()
+        if active.effect.from_file:
+            change = _act_of_file(active, surroundings, now)
+        else:
+            change = active.effect.act(surroundings, **active.values)
         for name, value in change.items():
             if name in added:
-                now[name] = now[name] + (value if on.all() else np.where(on, value, 0.0))
-            else:
-                now[name] = _chosen(on, value, now[name])
+                now[name] = now[name] + (value if everywhere else np.where(on, value, 0.0))
+            elif not everywhere:
+                now[name] = np.where(on, value, now[name])
+            else:  # np.where without its copy; np.broadcast_shapes takes longer than most effects
+                value, shape = np.asarray(value), np.shape(now[name])
+                now[name] = (
+                    value if value.shape == shape else np.broadcast_to(value, np.broadcast_shapes(value.shape, shape))
+                )
         if not added:
             surroundings = replace(surroundings, **{name: now[name] for name in change})
     return now
 
 
-def _change(active: ActiveEffect, surroundings: Any, now: Mapping[str, Array]) -> Mapping[str, Array]:
-    """What the effect makes of its surroundings; now: what the stage hands on so far.
+def _act_of_file(active: ActiveEffect, surroundings: Any, now: Mapping[str, Array]) -> Mapping[str, Array]:
+    """What an effect from a user's file returns, checked; it can write into nothing that other effects see.
 
-    Errors: InputError where the effect of a user fails, or gives what the stage does not hand on.
+    now: what the stage hands on so far. Raises InputError.
     """
-    act = active.effect.act
-    if not act.__module__.startswith("vegglue."):
-        return _change_by_a_stranger(active, surroundings, now)
-    return act(surroundings, **active.values)
-
-
-def _change_by_a_stranger(active: ActiveEffect, surroundings: Any, now: Mapping[str, Array]) -> Mapping[str, Array]:
-    """What the effect of a user makes of its surroundings, which it cannot write into: others see them, too."""
-    act = active.effect.act
+    name, act = active.effect.name, active.effect.act
     try:
-        values = {name: _unwritable(value) for name, value in active.values.items()}
+        values = {parameter: _unwritable(value) for parameter, value in active.values.items()}
         change = act(_unwritable(surroundings), **values)
     except SystemExit:  # it would end the command as if all were well
-        raise InputError(f"The effect `{active.effect.name}` ends the program when it acts; mend it.") from None
+        raise InputError(f"The effect `{name}` ends the program when it acts; mend it.") from None
     except Exception as error:
-        what, name = f"{type(error).__name__}: {error}", active.effect.name
+        file = getattr(getattr(act, "__code__", None), "co_filename", None)
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+        where = f", in line {lines[-1]}" if lines else ""  # none if it takes other parameters and never began
         advice = "return new arrays, and change none that it is given" if READ_ONLY in str(error) else "mend it"
-        raise InputError(f"The effect `{name}` fails when it acts{_in_line(act, error)}: {what}; {advice}.") from None
-    _refuse_misfits(active.effect, change, now)
+        what = f"{type(error).__name__}: {error}"
+        raise InputError(f"The effect `{name}` fails when it acts{where}: {what}; {advice}.") from None
+    expected = f"expected a dict with {' or '.join(f'`{known}`' for known in now)}"
+    if not isinstance(change, Mapping):
+        raise InputError(f"The effect `{name}` gives {type(change).__name__}; {expected}.")
+    for key, value in change.items():
+        if key not in now:
+            raise InputError(f"The effect `{name}` gives `{key}`; {expected}.")
+        if np.asarray(value).dtype.kind not in "fiub":
+            kind = np.asarray(value).dtype
+            raise InputError(f"The effect `{name}` gives `{key}`; expected real numbers, got {kind}.")
+        try:
+            np.broadcast_shapes(np.shape(value), np.shape(now[key]))
+        except ValueError:
+            shapes = f"the shape {np.shape(now[key])}, got {np.shape(value)}"
+            raise InputError(f"The effect `{name}` gives `{key}`; expected {shapes}.") from None
     return change
 
 
@@ -96,38 +138,3 @@ def _unwritable(given: Any) -> Any:
     if not is_dataclass(given) or isinstance(given, type):
         return given
     return replace(given, **{one.name: _unwritable(getattr(given, one.name)) for one in fields(given)})
-
-
-def _in_line(act: Any, error: Exception) -> str:
-    """`, in line 7` of the file of a function; '' where it never began, as one that takes other names."""
-    file = getattr(getattr(act, "__code__", None), "co_filename", None)
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-    return f", in line {lines[-1]}" if lines else ""
-
-
-def _refuse_misfits(effect: Effect, change: Any, now: Mapping[str, Array]) -> None:
-    """Errors: InputError for anything but arrays by the names and of the shapes that its stage hands on."""
-    expected = f"expected a dict with {' or '.join(f'`{name}`' for name in now)}"
-    if not isinstance(change, Mapping):
-        raise InputError(f"The effect `{effect.name}` gives {type(change).__name__}; {expected}.")
-    for name, value in change.items():
-        if name not in now:
-            raise InputError(f"The effect `{effect.name}` gives `{name}`; {expected}.")
-        if np.asarray(value).dtype.kind not in "fiub":
-            got = np.asarray(value).dtype
-            raise InputError(f"The effect `{effect.name}` gives `{name}`; expected real numbers, got {got}.")
-        try:
-            np.broadcast_shapes(np.shape(value), np.shape(now[name]))
-        except ValueError:
-            shapes = f"the shape {np.shape(now[name])}, got {np.shape(value)}"
-            raise InputError(f"The effect `{effect.name}` gives `{name}`; expected {shapes}.") from None
-
-
-def _chosen(on: NDArray[np.bool_], value: Array, otherwise: Array) -> Array:
-    """np.where, without a copy when all members are on."""
-    if not on.all():
-        return np.where(on, value, otherwise)
-    value = np.asarray(value)
-    if value.shape == np.shape(otherwise):  # nearly always: to ask which shape both have takes longer than most effects
-        return value
-    return np.broadcast_to(value, np.broadcast_shapes(value.shape, np.shape(otherwise)))

@@ -1,7 +1,7 @@
 """What a physical effect is: a small pure function of the flow at cell centres, declared beside its parameters.
 
-Each effect acts at one stage. Its function gets what is to be seen there (`surroundings`) and its parameters, (m,)
-each, and returns what it changes, by name:
+Each effect acts at one stage. Its function takes what is visible there (`surroundings`) and its parameters, (m,) each,
+and returns what it changes, by name:
 
     site        act(geometry, ...)  -> {"bed"} [m], {"inflow"} [m/s]                      added
     boundary    act(boundary, ...)  -> {"discharge", "level", "spread", "lateral"}        takes their place
@@ -11,7 +11,7 @@ each, and returns what it changes, by name:
     force       act(cells, ...)     -> {"x", "y"}                                         added [m/s2]
     sensor      act(reading, ...)   -> {"value"}                                          takes its place
 
-In {"xx", "xy", "yy"} are momentum fluxes h T, so that the force on the water is -(1/h) div(h T).
+{"xx", "xy", "yy"} are momentum fluxes h T, so that the force on the water is -(1/h) div(h T).
 """
 
 from collections.abc import Callable, Mapping
@@ -22,7 +22,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 
-# What an effect does: what is to be seen at its stage and its parameters -> what it changes, by name.
+# Surroundings of its stage and parameters -> what the effect changes, by name.
 Act = Callable[..., Mapping[str, Array]]
 Stage = Literal["site", "boundary", "plants", "resistance", "exchange", "force", "sensor"]
 Each = Literal["case", "experiment", "section", "device", "patch"]
@@ -40,10 +40,24 @@ REPLACED = {
 
 @dataclass(frozen=True)
 class Amplitude:
-    """The one parameter that switches an effect on: nothing happens at `off`.
+    """The one parameter that switches an effect on.
 
-    scale: a plausible size, the standard deviation of its prior around `off`; low, high: its support, within which it
-    must lie; power: to first order, predictions change in proportion to (amplitude - off)^power, the gain.
+        g = |value - off|^power sign(value - off)
+
+    Predictions change in proportion to the gain g, to first order; nothing happens at `off`.
+
+    Parameters
+    ----------
+    name, unit, meaning
+        Name by which the function takes it, unit ("-" if none), and what it is in words.
+    scale
+        A plausible size [unit], the standard deviation of its prior around `off`.
+    low, high
+        Its support [unit].
+    off
+        The value [unit] at which the effect does nothing.
+    power
+        Exponent of the gain [-].
     """
 
     name: str
@@ -57,7 +71,7 @@ class Amplitude:
 
     @property
     def only_sign(self) -> int:
-        """The only sign that its gain may have, 0 where it may have both."""
+        """The only sign that the gain may have, 0 if it may have both."""
         return int(self.low >= self.off) - int(self.high <= self.off)
 
     @property
@@ -66,11 +80,11 @@ class Amplitude:
         return max(self.high - self.off, self.off - self.low)
 
     def gain(self, value: float) -> float:
-        """g = |value - off|^power with the sign of value - off, to which predictions change in proportion."""
+        """g of a value."""
         return float(np.sign(value - self.off) * np.abs(value - self.off) ** self.power)
 
     def size(self, gain: float) -> float:
-        """value - off = |g|^(1/power) with the sign of the gain g."""
+        """value - off = |g|^(1/power) sign(g)."""
         return float(np.sign(gain) * np.abs(gain) ** (1.0 / self.power))
 
     def at(self, gain: float) -> float:
@@ -78,7 +92,7 @@ class Amplitude:
         return float(np.clip(self.off + self.size(gain), self.low, self.high))
 
     def allows(self, gain: float, largest: float) -> bool:
-        """Whether the value of that gain lies within the support and no further from off than `largest` times scale."""
+        """Whether the value of that gain lies in the support and within `largest` times scale of off."""
         value = self.off + self.size(gain)
         return self.low <= value <= self.high and abs(value - self.off) <= largest * self.scale
 
@@ -96,9 +110,18 @@ class Amplitude:
 
 @dataclass(frozen=True)
 class Shape:
-    """A parameter that means nothing while the effect is off: where, how wide, which exponent.
+    """A parameter that means nothing while the effect is off: a place, a width, an exponent.
 
-    default: its value unless told; grid: the values a search tries; low, high: where it must lie.
+    Parameters
+    ----------
+    name, unit, meaning
+        As of an amplitude.
+    default
+        Its value unless a config gives one.
+    low, high
+        Its support.
+    grid
+        Values that a search tries; empty: the default alone.
     """
 
     name: str
@@ -112,8 +135,9 @@ class Shape:
 
 @dataclass(frozen=True)
 class SeenRange:
-    """Where an effect was found to hold: its quantity as it is written, and the values that the data have seen of it
-    [unit]. of: the quantity of cells, or what else its stage gets to see.
+    """The range of a quantity, `low` to `high` [unit], in the data from which an effect was discovered.
+
+    symbol: of the quantity in an equation; of: the quantity as a function of the surroundings of its stage.
     """
 
     symbol: str
@@ -125,13 +149,39 @@ class SeenRange:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect as the library lists it. equation: one line of text; checked: whether the formula was read in `source`;
-    read_in: the program in whose code it was read, where the source was not at hand.
+    """A physical effect as the library lists it.
 
-    each: whether it is one cause for the whole case, or a cause of its own in each experiment, section, device
-    or patch (a shape `patch` is then its number).
-    mirrored: whether a mirrored flow feels the mirrored effect; if not, `equation` says what breaks the mirror.
-    seen: where it was found to hold, of a law that was discovered; elsewhere it is a guess, and commands say so.
+    Parameters
+    ----------
+    name
+        Letters, digits and underscores.
+    stage
+        Where it acts, see the head of this module.
+    title
+        What it is, in a few words.
+    equation
+        What it changes, in one line of text.
+    act
+        The function: surroundings and parameters by name in, changes by name out.
+    amplitude, shapes
+        Its parameters.
+    source, doi
+        Where the equation stands.
+    checked
+        Whether the equation was read in `source`.
+    read_in
+        The program in whose code it was read, if the source was not at hand.
+    each
+        "case" if it is one cause for the whole case, else "experiment", "section", "device" or "patch" for a cause of
+        its own in each; "patch" needs a shape `patch`, the number of the patch from 1.
+    mirrored
+        Whether a mirrored flow feels the mirrored effect; if not, `equation` contains what breaks the mirror.
+    tags
+        "search": something at a place; "law": of the grammar; "negative control".
+    seen
+        Where a discovered effect was found to hold; elsewhere it is an extrapolation, of which commands warn.
+    from_file
+        Whether it was read from a user's file, so that what it returns is checked. Set by `library.effects_of`.
     """
 
     name: str
@@ -149,6 +199,7 @@ class Effect:
     mirrored: bool = True
     tags: tuple[str, ...] = ()
     seen: SeenRange | None = None
+    from_file: bool = False
 
     @property
     def parameters(self) -> tuple[Amplitude | Shape, ...]:

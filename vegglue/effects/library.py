@@ -2,7 +2,7 @@
 
 import importlib.util
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import lru_cache
 from numbers import Real
 from pathlib import Path
@@ -27,10 +27,22 @@ SHIPPED: tuple[Effect, ...] = (
 
 @lru_cache
 def library(own: Path | None = None) -> Mapping[str, Effect]:
-    """All effects by name: those shipped, laws of the grammar and their products, then those of a user's file, which is
-    run to read them.
+    """All effects by name.
 
-    Errors: InputError when the file cannot be run, has no EFFECTS, or repeats a name.
+    Parameters
+    ----------
+    own
+        A user's file of effects, which is run to read them.
+
+    Returns
+    -------
+    Mapping
+        The effects shipped, laws of the grammar and their products, then those of the file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be run, has no EFFECTS, or repeats a name.
     """
     known = {effect.name: effect for effect in (*SHIPPED, *grammar.EFFECTS, *grammar.EFFECTS_OF_PRODUCTS)}
     if own is None:
@@ -43,7 +55,13 @@ def library(own: Path | None = None) -> Mapping[str, Effect]:
 
 
 def effects_of(path: Path) -> tuple[Effect, ...]:
-    """The effects of a user's file, which is run. Errors: InputError when it cannot be, or has no EFFECTS."""
+    """The effects of a user's file, which is run.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be run, has no EFFECTS, or declares an effect that no command could use.
+    """
     shown = shown_path(path)
     spec = importlib.util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None:
@@ -55,63 +73,51 @@ def effects_of(path: Path) -> tuple[Effect, ...]:
         raise InputError(f"{shown}: cannot be run: {type(error).__name__}: {error}; mend it.") from None
     found = getattr(module, "EFFECTS", None)
     found = tuple(found) if isinstance(found, list) else found
-    if not isinstance(found, tuple) or not all(isinstance(effect, Effect) for effect in found):
-        raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got {_other_effects(found)}.")
-    if not found:
-        raise InputError(f"{shown}: expected EFFECTS = (Effect(...), ...), got none in it; add one.")
-    for effect in found:
-        _refuse_wrong_kinds(effect, shown)
-        _refuse_unusable(effect, shown)
-    return found
-
-
-def _other_effects(found: object) -> str:
-    """What stands for EFFECTS in a file, and what to do."""
+    expected = f"{shown}: expected EFFECTS = (Effect(...), ...), got"
     if found is None:
-        return "none; add it"
+        raise InputError(f"{expected} none; add it.")
     if isinstance(found, Effect):
-        return "one Effect; put it in brackets with a comma, (Effect(...),)"
-    other = next((one for one in found if not isinstance(one, Effect)), found) if isinstance(found, tuple) else found
-    return f"{type(other).__name__}; correct it"
+        raise InputError(f"{expected} one Effect; put it in brackets with a comma, (Effect(...),).")
+    other = next((one for one in found if not isinstance(one, Effect)), None) if isinstance(found, tuple) else found
+    if other is not None:
+        raise InputError(f"{expected} {type(other).__name__}; correct it.")
+    if not found:
+        raise InputError(f"{expected} none in it; add one.")
+    for effect in found:
+        _refuse_unusable(effect, shown)
+    return tuple(replace(effect, from_file=True) for effect in found)
 
 
-def _refuse_wrong_kinds(effect: Effect, shown: str) -> None:
-    """Errors: InputError for a declaration whose parts are not of their kind, such as a number that is text."""
-    whole = isinstance(effect.shapes, tuple) and all(isinstance(one, Shape) for one in effect.shapes)
+def _refuse_unusable(effect: Effect, shown: str) -> None:
+    """InputError for parts that are not of their kind, or a name, a stage or an `each` that no command can use."""
+    shapes = isinstance(effect.shapes, tuple) and all(isinstance(one, Shape) for one in effect.shapes)
     for name, right, wanted in (
         ("amplitude", isinstance(effect.amplitude, Amplitude), "an Amplitude(...)"),
-        ("shapes", whole, "a tuple (Shape(...), ...)"),
+        ("shapes", shapes, "a tuple (Shape(...), ...)"),
         ("act", callable(effect.act), "a function"),
     ):
         if not right:
             got = type(getattr(effect, name)).__name__
-            said = f"`{name}` of the effect {effect.name!r} expected {wanted}, got {got}"
-            raise InputError(f"{shown}: {said}; correct it.")
+            raise InputError(
+                f"{shown}: `{name}` of the effect {effect.name!r} expected {wanted}, got {got}; correct it."
+            )
     parts: tuple[Effect | Amplitude | Shape, ...] = (effect, effect.amplitude, *effect.shapes)
     for part in parts:
         kinds = get_type_hints(type(part))
         for one in fields(part):
             value, kind = getattr(part, one.name), kinds[one.name]
-            right = _is_number(value) if kind in (float, int) else isinstance(value, str) if kind is str else True
-            if not right:
+            number = isinstance(value, Real) and not isinstance(value, bool)
+            if (kind in (float, int) and not number) or (kind is str and not isinstance(value, str)):
+                place = f"`{one.name}` of " + ("" if part is effect else f"{part.name!r} of ")
                 wanted = "text" if kind is str else "a number"
-                of = "" if part is effect else f"{part.name!r} of "
-                said = f"`{one.name}` of {of}the effect {effect.name!r} expected {wanted}, got {value!r}"
-                raise InputError(f"{shown}: {said}; correct it.")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def _refuse_unusable(effect: Effect, shown: str) -> None:
-    """Errors: InputError for a name that no config and no command can hold, or a stage or `each` that there is not."""
-    if not (effect.name.isascii() and effect.name.isidentifier()):
-        said = f"expected letters, digits and underscores, got `{effect.name}`"
-        raise InputError(f"{shown}: the name of an effect {said}; correct it.")
-    if effect.stage not in STAGES:
-        said = f"expected one of {', '.join(STAGES)}, got `{effect.stage}`"
-        raise InputError(f"{shown}: the stage of `{effect.name}` {said}; correct it.")
-    if effect.each not in EACH:
-        said = f"expected one of {', '.join(EACH)}, got `{effect.each}`"
-        raise InputError(f"{shown}: `each` of `{effect.name}` {said}; correct it.")
+                raise InputError(
+                    f"{shown}: {place}the effect {effect.name!r} expected {wanted}, got {value!r}; correct it."
+                )
+    for place, value, right, wanted in (
+        ("the name of an effect", effect.name, effect.name.isascii() and effect.name.isidentifier(),
+         "letters, digits and underscores"),
+        (f"the stage of `{effect.name}`", effect.stage, effect.stage in STAGES, f"one of {', '.join(STAGES)}"),
+        (f"`each` of `{effect.name}`", effect.each, effect.each in EACH, f"one of {', '.join(EACH)}"),
+    ):  # fmt: skip
+        if not right:
+            raise InputError(f"{shown}: {place} expected {wanted}, got `{value}`; correct it.")
