@@ -65,9 +65,8 @@ LOG_SLOPE = 18.0 / math.log(10.0)
 
 @compiled
 def _wet_depths(out, depth, half_range, dry):
-    """Mean depth [m] of the wet part of cells (t,), f + a^(1/2) (a^4 + w^4)^(1/8), a = h - f.
-
-    f: depth of the film. Without it (a w)^(1/2) where the waterline crosses the cell, a far from it, smooth between.
+    """Mean depth [m] of the wet part of cells (t,), f + a^(1/2) (a^4 + w^4)^(1/8), a = h - f: f + (a w)^(1/2) if the
+    waterline crosses the cell, h far from it.
     """
     for t in range(depth.size):
         mean = max(depth[t] - dry, 1e-12)
@@ -77,11 +76,10 @@ def _wet_depths(out, depth, half_range, dry):
 
 @compiled
 def _chezys(out, wet, half_range, law, coefficient, bank_argument_minimum):
-    """C [m^1/2/s] of the wet part of cells (t,), of mean depth h: between h - w and h + w, or 0 and 2 h.
+    """C [m^1/2/s] of the wet part of cells (t,), of depths from h - w to h + w, or 0 to 2 h.
 
-    h^(1/6) / n, the coefficient itself, or the mean over these depths of 18 log10(max(12 h/k_s, a))
-    (Keulegan 1938) with a the floor of the bank law, `bank_argument_minimum`, which would stop Newton where all of a
-    cell met it at once.
+    h^(1/6) / n (Manning), C itself (Chezy), or the mean over these depths of 18 log10(max(12 h/k_s, a)) (Keulegan
+    1938): a floor that a whole cell met at once would stop Newton.
     """
     if law == MANNING:
         for t in range(wet.size):
@@ -100,33 +98,37 @@ def _chezys(out, wet, half_range, law, coefficient, bank_argument_minimum):
 
 
 @compiled
-def _drag_of_cells(out, depth, wet, on_film, dry):
-    """k [1/m] of cells (t,) in place of the C of their wet parts, whose mean depths are `wet` [m]; on_film: K(f)."""
-    for t in range(depth.size):
-        share = max(depth[t] - dry, 1e-12) / (wet[t] - dry)
-        carried = share * out[t] * wet[t] * math.sqrt(wet[t]) + (1.0 - share) * on_film[t]
-        out[t] = GRAVITY * (depth[t] / carried) ** 2
-
-
-@compiled
-def _one_after_the_other(out, values, times):
-    """Values (n,) of cells, each as often as there are members: a row of cells and their members (n times,)."""
-    for j in range(values.size):
-        for k in range(times):
-            out[j * times + k] = values[j]
-
-
-@compiled
 def class_drag(depth, half_range, friction_class, law, coefficient, bank_argument_minimum, film):
-    """k = g h^2 / (s K(h_w) + (1 - s) K(f))^2 [1/m], K = C h^(3/2): a wet share s of the cell and a film f beyond it.
+    """k = g h^2 / (s K(h_w) + (1 - s) K(f))^2, K = C h^(3/2): friction rate of the bed.
 
-    depth (nx, ny, m) is h, the mean of the cell; h_w = f + (h - f)/s; half_range: half the range of the bed across the
-    flow in a cell, w [m]. The slope of the surface drives either part, as in the subgrid friction of Volp et al. 2013,
-    doi:10.1002/wrcr.20324; but the wet part is asked once, at its mean depth, and not each depth as if the water beside
-    it did not matter (`verification/test_banks`).
+    A wet share s of the cell, of mean depth h_w = f + (h - f)/s, and a film f beyond it.
 
-    Neighbours of one class and all their members are one run of numbers: SIMD lanes are full with one member, too.
+    Parameters
+    ----------
+    depth
+        Mean depth h of each cell (nx, ny, m) [m].
+    half_range
+        Half the range w of the bed across the flow within each cell (nx, ny) [m].
+    friction_class
+        Class of each cell (nx, ny).
+    law, coefficient
+        Law of each class (class,), an index into BED_LAWS, and its coefficient (class, m) [s m^(-1/3), m or m^1/2/s].
+    bank_argument_minimum
+        Floor of 12 h/k_s in Keulegan's law [-].
+    film
+        Ten times f [m].
+
+    Returns
+    -------
+    array
+        k (nx, ny, m) [1/m].
+
+    References
+    ----------
+    Subgrid friction as in Volp et al. (2013), doi:10.1002/wrcr.20324, except that the wet part counts by C at its mean
+    depth, since mixing ties its water together (`verification/test_banks`).
     """
+    # Neighbours of one class and all their members are one run of numbers: SIMD lanes are full with one member, too.
     (nx, ny, m), dry = depth.shape, FILM_ON_LAND * film
     drag, wet, half, thin = np.empty((nx, ny * m)), np.empty(ny * m), np.empty(ny * m), np.full(ny * m, dry)
     of_members, on_film = np.empty((law.size, ny * m)), np.empty((law.size, ny * m))
@@ -138,7 +140,9 @@ def class_drag(depth, half_range, friction_class, law, coefficient, bank_argumen
     on_film *= dry * math.sqrt(dry)
     for i in range(nx):
         here = depth[i].reshape(ny * m)
-        _one_after_the_other(half, half_range[i], m)
+        for j in range(ny):
+            for k in range(m):
+                half[j * m + k] = half_range[i, j]
         _wet_depths(wet, here, half, dry)
         first = 0
         while first < ny:
@@ -147,18 +151,36 @@ def class_drag(depth, half_range, friction_class, law, coefficient, bank_argumen
                 stop += 1
             a, b = first * m, stop * m
             _chezys(drag[i, a:b], wet[a:b], half[a:b], law[c], of_members[c, a:b], bank_argument_minimum)
-            _drag_of_cells(drag[i, a:b], here[a:b], wet[a:b], on_film[c, a:b], dry)
+            for t in range(a, b):
+                share = max(here[t] - dry, 1e-12) / (wet[t] - dry)
+                carried = share * drag[i, t] * wet[t] * math.sqrt(wet[t]) + (1.0 - share) * on_film[c, t]
+                drag[i, t] = GRAVITY * (here[t] / carried) ** 2
             first = stop
     return drag.reshape((nx, ny, m))
 
 
 def wall_coefficient(law: int, coefficient: Array, width: float, argument_minimum: float) -> Array:
-    """c_w = g / C_w^2 [-], so that the stress on the wall is tau/rho = c_w |u| u, u the mean of a cell beside it.
+    """c_w = g / C_w^2: the stress on a wall is tau/rho = c_w |u| u, u the mean of a cell beside it.
 
-    C_w [m^1/2/s] is that of the law (its place in BED_LAWS) at the width of the cell [m] in the place of a depth: over
-    that width u is the mean of the profile that begins at the wall, as a velocity over a bed is over its depth. (Of
-    u(y) = u*/kappa ln(y/z_0), z_0 = k_s/30, the mean over a width b is u*/kappa (ln(b/z_0) - 1), so that C_w =
-    18 log10(11 b/k_s), where Keulegan has 12.) 12 b/k_s is bounded as on banks; coefficient: (m,), unit of the law.
+    C_w [m^1/2/s] is that of the law at the width b of the cell in place of a depth: u is the mean over b of a profile
+    that begins at the wall, as a depth-averaged velocity is over a bed. (Of u(y) = u*/kappa ln(y/z_0), z_0 = k_s/30,
+    the mean over b is u*/kappa (ln(b/z_0) - 1), so that C_w = 18 log10(11 b/k_s), where Keulegan has 12.)
+
+    Parameters
+    ----------
+    law
+        Index into BED_LAWS.
+    coefficient
+        Of the law, (m,) [s m^(-1/3), m or m^1/2/s].
+    width
+        Width b of the cell [m].
+    argument_minimum
+        Floor of 12 b/k_s [-].
+
+    Returns
+    -------
+    array
+        c_w (m,) [-].
     """
     if law == MANNING:
         chezy = width ** (1.0 / 6.0) / coefficient

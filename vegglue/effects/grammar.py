@@ -1,4 +1,4 @@
-"""What a law is that no list holds: a term of the equations changes with what is there.
+"""Laws that no list holds: a term of the equations changes with a quantity of the flow or the channel.
 
     k -> k exp(a g),   nu -> nu exp(a g),   h U U -> h U U exp(a g)
 
@@ -33,8 +33,18 @@ PLAUSIBLE_STRENGTH = 0.5
 
 @dataclass(frozen=True)
 class LawTerm:
-    """What a law changes. share: where, 1 or 0 in each cell; symbol: of the term; written: share as code, a factor;
-    changed: what the term is with a factor on it, as an effect says it; change: the same as code.
+    """What a law changes.
+
+    Parameters
+    ----------
+    name, words, where, symbol
+        Of the term, and where it is changed in words.
+    stage
+        Stage of the effect.
+    share, written
+        1 in the cells where it is changed, else 0, as a function and as a factor in code.
+    changed, change
+        What the effect returns with a factor on the term, as a function and as code.
     """
 
     name: str
@@ -50,8 +60,16 @@ class LawTerm:
 
 @dataclass(frozen=True)
 class LawQuantity:
-    """What a law depends on. of: q in each cell; written: the same as code; usual: a usual value, the reference unless
-    told.
+    """What a law depends on.
+
+    Parameters
+    ----------
+    name, words, symbol, unit
+        Of the quantity q.
+    of, written
+        q in each cell, as a function and as code.
+    usual
+        A usual value [unit], the default of the reference r.
     """
 
     name: str
@@ -75,8 +93,18 @@ def signed(reference: float) -> str:
 
 @dataclass(frozen=True)
 class LawForm:
-    """How g follows from q and r, as a function, as code and as text; quantiles: of the q that the data have seen, to
-    be tried as r (none: g has no r); strongest: end of the support of a on either side, a factor of 20 where g is 1.
+    """How g follows from q and r.
+
+    Parameters
+    ----------
+    name, words
+        Of the form.
+    of, written, equation
+        g as a function, as code and as text.
+    quantiles
+        Quantiles of the q in the data that are tried as r; empty: g has no r.
+    strongest
+        End of the support of a on either side [-]; 3 is a factor of 20 where g is 1.
     """
 
     name: str
@@ -90,8 +118,16 @@ class LawForm:
 
 @dataclass(frozen=True)
 class Law:
-    """A law of the grammar, `effect` as the library lists it; times: the law whose g its own g is multiplied by, which
-    has a reference of its own, `first`.
+    """A law of the grammar.
+
+        term -> term exp(a g(q, r))
+
+    Parameters
+    ----------
+    term, quantity, form
+        What changes, with what, and how.
+    times
+        A law by whose g its own g is multiplied, which has a reference of its own, `first`.
     """
 
     term: LawTerm
@@ -118,8 +154,8 @@ class Law:
         return f"{self.term.words[0].upper()}{self.term.words[1:]} {words}"
 
     def equation(self, reference: float | None = None, first: float | None = None) -> str:
-        """In one line; reference: the value of r, where it is known; first: the same of the law that it multiplies."""
-        a, g = ("a", self.g_in_words(reference, "r"))
+        """In one line; reference: the value of r if it is known; first: that of the law that it multiplies."""
+        a, g = "a", self.g_in_words(reference, "r")
         if self.times is not None:
             a, g = ("c", f"({self.times.g_in_words(first, 'r_1')}) ({g})")
         return f"{self.term.symbol} -> {self.term.symbol} exp({a} g) {self.term.where}, g = {g}"
@@ -175,25 +211,14 @@ def _friction(cells: Cells, factor: Array) -> dict[str, Array]:
     return {"rate": cells.rate * factor}
 
 
-def _mixing(cells: Cells, factor: Array) -> dict[str, Array]:
-    return {"viscosity": cells.viscosity * (factor - 1.0)}
-
-
-def _advection(cells: Cells, factor: Array) -> dict[str, Array]:
-    return dispersion(cells, factor - 1.0)
-
-
 def _everywhere(cells: Cells) -> Array:
     return np.ones_like(cells.geometry.bank)
 
 
-def _open_floor(cells: Cells) -> Array:
-    return (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
-
-
 _WITH_FACTOR = '{{"rate": cells.rate * {factor}}}'
 _FLOOR = LawTerm(
-    "floor", "friction of the open floor", "on the floor without plants", "resistance", "k", _open_floor,
+    "floor", "friction of the open floor", "on the floor without plants", "resistance", "k",
+    lambda cells: (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted),
     " * (1 - cells.geometry.bank) * (1 - cells.geometry.planted)", _friction, _WITH_FACTOR,
 )  # fmt: skip
 _BANK = LawTerm(
@@ -205,12 +230,13 @@ _PLANTS = LawTerm(
     " * cells.geometry.planted", _friction, _WITH_FACTOR,
 )  # fmt: skip
 _VISCOSITY = LawTerm(
-    "viscosity", "the eddy viscosity", "everywhere", "exchange", "nu", _everywhere, "", _mixing,
+    "viscosity", "the eddy viscosity", "everywhere", "exchange", "nu", _everywhere, "",
+    lambda cells, factor: {"viscosity": cells.viscosity * (factor - 1.0)},
     '{{"viscosity": cells.viscosity * ({factor} - 1)}}',
 )  # fmt: skip
 _ADVECTION = LawTerm(
-    "advection", "the momentum that the flow carries", "everywhere", "exchange", "h U U", _everywhere, "", _advection,
-    "dispersion(cells, {factor} - 1)",
+    "advection", "the momentum that the flow carries", "everywhere", "exchange", "h U U", _everywhere, "",
+    lambda cells, factor: dispersion(cells, factor - 1.0), "dispersion(cells, {factor} - 1)",
 )  # fmt: skip
 
 _DEPTH = LawQuantity("depth", "the depth", "h", "m", lambda cells: cells.depth, "cells.depth", 0.5)

@@ -102,8 +102,26 @@ def _chezy(law: int, phi: float, top: float, depth: float, bare: float) -> float
 
 @compiled
 def plant_drag(drag, depth, column, row, law, cover, phi, canopy, bare_chezy, proportional):
-    """k -> s k_p + (1 - s) k [1/m] on cells of which plants cover the share s, k_p = g / (C^2 h) by the law of each, an
-    index into PLANT_LAWS: what both parts take, where the water is as fast on both.
+    """k -> s k_p + (1 - s) k, k_p = g / (C^2 h): friction rate of vegetated cells, in place.
+
+    The force on the plants' share s and on the rest, with the water as fast on both.
+
+    Parameters
+    ----------
+    drag
+        k (nx, ny, m) [1/m], of the bed on entry.
+    depth
+        h (nx, ny, m) [m].
+    column, row
+        Vegetated cells (cell,).
+    law
+        Law of each (cell,), an index into PLANT_LAWS.
+    cover
+        s (cell,) [-].
+    phi, canopy, bare_chezy
+        C_D m D h_d [-], h_d [m] and C_b [m^1/2/s] of each, (cell, m).
+    proportional
+        Whether phi h/h_d takes the place of phi if plants stand out of the water.
     """
     m = depth.shape[2]
     for p in range(column.size):

@@ -1,4 +1,4 @@
-"""What an effect gets to see at its stage: the channel, the flow at cell centres, plants, boundaries, readings."""
+"""What an effect sees at its stage: the channel, the flow at cell centres, plants, boundaries, readings."""
 
 from dataclasses import dataclass, field
 
@@ -11,22 +11,50 @@ AT_REST_SQUARED = 1e-6
 
 
 def speed_of(u: Array, v: Array) -> Array:
-    """|U| = (u^2 + v^2 + 0.001^2)^(1/2) [m/s], never zero, so that it has a derivative at rest."""
+    """|U| = (u^2 + v^2 + 0.001^2)^(1/2) [m/s]: it has a derivative at rest."""
     return np.sqrt(u**2 + v**2 + AT_REST_SQUARED)
 
 
 @dataclass(frozen=True)
 class ChannelGeometry:
-    """What does not move, at cell centres, (nx, ny, 1) [m] where not said otherwise.
+    """What does not move, at cell centres (nx, ny, 1) unless another shape is given; seen by effects on the site.
 
-    share_along: (x - x_m) / L, x_m the middle of the grid and L its length, -1/2 .. 1/2 (nx, 1, 1) [-];
-    offset: distance from the channel axis over the half width of the floor, positive towards larger y [-]; half_width:
-    that half width; side_slope: |dz/dy| [-]; bank: 1 beyond the toe of the banks, else 0; planted: share of a cell that
-    plants cover in this experiment; front: distance from the upstream end of the patch a cell is in, else infinite;
-    edge: distance across from the nearest side of a patch, positive outside it and negative inside, infinite in columns
-    without one; relative_stems: of the patch over the mean of all patches, 1 where none stands [-];
-    wake: distance downstream from the end of the nearest patch upstream that spans this row, else infinite; on a grid
-    along a centreline, stretch: length of a cell over dx [-], and turning: curvature of the line along its row [1/m].
+    Parameters
+    ----------
+    x, y
+        Along and across the channel [m].
+    share_along
+        (x - x_m) / L, x_m the middle of the grid and L its length, -1/2 .. 1/2 (nx, 1, 1) [-].
+    dx, dy
+        Size of a cell [m].
+    filter_width
+        Width [m] below which eddies are not resolved, the same on every grid of a case.
+    bed
+        Bed level [m].
+    offset
+        Distance from the channel axis over the half width of the floor, positive towards larger y [-].
+    half_width
+        Half width of the floor [m].
+    side_slope
+        |dz/dy| [-].
+    bank
+        1 beyond the toe of the banks, else 0 [-].
+    planted
+        Share of a cell that plants cover in this experiment [-].
+    front
+        Distance from the upstream end of the patch that a cell is in, else infinite [m].
+    edge
+        Distance across from the nearest side of a patch, negative inside; infinite in columns without a patch [m].
+    wake
+        Distance downstream from the end of the nearest patch upstream that spans this row, else infinite [m].
+    patch
+        Index of the patch, -1 without.
+    relative_stems
+        Stems of the patch over the mean of all patches, 1 without a patch [-].
+    stretch
+        Length of a cell over dx on a grid along a centreline [-].
+    turning
+        Curvature of that line along the row of a cell [1/m]; empty on a straight grid.
     """
 
     x: Array
@@ -34,7 +62,7 @@ class ChannelGeometry:
     share_along: Array
     dx: float
     dy: float
-    filter_width: float  # below which eddies are not resolved, the same on every grid of a case
+    filter_width: float
     bed: Array
     offset: Array
     half_width: Array
@@ -44,17 +72,30 @@ class ChannelGeometry:
     front: Array
     edge: Array
     wake: Array
-    patch: Array  # index of the patch, -1 without
-    relative_stems: Array = field(default_factory=lambda: np.ones((1, 1, 1)))  # as if all patches were as dense
-    stretch: Array = field(default_factory=lambda: np.ones((1, 1, 1)))  # of a straight grid
-    turning: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))  # empty on a straight grid
+    patch: Array
+    relative_stems: Array = field(default_factory=lambda: np.ones((1, 1, 1)))
+    stretch: Array = field(default_factory=lambda: np.ones((1, 1, 1)))
+    turning: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
 
 
 @dataclass(frozen=True)
 class Cells:
-    """The flow at cell centres, (nx, ny, m): depth h and level [m], u and v [m/s], friction rate k [1/m], the
-    part of it that is the bed's, and viscosity [m2/s]; gradients [1/s]. shear_depth: by which du/dy weighs what is on
-    either side, (nx, ny - 1, m) [m], the smaller depth of the two cells, or empty.
+    """The flow at cell centres, (nx, ny, m); seen by effects on resistance, exchange and force.
+
+    Parameters
+    ----------
+    geometry
+        The channel.
+    depth, level
+        h and z_s [m].
+    u, v
+        Velocities along x and y [m/s].
+    rate, bed_rate
+        Friction rate k = g / (C^2 h) and the part of it that is the bed's [1/m].
+    viscosity
+        Eddy viscosity [m2/s].
+    shear_depth
+        Smaller depth of two neighbours across (nx, ny - 1, m) [m], by which du/dy weighs its sides, or empty.
     """
 
     geometry: ChannelGeometry
@@ -109,8 +150,18 @@ class Cells:
 
 @dataclass(frozen=True)
 class PlantCells:
-    """Plants of each vegetated cell, (cell, m): phi [-], canopy height h_d [m], depth [m], speed [m/s]; and, (cell, 1),
-    front: distance from the upstream end of the patch, edge: from its nearest side, x, y [m]; patch: its index.
+    """Plants of vegetated cells; seen by effects on plants.
+
+    Parameters
+    ----------
+    phi, canopy_height
+        Drag C_D m D h_d [-] and height h_d [m] of the plants (cell, m).
+    depth, speed
+        h [m] and |U| [m/s] (cell, m).
+    front, edge
+        Distances from the upstream end of the patch and from its nearest side, (cell, 1) [m].
+    x, y, patch
+        Place [m] and index of the patch, (cell, 1).
     """
 
     phi: Array
@@ -126,9 +177,20 @@ class PlantCells:
 
 @dataclass(frozen=True)
 class BoundaryValues:
-    """What enters and leaves: discharge of each inflow and member (inflow, m) [m3/s], outlet level (m,) [m], relative
-    spread across the inflows (inflow, cell, m) [-], lateral inflow along the channel (m,) [m3/s]; position:
-    -1 .. 1 across each inflow (inflow, cell, 1).
+    """What enters and leaves; seen by effects on boundaries.
+
+    Parameters
+    ----------
+    discharge
+        Of each inflow (inflow, m) [m3/s].
+    level
+        At the outlet (m,) [m].
+    spread
+        Relative spread over each inflow (inflow, cell, m) [-].
+    lateral
+        Inflow along the channel (m,) [m3/s].
+    position
+        -1 .. 1 across each inflow (inflow, cell, 1) [-].
     """
 
     discharge: Array
@@ -140,11 +202,22 @@ class BoundaryValues:
 
 @dataclass(frozen=True)
 class Reading:
-    """What instruments show: value (station, m) [m/s, m or m3/s]; which of them measure a velocity or a level, 1 or 0
-    (station, 1), neither for a discharge; component: the velocity that a probe measures, along x, across, or the speed
-    [m/s], component_y its d/dy [1/s] (station, m), 0 for what is no velocity; and of the flow at each station depth
-    [m], u [m/s], friction rate k [1/m] (station, m), canopy height over depth (station, m), 0 outside plants; x, y [m]
-    (station, 1).
+    """What instruments show; seen by effects on sensors.
+
+    Parameters
+    ----------
+    value
+        The reading (station, m) [m/s, m or m3/s].
+    velocity, level
+        1 for stations that measure a velocity or a level, else 0; both 0 for a discharge (station, 1).
+    component, component_y
+        Velocity that a probe measures, along x, across, or the speed [m/s], and its d/dy [1/s] (station, m); else 0.
+    depth, u, rate
+        Depth [m], u [m/s] and friction rate k [1/m] of the flow at the station (station, m).
+    canopy_share
+        Canopy height over depth (station, m) [-], 0 outside plants.
+    x, y
+        Place (station, 1) [m].
     """
 
     value: Array
@@ -186,7 +259,7 @@ def weighted_across(values: Array, weight: Array, dy: float) -> Array:
 
 
 def _slope(values: Array, step: float) -> Array:
-    """What numpy.gradient gives along the first axis, in fewer passes: effects ask for it in every residual."""
+    """numpy.gradient along the first axis in fewer passes: every residual needs it."""
     slope = np.empty_like(values)
     np.subtract(values[2:], values[:-2], out=slope[1:-1])
     slope[1:-1] *= 0.5 / step
