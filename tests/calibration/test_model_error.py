@@ -12,11 +12,11 @@ from vegglue.calibration.baseline import with_own_error
 from vegglue.calibration.candidates import effect_entry, place_candidate, with_effect
 from vegglue.calibration.model_error import (
     CellResponses,
-    bumps,
     cell_responses,
     field_columns,
+    gaussian_basis,
     model_error_columns,
-    responses_to_bumps,
+    responses_to_basis,
 )
 from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.grid import Grid
@@ -40,9 +40,9 @@ def seen_directly(cells: list[tuple[int, int]]) -> CellResponses:
 
 @pytest.mark.parametrize(("length", "width"), [(2.0, 1.0), (1.0, 1.0), (4.0, 0.5)])
 def test_the_field_has_its_standard_deviation_and_dies_out(length: float, width: float) -> None:
-    """In the middle of the grid, on bumps and between them; far apart it is of its own."""
+    """In the middle of the grid, on basis functions and between them; far apart it is independent."""
     cells = [(i, j) for i in (16, 18, 19, 21) for j in (10, 12, 13)]
-    columns = field_columns(seen_directly([*cells, (1, 1)]), "friction", bumps(GRID, length, width))
+    columns = field_columns(seen_directly([*cells, (1, 1)]), "friction", gaussian_basis(GRID, length, width))
     covariance = columns @ columns.T
     assert np.diag(covariance)[: len(cells)] == pytest.approx(1.0, rel=0.05)
     near = covariance[0, 1]
@@ -51,26 +51,26 @@ def test_the_field_has_its_standard_deviation_and_dies_out(length: float, width:
     assert np.linalg.eigvalsh(covariance).min() > -1e-9
 
 
-def test_a_field_is_as_smooth_as_its_bumps() -> None:
-    """exp(-d^2 / 2 l^2), as of bumps exp(-d^2 / l^2) that stand close."""
+def test_a_field_is_as_smooth_as_its_basis() -> None:
+    """exp(-d^2 / 2 l^2), as of functions exp(-d^2 / l^2) that stand close."""
     row = [(i, 12) for i in range(14, 26)]
-    columns = field_columns(seen_directly(row), "friction", bumps(GRID, 2.0, 1.0))
+    columns = field_columns(seen_directly(row), "friction", gaussian_basis(GRID, 2.0, 1.0))
     found = columns @ columns[0]
     d = GRID.x[14:26] - GRID.x[14]
     assert found == pytest.approx(np.exp(-(d**2) / (2.0 * 2.0**2)), abs=0.06)
 
 
-def test_bumps_are_no_smaller_than_cells() -> None:
-    small = bumps(GRID, 0.01, 0.01)
+def test_basis_functions_are_no_smaller_than_cells() -> None:
+    small = gaussian_basis(GRID, 0.01, 0.01)
     assert (small.length, small.width) == pytest.approx((1.5 * 0.5, 1.5 * 0.25))
     assert small.x[[0, -1]] == pytest.approx(GRID.x[[0, -1]])
 
 
-def test_responses_to_bumps_are_sums_over_cells() -> None:
+def test_responses_to_the_basis_are_sums_over_cells() -> None:
     random = np.random.default_rng(1)
     some = CellResponses(GRID, {"bed": random.standard_normal((2, NX, NY)).astype(np.float32)})
-    over = bumps(GRID, 3.0, 1.0)
-    found = responses_to_bumps(some, "bed", over)
+    over = gaussian_basis(GRID, 3.0, 1.0)
+    found = responses_to_basis(some, "bed", over)
     k, m = 2, 3
     shape = np.exp(-(((GRID.x[:, None] - over.x[k]) / 3.0) ** 2) - ((GRID.y[None] - over.y[m]) / 1.0) ** 2)
     assert found[1, k, m] == pytest.approx(float(np.sum(some.of["bed"][1] * shape)), rel=1e-4)
@@ -138,7 +138,7 @@ def test_something_unlisted_in_the_model_may_differ_from_its_spot(flowing: tuple
     own, twice, off = (columns(drag)[:, without.shape[1] :] for drag in (0.2, 0.4, 0.0))
     assert twice == pytest.approx(2.0 * own)
     assert not off.any()
-    assert 1 < own.shape[1] < 60, "bumps around the place, not all over the channel"
+    assert 1 < own.shape[1] < 60, "functions around the place, not all over the channel"
 
 
 def test_something_unlisted_differs_from_its_spot_only_where_it_acts(flowing: tuple[Model, Point]) -> None:
@@ -191,7 +191,7 @@ def test_an_error_of_shape_does_not_look_like_another_size(
 def test_an_error_of_shape_is_no_larger_than_what_has_that_shape(
     flowing: tuple[Model, Point], name: str, amplitude: float
 ) -> None:
-    """Bumps larger than the spot held many times its water: no data were left that anything could be told from."""
+    """Basis functions larger than the spot held many times its water, and left nothing to be identified."""
     model, point = flowing
     there, size, shape = with_a_place(model, point, name, amplitude)
     whole = np.linalg.norm(there.slope[:, -1] * size)

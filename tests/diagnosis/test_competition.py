@@ -90,7 +90,7 @@ def test_what_promised_most_and_keeps_less_leaves_room_for_others(
         ]
 
     monkeypatch.setattr(competition, "refits_of", refits)
-    monkeypatch.setattr(competition, "second_looks", lambda _: ())
+    monkeypatch.setattr(competition, "conditional_screenings", lambda _: ())
     monkeypatch.setattr(competition, "_effect_trial", lambda _screening, j, *_: "abc"[j])
     kind = SimpleNamespace(name="effect", total=20.0, log_evidence=promise, log_prior=np.zeros(3))
     columns, candidates = [np.array([j]) for j in range(3)], [SimpleNamespace(name=name) for name in "abc"]
@@ -102,7 +102,7 @@ def test_what_promised_most_and_keeps_less_leaves_room_for_others(
 
 
 def test_without_a_listed_effect_all_else_competes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(competition, "second_looks", lambda _: ())
+    monkeypatch.setattr(competition, "conditional_screenings", lambda _: ())
     monkeypatch.setattr(competition, "refits_of", lambda *_: [])
     none = SimpleNamespace(name="effect", total=-np.inf, log_evidence=np.zeros(0), log_prior=np.zeros(0))
     gauge = SimpleNamespace(name="gauge", total=2.0, best=0)

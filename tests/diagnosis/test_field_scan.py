@@ -9,7 +9,7 @@ from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel, search_model
-from vegglue.calibration.model_error import CellResponses, bumps, field_columns
+from vegglue.calibration.model_error import CellResponses, field_columns, gaussian_basis
 from vegglue.calibration.noise import covariance_of
 from vegglue.case.gridded_site import build_site
 from vegglue.diagnosis.field_scan import FIELD_SIZES, FieldHypothesis, best_field, map_of_field, scanned_fields
@@ -92,7 +92,7 @@ def test_all_fields_of_a_term_share_its_prior() -> None:
 
 
 def hypothesis() -> FieldHypothesis:
-    return FieldHypothesis("friction", bumps(GRID, 3.0, 1.5), 0.5, 0.0)
+    return FieldHypothesis("friction", gaussian_basis(GRID, 3.0, 1.5), 0.5, 0.0)
 
 
 def test_the_map_is_the_mean_of_the_field_after_the_data() -> None:

@@ -1,7 +1,4 @@
-"""The calibrated model that a diagnosis starts from: its MAP estimate, its noise, and the error of its grid.
-
-The baselines of a case and of its child, which several steps of a run begin with, each computed once.
-"""
+"""The calibrated model that a diagnosis starts from: its MAP estimate, its noise, and the error of its grid."""
 
 import hashlib
 import json
@@ -14,13 +11,7 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.calibration.fit import MapEstimate, at_point, fit, log_evidence_under, objective
 from vegglue.calibration.model_error import any_error, model_error_columns
-from vegglue.calibration.noise import (
-    Noise,
-    noise_of,
-    with_grid_error,
-    with_independent_grid_errors,
-    with_model_error,
-)
+from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_independent_grid_errors, with_model_error
 from vegglue.case.channel_geometry import cells_across
 from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.case.resolved_config import dumped, plain_tree
@@ -41,13 +32,20 @@ FAR_MOVED = 1.0
 # Cells across the floor of the channel below which fingerprints are not computed on a grid. Chosen, not measured: a
 # lower bound makes more searches cheap, and their fingerprints less exact.
 FEWEST_CELLS_ACROSS = 7.0
+# Baselines that are kept, of a case and its child [-]: each holds factors of all its experiments, each 0.2 GB by its
+# size at 1142 x 40 cells.
+MOST_KEPT = 2
+# Keys of a case that change no calibration, in the form in which pydantic leaves them out.
+ONLY_NAMED = dict.fromkeys(
+    ("name", "title", "simulate", "infer", "survey", "validation", "reference", "canopy_correction"), True
+) | {"frame": True, "imported": True}
+_kept: OrderedDict[str, "Baseline"] = OrderedDict()
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """A calibrated model; coarse, on_coarse: the model on cells of twice the size and its point at the same z.
-
-    None where the grid cannot be coarsened, or the coarse model has no steady flow.
+    """A calibrated model; coarse, on_coarse: the model on cells of twice the size and its point at the same z, None if
+    the grid cannot be coarsened, or the coarse model has no steady flow.
     """
 
     model: Model
@@ -66,55 +64,42 @@ class SearchModel:
     point: Point
 
 
-def search_model(base: Baseline) -> SearchModel:
-    """The model on cells of twice the size, y_coarse = y - (f - f_coarse): residuals are those of the fine model.
-
-    The model itself where the coarse one has fewer than FEWEST_CELLS_ACROSS.
-    """
-    point, searched = base.fitted.point, coarse_search(base)
-    if searched is None:
-        return SearchModel(base.model, base.noise, point)
-    coarse, on_coarse = searched
-    shift = base.noise.used(point.prediction - on_coarse.prediction)
-    return SearchModel(coarse, replace(base.noise, value=base.noise.value - shift), on_coarse)
-
-
-def searched_by_itself(base: Baseline) -> Baseline:
-    """The baseline with nothing borrowed at the point of its search: many answers are asked for there."""
-    searched = coarse_search(base)
-    if searched is not None:
-        return replace(base, on_coarse=by_itself(*searched))
-    return replace(base, fitted=replace(base.fitted, point=by_itself(base.model, base.fitted.point)))
-
-
-def coarse_search(base: Baseline) -> tuple[Model, Point] | None:
-    """The model on cells of twice the size and its point; None where missing effects are searched on the case's own."""
-    if base.coarse is None or base.on_coarse is None or cells_across(base.coarse.site) < FEWEST_CELLS_ACROSS:
-        return None
-    return base.coarse, base.on_coarse
-
-
-def model_that_errs(base: Baseline) -> SearchModel:
-    """The model on the cells from which its own error is told: those of the case where sides of patches may lie off,
-    since cells of twice the size do not resolve what water does there; else those of the search.
-    """
-    if base.model.case.model_error.edges:
-        return SearchModel(base.model, base.noise, base.fitted.point)
-    return search_model(base)
-
-
 def baseline(model: Model, known: Array | None = None) -> Baseline:
-    """The calibrated model, from z = `known` (p,), else from the best points of the prior on coarse grids.
+    """The calibrated model; on cells of twice the size, where a fit costs a quarter, as far as possible.
 
-    What can be is done on cells of twice the size: there a fit costs a quarter. Errors: InputError when no steady flow
-    is found, or there is nothing to calibrate.
+    Parameters
+    ----------
+    model : Model
+        Of a case with at least one parameter.
+    known : array (p,), optional
+        z to start from, else the best points of the prior on coarse grids.
+
+    Returns
+    -------
+    Baseline
+        Under the errors of the data, the grid and the model.
+
+    Raises
+    ------
+    InputError
+        If no steady flow is found, or there is nothing to calibrate.
     """
     refuse_without_parameters(model.case)
     noise, coarse = noise_of(model.station), coarser(model)
     if coarse is None:
         start = _best_from_prior(model, noise) if known is None else linearise(model, known)
         return with_own_error(Baseline(model, noise, fit(model, noise, _found(model, start)), None, None))
-    near = _near(coarse, noise, known)
+    near: Point | None
+    if known is not None:
+        near = linearise(coarse, known)
+    elif (coarsest := coarser(coarse)) is None:
+        near = _best_from_prior(coarse, noise)
+    else:
+        there = _best_from_prior(coarsest, noise)
+        start = linearise_from(coarse, there.z, there)
+        if start is None:
+            raise InputError(f"{model.case.name}: no steady flow on cells of half the size was found; refine `grid`.")
+        near = fit(coarse, noise, start).point
     if near is not None and cells_across(coarse.site) >= FEWEST_CELLS_ACROSS:
         noise = with_own_error_at(noise, coarse, near)
         near = near if known is not None else fit(coarse, noise, near).point
@@ -124,22 +109,50 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
     return with_own_error(base) if near is None else with_own_error_again(base, near.z)
 
 
+def _found(model: Model, start: Point | None) -> Point:
+    if start is None:
+        raise InputError(f"{model.case.name}: the model finds no steady flow at its best point; widen the priors.")
+    return start
+
+
+def _best_from_prior(model: Model, noise: Noise) -> Point:
+    """The point of the best fit among those that start from the FITTED_POINTS with the least objective."""
+    middle, *others = places_of_prior(len(model.names))
+    first = linearise(model, middle)
+    tried = [first, *in_threads(linearise_from, [(model, z, first) for z in others])]
+    found = [point for point in tried if point is not None]
+    if not found:
+        raise InputError(
+            f"{model.case.name}: no steady flow was found at any of {PRIOR_POINTS} points of the prior; see in "
+            "`vegglue check` outlet, inflow and bed, and correct levels, discharges or priors."
+        )
+    starts = sorted(found, key=lambda point: objective(noise, point))[:FITTED_POINTS]
+    ends = in_threads(fit, [(model, noise, start) for start in starts])
+    return min(ends, key=lambda found: found.objective).point
+
+
+def places_of_prior(parameters: int) -> Array:
+    """The middle of the prior, and Sobol' points around it, z (PRIOR_POINTS, p)."""
+    from scipy.stats import norm, qmc  # late: a command that only checks a case need not wait for it
+
+    places = norm.ppf(qmc.Sobol(parameters, seed=1).random(PRIOR_POINTS))
+    places[0] = 0.0
+    return np.asarray(START_SPREAD * places)
+
+
 def under_error_of_grid(trial: Baseline) -> Baseline:
-    """The model calibrated on its own cells from a trial, the error of its grid told where that ends."""
+    """The model calibrated on its own cells from a trial, the error of its grid computed again where that ends."""
+
+    def with_error_of_grid(base: Baseline) -> Baseline:
+        noise = with_grid_error(base.noise, grid_difference(base.fitted.point, base.on_coarse))
+        return replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
+
     return with_error_of_grid(with_coarse_point(with_error_of_grid(trial)))
 
 
-def with_own_error_again(base: Baseline, z: Array) -> Baseline:
-    """`with_own_error`, unless coarse cells told it at a place z (p,) that is near enough."""
-    if _told_on_coarse_cells(base) and _is_near(base, z):
-        return with_coarse_point(base)
-    # The model's own error moves the best place, and is another there.
-    return with_own_error(base)
-
-
-def with_own_error_at(noise: Noise, coarse: Model, point: Point) -> Noise:
-    """The noise with the model's own error as coarse cells tell it at a point."""
-    return with_model_error(noise, model_error_columns(coarse, point, coarse.case.model_error))
+def grid_difference(point: Point, on_coarse: Point | None) -> Array:
+    """f - f_coarse (station,) [m/s or m], to cells of twice the size; zero if no steady flow is found on these."""
+    return point.prediction - (point if on_coarse is None else on_coarse).prediction
 
 
 def with_coarse_point(base: Baseline) -> Baseline:
@@ -148,39 +161,6 @@ def with_coarse_point(base: Baseline) -> Baseline:
     if coarse is None or (known is not None and np.array_equal(known.z, z)):
         return base
     return replace(base, on_coarse=linearise(coarse, z, known))
-
-
-def _near(coarse: Model, noise: Noise, known: Array | None) -> Point | None:
-    """A point on cells of twice the size to start from: a known place, or the best from the prior."""
-    if known is not None:
-        return linearise(coarse, known)
-    coarsest = coarser(coarse)
-    if coarsest is None:
-        return _best_from_prior(coarse, noise)
-    return _from_coarse(coarse, noise, _best_from_prior(coarsest, noise)).point
-
-
-def _found(model: Model, start: Point | None) -> Point:
-    if start is None:
-        raise InputError(f"{model.case.name}: the model finds no steady flow at its best point; widen the priors.")
-    return start
-
-
-def with_error_of_grid(base: Baseline) -> Baseline:
-    """The error of the grid from its point on coarse cells, and the model calibrated under it."""
-    noise = with_grid_error(base.noise, grid_difference(base.fitted.point, base.on_coarse))
-    return replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
-
-
-def _told_on_coarse_cells(base: Baseline) -> bool:
-    """Whether the noise holds the model's own error already, from coarse cells that are good enough for it."""
-    return bool(base.noise.model_error.any()) and not base.model.case.model_error.edges
-
-
-def _is_near(base: Baseline, z: Array) -> bool:
-    """Whether the best place lies within FAR_MOVED standard errors of z (p,) in every parameter."""
-    moved = np.abs(base.fitted.point.z - z) / np.sqrt(np.diag(base.fitted.covariance))
-    return bool(moved.max(initial=0.0) <= FAR_MOVED)
 
 
 def with_own_error(base: Baseline) -> Baseline:
@@ -194,10 +174,62 @@ def with_own_error(base: Baseline) -> Baseline:
     return with_coarse_point(replace(base, noise=noise, fitted=fitted))
 
 
-def log_evidence(base: Baseline) -> float:
-    """ln p(y) - 1/2 ln|C| of a calibrated model, C the covariance of its errors, up to a constant of the data [-].
+def with_own_error_again(base: Baseline, z: Array) -> Baseline:
+    """`with_own_error`, unless coarse cells gave it at a place z (p,) within FAR_MOVED standard errors of the best."""
+    if base.noise.model_error.any() and not base.model.case.model_error.edges:
+        moved = np.abs(base.fitted.point.z - z) / np.sqrt(np.diag(base.fitted.covariance))
+        if moved.max(initial=0.0) <= FAR_MOVED:
+            return with_coarse_point(base)
+    # The model's own error moves the best place, and is another there.
+    return with_own_error(base)
 
-    Under the errors as they are told now: a screening tells them anew, and keeps the place of the fit.
+
+def with_own_error_at(noise: Noise, coarse: Model, point: Point) -> Noise:
+    """The noise with the model's own error as computed on coarse cells at a point."""
+    return with_model_error(noise, model_error_columns(coarse, point, coarse.case.model_error))
+
+
+def model_that_errs(base: Baseline) -> SearchModel:
+    """The model on the cells on which its own error is computed: those of the case if sides of patches may lie off,
+    since cells of twice the size do not resolve what water does there; else those of the search.
+    """
+    if base.model.case.model_error.edges:
+        return SearchModel(base.model, base.noise, base.fitted.point)
+    return search_model(base)
+
+
+def search_model(base: Baseline) -> SearchModel:
+    """The model on cells of twice the size, y_coarse = y - (f - f_coarse): residuals are those of the fine model.
+
+    The model itself if the coarse one has fewer than FEWEST_CELLS_ACROSS.
+    """
+    point, searched = base.fitted.point, coarse_search(base)
+    if searched is None:
+        return SearchModel(base.model, base.noise, point)
+    coarse, on_coarse = searched
+    shift = base.noise.used(point.prediction - on_coarse.prediction)
+    return SearchModel(coarse, replace(base.noise, value=base.noise.value - shift), on_coarse)
+
+
+def coarse_search(base: Baseline) -> tuple[Model, Point] | None:
+    """The model on cells of twice the size and its point; None if missing effects are searched on the case's own."""
+    if base.coarse is None or base.on_coarse is None or cells_across(base.coarse.site) < FEWEST_CELLS_ACROSS:
+        return None
+    return base.coarse, base.on_coarse
+
+
+def searched_by_itself(base: Baseline) -> Baseline:
+    """The baseline with factors of its own at the point of its search: many responses are computed there."""
+    searched = coarse_search(base)
+    if searched is not None:
+        return replace(base, on_coarse=by_itself(*searched))
+    return replace(base, fitted=replace(base.fitted, point=by_itself(base.model, base.fitted.point)))
+
+
+def log_evidence(base: Baseline) -> float:
+    """ln p(y) - 1/2 ln|C| of a calibrated model [-], C the covariance of its errors, up to a constant of the data.
+
+    Under the errors of its noise: a screening estimates them again, and keeps the place of the fit.
     """
     here = at_point(base.noise, base.fitted.point)
     return log_evidence_under(here) - float(np.log(np.diag(base.noise.lower)).sum())
@@ -211,79 +243,23 @@ def for_prediction(base: Baseline) -> Baseline:
     return replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
 
 
-def _best_from_prior(model: Model, noise: Noise) -> Point:
-    """The point of the best fit among those that start from the best points of the prior."""
-    ends = in_threads(fit, [(model, noise, start) for start in _starts(model, noise)])
-    return min(ends, key=lambda found: found.objective).point
-
-
-def _from_coarse(model: Model, noise: Noise, near: Point) -> MapEstimate:
-    """The MAP estimate of a model, from a point of one on cells of twice the size."""
-    start = linearise_from(model, near.z, near)
-    if start is None:
-        raise InputError(f"{model.case.name}: the model finds no steady flow on cells of half the size; refine `grid`.")
-    return fit(model, noise, start)
-
-
-def grid_difference(point: Point, on_coarse: Point | None) -> Array:
-    """f - f_coarse (station,) [m/s or m], to cells of twice the size; zero where no steady flow is found on these."""
-    return point.prediction - (point if on_coarse is None else on_coarse).prediction
-
-
-def places_of_prior(parameters: int) -> Array:
-    """The middle of the prior, and Sobol' points around it, z (PRIOR_POINTS, p)."""
-    from scipy.stats import norm, qmc  # late: what only looks at a case need not wait for it
-
-    places = norm.ppf(qmc.Sobol(parameters, seed=1).random(PRIOR_POINTS))
-    places[0] = 0.0
-    return np.asarray(START_SPREAD * places)
-
-
-def _starts(model: Model, noise: Noise) -> list[Point]:
-    """The FITTED_POINTS with the least objective, of the places of the prior."""
-    middle, *others = places_of_prior(len(model.names))
-    first = linearise(model, middle)
-    tried = [first, *in_threads(linearise_from, [(model, z, first) for z in others])]
-    found = [point for point in tried if point is not None]
-    if not found:
-        raise InputError(
-            f"{model.case.name}: no steady flow was found at any of {PRIOR_POINTS} points of the prior; see what "
-            "`vegglue check` says of outlet, inflow and bed, and correct the levels, discharges or priors."
-        )
-    return sorted(found, key=lambda point: objective(noise, point))[:FITTED_POINTS]
-
-
-# A case and its child [-]: each holds factors of all its experiments, each 0.2 GB by its size at 1142 x 40 cells.
-MOST_KEPT = 2
-# Keys of a case on which no calibration hangs, as pydantic wants those to leave out.
-ONLY_NAMED = dict.fromkeys(
-    ("name", "title", "simulate", "infer", "survey", "validation", "reference", "canopy_correction"), True
-) | {"frame": True, "imported": True}
-_kept: OrderedDict[str, Baseline] = OrderedDict()
-
-
 def kept_baseline(model: Model) -> Baseline:
-    """`baseline` of a model from its prior; of the same grid, measurements and priors it is not made again."""
-    if model.engine is not NEWTON or model.case.effect_file is not None:  # codes of others, which may have changed
+    """`baseline` of a model from its prior, kept in memory: of the same grid, measurements and priors it is not
+    computed again.
+    """
+    if model.engine is not NEWTON or model.case.effect_file is not None:  # codes of users, which may have changed
         return baseline(model)
-    key = _content_of(model)
-    found = _kept.pop(key, None)
-    if found is None:
-        found = baseline(model)
-    else:
-        found = replace(found, model=model, coarse=None if found.coarse is None else coarser(model))
-    _kept[key] = found
-    while len(_kept) > MOST_KEPT:
-        _kept.popitem(last=False)
-    return found
-
-
-def _content_of(model: Model) -> str:
-    """A digest of what the predictions of a model and its misfit hang on, as it was read."""
-    tree = plain_tree(dumped(model.case, ONLY_NAMED), str)
-    digest = hashlib.sha256(json.dumps(tree).encode())
+    digest = hashlib.sha256(json.dumps(plain_tree(dumped(model.case, ONLY_NAMED), str)).encode())
     for site in (model.site, *model.site.own.values()):
         for values in (site.bed, site.friction_class, site.patch, site.cover):
             digest.update(values.tobytes())
     digest.update(pd.util.hash_pandas_object(model.station, index=False).to_numpy().tobytes())
-    return digest.hexdigest()
+    found = _kept.pop(digest.hexdigest(), None)
+    if found is None:
+        found = baseline(model)
+    else:
+        found = replace(found, model=model, coarse=None if found.coarse is None else coarser(model))
+    _kept[digest.hexdigest()] = found
+    while len(_kept) > MOST_KEPT:
+        _kept.popitem(last=False)
+    return found

@@ -1,10 +1,9 @@
-"""Candidates: every effect of the library that a case could lack, as a case with one parameter more.
+"""What may be missing or off: effects of the library that a case could lack, as a case with one parameter more, and
+instruments.
 
-Instruments that could be off: a reading, a probe at one place or at one y of all sections, a gauge at one place.
+    value -> value + offset,   the offset the same in all readings of the instrument
 
-value -> value + offset,   the offset the same in all readings of the instrument
-
-By its offset it is found. A probe may be off by a factor, too: once it is set aside neither counts, see
+An instrument is found by its offset. A probe may be off by a factor, too: once it is excluded neither counts, see
 `error_columns`.
 """
 
@@ -33,7 +32,7 @@ MOST_SETTINGS = 12
 # Share of a plausible size [-] by which a fit starts off the ends of a support: there the normal variable in which it
 # searches is at its furthest. Chosen, not measured.
 START_OFF_ENDS = 0.01
-# Tags of effects that are no suspects of their own: something at a place, and laws of the grammar.
+# Tags of effects that are no candidates of their own: something at a place, and laws of the grammar.
 NOT_SEARCHED = {"search", "law"}
 
 
@@ -95,11 +94,10 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
             continue
         if effect.each == "case":
             found.append(Candidate(effect))
-            continue
-        if effect.each == "patch":
+        elif effect.each == "patch":
             found += [patch_candidate(effect, index, case) for index in range(len(case.plants.patches))]
-            continue
-        found += [acting_in(effect, effect.each, (name,)) for name in possible[effect.each]]
+        else:
+            found += [acting_in(effect, effect.each, (name,)) for name in possible[effect.each]]
     return [one for one in found if not at_work(case, one)]
 
 
@@ -108,15 +106,14 @@ def at_work(case: Case, candidate: Candidate) -> bool:
 
     A key of the same name counts too: the candidate would take its place.
     """
-    if candidate.key in case.effects:
-        return True
-    return any(_acts_in(case, one) == _acts_in(case, candidate) for one in candidates_in_case(case).values())
 
+    def acts_in(one: Candidate) -> tuple[object, ...]:
+        """Every experiment by its name is the same as none."""
+        experiments = frozenset(one.experiments or case.experiments)
+        return one.effect.name, one.at, experiments, frozenset(one.sections), frozenset(one.devices)
 
-def _acts_in(case: Case, one: Candidate) -> tuple[object, ...]:
-    """The effect and where it acts; every experiment by its name is the same as none."""
-    experiments = frozenset(one.experiments or case.experiments)
-    return one.effect.name, one.at, experiments, frozenset(one.sections), frozenset(one.devices)
+    in_case = candidates_in_case(case).values()
+    return candidate.key in case.effects or any(acts_in(one) == acts_in(candidate) for one in in_case)
 
 
 def acting_in(effect: Effect, kind: str, names: tuple[str, ...]) -> Candidate:
@@ -139,22 +136,22 @@ def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
 
 def candidates_in_case(case: Case) -> dict[str, Candidate]:
     """The effects of a case as candidates, by their keys; shapes that are calibrated in the middle of their priors."""
-    return {key: _candidate_of(case, key, entry) for key, entry in case.effects.items()}
+    found = {}
+    for key, entry in case.effects.items():
+        effect = effect_of(case, key)
+        shapes = {one.name: float(middle_value(case, entry.values.get(one.name, one.default))) for one in effect.shapes}
+        if effect.each == "patch" and (index := int(shapes["patch"]) - 1) in range(len(case.plants.patches)):
+            found[key] = patch_candidate(effect, index, case)
+        elif "search" in effect.tags and key != effect.name:
+            found[key] = place_candidate(effect, shapes)
+        else:
+            found[key] = Candidate(effect, entry.experiments or (), entry.sections, entry.devices)
+    return found
 
 
 def candidate_in_case(case: Case, name: str) -> Candidate:
     """The effect of a case that has this name as a candidate."""
     return next(one for one in candidates_in_case(case).values() if one.name == name)
-
-
-def _candidate_of(case: Case, key: str, entry: EffectEntry) -> Candidate:
-    effect = effect_of(case, key)
-    shapes = {one.name: float(middle_value(case, entry.values.get(one.name, one.default))) for one in effect.shapes}
-    if effect.each == "patch" and (index := int(shapes["patch"]) - 1) in range(len(case.plants.patches)):
-        return patch_candidate(effect, index, case)
-    if "search" in effect.tags and key != effect.name:
-        return place_candidate(effect, shapes)
-    return Candidate(effect, entry.experiments or (), entry.sections, entry.devices)
 
 
 def patch_candidate(effect: Effect, index: int, case: Case) -> Candidate:
@@ -184,12 +181,9 @@ def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, fl
 def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Case:
     """The case with one effect more; its amplitude is a parameter, its shapes are numbers."""
     parameter = candidate.parameter
-    return case.model_copy(
-        update={
-            "effects": {**case.effects, candidate.key: effect_entry(candidate, parameter, shapes)},
-            "parameters": {**case.parameters, parameter: prior_of(candidate)},
-        }
-    )
+    effects = {**case.effects, candidate.key: effect_entry(candidate, parameter, shapes)}
+    parameters = {**case.parameters, parameter: prior_of(candidate)}
+    return case.model_copy(update={"effects": effects, "parameters": parameters})
 
 
 def cause_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Cause:
@@ -245,23 +239,26 @@ def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument,
     """
     kinds = [kind_of(str(name)) for name in used["kind"]]
     places = used[["x", "y"]].to_numpy(float)
-    rows = range(len(used))
-    probes = [row for row in rows if kinds[row].velocity]
-    gauges = [row for row in rows if kinds[row].instrument == "gauge"]
+
+    def shared(kind: InstrumentKind, name: Mapping[int, Hashable]) -> tuple[Instrument, ...]:
+        """Instruments of more than one reading, rows of the same name together."""
+        together: dict[Hashable, list[int]] = {}
+        for row, its in name.items():
+            together.setdefault(its, []).append(row)
+        several = [rows for rows in together.values() if len(rows) > 1]
+        return tuple(Instrument(kind, tuple(rows), *map(float, places[rows[0]])) for rows in several)
+
     # To a millimetre: a place on the axis that was turned from a map lies at 0 or at -0.
-    of = [(kinds[row].name, round(float(places[row, 0]), 3), round(float(places[row, 1]), 3)) for row in rows]
-    across = [(name, y) for name, _, y in of]
-    positions = _shared("position", {row: of[row] for row in probes}, places)
+    of = [(kind.name, round(float(x), 3), round(float(y), 3)) for kind, (x, y) in zip(kinds, places, strict=True)]
+    probes = [row for row, kind in enumerate(kinds) if kind.velocity]
+    positions = shared("position", {row: of[row] for row in probes})
     at_one_place = {one.readings for one in positions}
+    across = shared("probe", {row: (of[row][0], of[row][2]) for row in probes})
     return {
-        "reading": tuple(Instrument("reading", (row,), *map(float, places[row])) for row in rows),
+        "reading": tuple(Instrument("reading", (row,), *map(float, place)) for row, place in enumerate(places)),
         "position": positions,
-        "probe": tuple(
-            replace(one, x=float("nan"))
-            for one in _shared("probe", {row: across[row] for row in probes}, places)
-            if one.readings not in at_one_place
-        ),
-        "gauge": _shared("gauge", {row: of[row] for row in gauges}, places),
+        "probe": tuple(replace(one, x=float("nan")) for one in across if one.readings not in at_one_place),
+        "gauge": shared("gauge", {row: of[row] for row, kind in enumerate(kinds) if kind.instrument == "gauge"}),
     }
 
 
@@ -281,13 +278,3 @@ def offset_columns(instruments: tuple[Instrument, ...], stations: int) -> Array:
     for j, one in enumerate(instruments):
         columns[list(one.readings), j] = 1.0
     return columns
-
-
-def _shared(kind: InstrumentKind, name: Mapping[int, Hashable], places: Array) -> tuple[Instrument, ...]:
-    """Instruments of more than one reading, rows of the same name together; places: x, y of all rows (n, 2) [m]."""
-    together: dict[Hashable, list[int]] = {}
-    for row, its in name.items():
-        together.setdefault(its, []).append(row)
-    return tuple(
-        Instrument(kind, tuple(rows), *map(float, places[rows[0]])) for rows in together.values() if len(rows) > 1
-    )

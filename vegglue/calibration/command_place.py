@@ -38,72 +38,65 @@ class CommandPlace:
 
 
 def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace:
-    """The search, from the first place of the prior where the command runs: it hangs on nothing but the case.
+    """The search, from the first place of the prior where the command runs: it depends on nothing but the case.
 
-    Errors: InputError when it runs at none of them, or the built-in engine finds no flow.
+    Raises
+    ------
+    InputError
+        If the command runs at none of these places, or the built-in engine finds no flow.
     """
-    z, correction = _start(runs, model, _named(watch, "place 1"))
-    here = _model_at(runs, model, correction, watch)
+
+    def in_phase(words: str) -> Watch:
+        """A phase of its own, so that the time that is left is that of its runs."""
+        return lambda now: watch(replace(now, phase=f"{now.phase}, {words}"))
+
+    def model_at(correction: Correction, phase: Watch = watch) -> Model:
+        return replace(model, engine=corrected(correction, runs, phase))
+
+    def objective_at(here: Model, noise: Noise, z: Array) -> float:
+        point = linearise(here, z)
+        return np.inf if point is None else objective(noise, point)
+
+    def lower_place(here: Model, base: Baseline, z: Array, phase: Watch) -> Array | None:
+        """A place towards the calibrated model where the command itself fits better than at z (p,), if there is one."""
+        before, step = objective_at(here, base.noise, z), base.fitted.point.z - z
+        for _ in range(MOST_HALVINGS):
+            try:
+                there = correction_at(runs, model, z + step, phase, slopes=False)
+            except InputError:  # the command fails there: it may not nearer by
+                there = None
+            if there is not None and objective_at(model_at(there, phase), base.noise, z + step) < before:
+                return np.asarray(z + step)
+            step = step / 2.0
+        return None
+
+    z, correction = _start(runs, model, in_phase("place 1"))
+    here = model_at(correction)
     base = baseline(here)
     for places in range(1, MOST_PLACES + 1):
-        if _is_near(base, z):
+        away = base.fitted.point.z - z
+        if away @ np.linalg.solve(base.fitted.covariance, away) < NEGLIGIBLE_DECREASE:
             return CommandPlace(here, z, True, places, correction.rough)
         if places == MOST_PLACES:
             break
-        lower = _lower(runs, model, here, base, z, _named(watch, f"on the way to place {places + 1}"))
+        lower = lower_place(here, base, z, in_phase(f"on the way to place {places + 1}"))
         if lower is None:
             break
-        z, correction = lower, correction_at(runs, model, lower, _named(watch, f"place {places + 1}"))
-        here = _model_at(runs, model, correction, watch)
+        z, correction = lower, correction_at(runs, model, lower, in_phase(f"place {places + 1}"))
+        here = model_at(correction)
         base = baseline(here, z)
     return CommandPlace(here, z, False, places, correction.rough)
 
 
-def _named(watch: Watch, words: str) -> Watch:
-    """The same, told as a phase of its own, so that the time that is left is that of its runs."""
-    return lambda now: watch(replace(now, phase=f"{now.phase}, {words}"))
-
-
 def _start(runs: CommandRuns, model: Model, watch: Watch) -> tuple[Array, Correction]:
-    """The middle of the prior or, where the command fails, the next of its Sobol' points."""
+    """The middle of the prior or, if the command fails there, the next of its Sobol' points."""
     refused = InputError(f"{model.case.name}: the command has no place to start from.")
     for z in places_of_prior(len(model.names)):
         try:
             correction_at(runs, model, z, watch, slopes=False)  # alone: a command that fails may take its time
             return z, correction_at(runs, model, z, watch)
-        except DeafCommandError:  # it is no more use anywhere else
+        except DeafCommandError:  # it fails anywhere else too
             raise
         except InputError as error:
             refused = error
     raise refused
-
-
-def _model_at(runs: CommandRuns, model: Model, correction: Correction, watch: Watch) -> Model:
-    return replace(model, engine=corrected(correction, runs, watch))
-
-
-def _is_near(base: Baseline, z: Array) -> bool:
-    """Whether the calibrated model lies so near z (p,) that another step would gain next to nothing."""
-    away = base.fitted.point.z - z
-    return bool(away @ np.linalg.solve(base.fitted.covariance, away) < NEGLIGIBLE_DECREASE)
-
-
-def _lower(runs: CommandRuns, model: Model, here: Model, base: Baseline, z: Array, watch: Watch) -> Array | None:
-    """A place towards the calibrated model where the command itself fits better than at z (p,); None where there is
-    none.
-    """
-    before, step = _objective(here, base.noise, z), base.fitted.point.z - z
-    for _ in range(MOST_HALVINGS):
-        try:
-            there = correction_at(runs, model, z + step, watch, slopes=False)
-        except InputError:  # the command fails there: it may not nearer by
-            there = None
-        if there is not None and _objective(_model_at(runs, model, there, watch), base.noise, z + step) < before:
-            return np.asarray(z + step)
-        step = step / 2.0
-    return None
-
-
-def _objective(model: Model, noise: Noise, z: Array) -> float:
-    point = linearise(model, z)
-    return np.inf if point is None else objective(noise, point)

@@ -1,4 +1,4 @@
-"""The maximum a posteriori (MAP) estimate of the parameters, by damped least squares with exact slopes.
+"""The MAP estimate: the best parameters of a model, given measurements and priors.
 
     minimise |W (y - f(z))|^2 + |z|^2,   W' W = cov^-1
 
@@ -10,7 +10,7 @@ Steps follow the bend of the predictions (geodesic acceleration):
     z + t v + t^2/2 a,   (H + l 1) v = b,   (H + l 1) a = -J' W' W f_vv,   f_vv = 2/h [(f(z + h v) - f(z))/h - J v]
 
 Drag and height of a canopy make up for one another along a curve, which straight steps leave at once.
-Source: Transtrum and Sethna (2012), doi:10.48550/arXiv.1201.5885, who refuse a step where a is long; here t shortens
+Source: Transtrum and Sethna (2012), doi:10.48550/arXiv.1201.5885, where a step is refused if a is long; here t shortens
 it.
 """
 
@@ -39,7 +39,7 @@ LONGEST_FIT_STEP = 1.5
 DAMPINGS = (0.0, *np.geomspace(1e-2, 1e10, 49))
 # h [-] and the largest t |a| / |v| [-], as in the source.
 BEND_STEP, LARGEST_BEND = 0.1, 0.75
-# Predicted decrease of the objective [-] below which the bend is not asked for: steps are then within a standard error.
+# Predicted decrease of the objective [-] below which the bend is not computed: steps are then within a standard error.
 # Chosen, not measured: each bend costs a flow without slopes, a quarter of one with them.
 STRAIGHT_DECREASE = 1.0
 
@@ -55,14 +55,37 @@ class MapEstimate:
 
 
 def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS, enough: float = np.inf) -> MapEstimate:
-    """The MAP estimate, searched from a point by Levenberg-Marquardt steps (More 1978, doi:10.1007/BFb0067700).
+    """The MAP estimate, searched from a point by Levenberg-Marquardt steps.
 
-    The longest step shrinks where one is taken back. The search ends when the predicted decrease is below
-    NEGLIGIBLE_DECREASE, after `steps`, or when slopes promise no objective below `enough`.
+    The longest step shrinks where one is taken back. The search ends if the predicted decrease is below
+    NEGLIGIBLE_DECREASE, after `steps`, or if slopes promise no objective below `enough`.
+
+    Parameters
+    ----------
+    model : Model
+        Predictions and slopes at any z.
+    noise : Noise
+        Measured values and the covariance of their errors.
+    start : Point
+        Where the search begins.
+    steps : int
+        Runs of the model at most.
+    enough : float
+        Objective [-] above which the search is given up.
+
+    Returns
+    -------
+    MapEstimate
+        The last point that was kept.
+
+    References
+    ----------
+    More (1978), doi:10.1007/BFb0067700.
     """
     point, longest = start, LONGEST_FIT_STEP
     for _ in range(steps):
-        matrix, right = _normal_equations(noise, point)
+        slope, residual = noise.whiten(noise.used(point.slope)), noise.whiten(noise.residual(point.prediction))
+        matrix, right = slope.T @ slope + np.eye(point.z.size), slope.T @ residual - point.z
         damped, step, predicted = _step(point, matrix, right, longest)
         before = objective(noise, point)
         # The least objective by the slopes here is F - b' H^-1 b.
@@ -71,12 +94,52 @@ def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS, enoug
         if predicted > STRAIGHT_DECREASE:
             step = _bent(model, noise, point, damped, step)
         there = point.z + step
-        # The slopes of a step that is taken back are never asked for: they are half of its work.
+        # The slopes of a step that is taken back are never computed: they are half of its work.
         moved = linearise(model, there, point, partial(_is_below, before, noise, there))
         length = float(np.abs(step).max())
         longest = length / 4.0 if moved is None else min(max(longest, 2.0 * length), LONGEST_FIT_STEP)
         point = moved or point
     return at_point(noise, point)
+
+
+def _is_below(limit: float, noise: Noise, z: Array, prediction: Array) -> bool:
+    """Whether the objective of predictions (n,) at z is below a limit."""
+    return squared_misfit(noise, prediction) + float(z @ z) < limit
+
+
+def _step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Array, Array, float]:
+    """The matrix H + l 1, damped until its step (p,) is no longer than `longest` (Levenberg 1944), the step, and the
+    predicted decrease.
+    """
+    # Beyond FURTHEST theta equals its bound: a z that would go there is held, else it shortens the step of the others.
+    held = (np.abs(point.z) >= FURTHEST) & (right * point.z > 0.0)
+    matrix, right = np.where(held[:, None] | held, np.eye(held.size), matrix), np.where(held, 0.0, right)
+    for damping in DAMPINGS:
+        damped = matrix + damping * np.eye(point.z.size)
+        step = np.linalg.solve(damped, right)
+        if np.abs(step).max() <= longest:
+            break
+    step = np.clip(point.z + step, -FURTHEST, FURTHEST) - point.z
+    return damped, np.asarray(step), float(2.0 * right @ step - step @ matrix @ step)
+
+
+def _bent(model: Model, noise: Noise, point: Point, damped: Array, step: Array) -> Array:
+    """The step (p,) along the bend of the predictions, shorter if that is large; straight if no flow is found ahead."""
+    ahead = list[Array]()
+
+    def kept_without_slopes(prediction: Array) -> bool:
+        ahead.append(prediction)
+        return False
+
+    linearise(model, point.z + BEND_STEP * step, point, kept_without_slopes)
+    if not ahead:
+        return step
+    bend = 2.0 / BEND_STEP * ((ahead[0] - point.prediction) / BEND_STEP - point.slope @ step)
+    slope = noise.whiten(noise.used(point.slope))
+    turn = -np.linalg.solve(damped, slope.T @ noise.whiten(noise.used(bend)))
+    share = min(1.0, LARGEST_BEND * float(np.linalg.norm(step)) / max(float(np.linalg.norm(turn)), 1e-300))
+    there = point.z + share * step + 0.5 * share**2 * turn
+    return np.asarray(np.clip(there, -FURTHEST, FURTHEST) - point.z)
 
 
 def at_point(noise: Noise, point: Point) -> MapEstimate:
@@ -92,6 +155,17 @@ def chi2(noise: Noise, point: Point) -> float:
 def squared_misfit(noise: Noise, prediction: Array) -> float:
     """|W (y - f)|^2 of predictions f (station,) [-]."""
     return float(np.sum(noise.whiten(noise.residual(prediction)) ** 2))
+
+
+def objective(noise: Noise, point: Point) -> float:
+    """|W (y - f)|^2 + |z|^2 [-]."""
+    return chi2(noise, point) + float(point.z @ point.z)
+
+
+def covariance(noise: Noise, point: Point) -> Array:
+    """(J' W' W J + I)^-1 (p, p): the covariance of z around a MAP estimate, J = df/dz."""
+    slope = noise.whiten(noise.used(point.slope))
+    return np.asarray(np.linalg.inv(slope.T @ slope + np.eye(point.z.size)))
 
 
 def chance_of_misfit(misfit: float, freedom: int) -> float:
@@ -114,25 +188,9 @@ def freedom_of_misfit(readings: int, spread: Array) -> int:
     return round(readings - determined(spread))
 
 
-def objective(noise: Noise, point: Point) -> float:
-    """|W (y - f)|^2 + |z|^2 [-]."""
-    return chi2(noise, point) + float(point.z @ point.z)
-
-
-def _is_below(limit: float, noise: Noise, z: Array, prediction: Array) -> bool:
-    """Whether the objective of predictions (n,) at z is below a limit."""
-    return squared_misfit(noise, prediction) + float(z @ z) < limit
-
-
-def covariance(noise: Noise, point: Point) -> Array:
-    """(J' W' W J + I)^-1 (p, p): the covariance of z around a MAP estimate, J = df/dz."""
-    slope = noise.whiten(noise.used(point.slope))
-    return np.asarray(np.linalg.inv(slope.T @ slope + np.eye(point.z.size)))
-
-
 def log_evidence_under(fitted: MapEstimate) -> float:
-    """ln p(y) = -1/2 F - 1/2 ln|H| by Laplace, F the objective and H^-1 the covariance of z, up to what all models have
-    in common under the same covariance of the errors [-].
+    """ln p(y) = -1/2 F - 1/2 ln|H| by Laplace [-], F the objective and H^-1 the covariance of z, up to what all models
+    have in common under the same covariance of the errors.
 
     Source: Kass and Raftery (1995), doi:10.2307/2291091, their equation 5; not checked against it.
     """
@@ -146,51 +204,3 @@ def interval95(model: Model, fitted: MapEstimate, name: str) -> tuple[float, flo
     z[:, j] += NORMAL95 * np.sqrt(fitted.covariance[j, j]) * np.array([0.0, -1.0, 1.0])
     middle, low, high = theta_at(model.case, z)[name]
     return float(middle), float(low), float(high)
-
-
-def _normal_equations(noise: Noise, point: Point) -> tuple[Array, Array]:
-    """H = J' W' W J + I (p, p) and b = J' W' W (y - f) - z (p,)."""
-    slope = noise.whiten(noise.used(point.slope))
-    residual = noise.whiten(noise.residual(point.prediction))
-    return slope.T @ slope + np.eye(point.z.size), slope.T @ residual - point.z
-
-
-def _step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Array, Array, float]:
-    """The matrix H + l 1, damped until its step (p,) is no longer than `longest` (Levenberg 1944), the step, and the
-    predicted decrease.
-    """
-    # Beyond FURTHEST theta equals its bound: a z that would go there is held, else it shortens the step of the others.
-    held = (np.abs(point.z) >= FURTHEST) & (right * point.z > 0.0)
-    matrix, right = np.where(held[:, None] | held, np.eye(held.size), matrix), np.where(held, 0.0, right)
-    for damping in DAMPINGS:
-        damped = matrix + damping * np.eye(point.z.size)
-        step = np.linalg.solve(damped, right)
-        if np.abs(step).max() <= longest:
-            break
-    step = np.clip(point.z + step, -FURTHEST, FURTHEST) - point.z
-    return damped, np.asarray(step), float(2.0 * right @ step - step @ matrix @ step)
-
-
-def _bent(model: Model, noise: Noise, point: Point, damped: Array, step: Array) -> Array:
-    """The step (p,) along the bend of the predictions, shorter where that is large; straight where no flow tells it."""
-    ahead = _prediction(model, point.z + BEND_STEP * step, point)
-    if ahead is None:
-        return step
-    bend = 2.0 / BEND_STEP * ((ahead - point.prediction) / BEND_STEP - point.slope @ step)
-    slope = noise.whiten(noise.used(point.slope))
-    turn = -np.linalg.solve(damped, slope.T @ noise.whiten(noise.used(bend)))
-    share = min(1.0, LARGEST_BEND * float(np.linalg.norm(step)) / max(float(np.linalg.norm(turn)), 1e-300))
-    there = point.z + share * step + 0.5 * share**2 * turn
-    return np.asarray(np.clip(there, -FURTHEST, FURTHEST) - point.z)
-
-
-def _prediction(model: Model, z: Array, near: Point) -> Array | None:
-    """Predictions (n,) at z, without slopes; None where no flow is found."""
-    found = list[Array]()
-
-    def told(prediction: Array) -> bool:
-        found.append(prediction)
-        return False
-
-    linearise(model, z, near, told)
-    return found[0] if found else None

@@ -1,15 +1,12 @@
-"""Laws beside all that is screened: one score test for each, and an alarm of their own.
-
-The errors' correlation is estimated with laws among what could be missing, else a law that is missing would pass for
-correlated errors. Listed effects, places and instruments keep their kinds and chances.
-
-Products of a law that is in the model with other quantities of its term, beside all else that may be missing yet.
+"""Laws beside all that is screened: one score test for each, and an alarm of their own; then products of a law that is
+in the model with other quantities of its term.
 
     k -> k exp(a g_1 + c g_1 g_2)
 
-One score test for each product at the flow with the law, and an alarm of their own. What else could explain what is
-left competes: a second law of any quantity, in any form, listed effects, places and instruments. The listed ones have
-the fingerprints of the flow without the law, which costs nothing.
+The errors' correlation is estimated with laws among what could be missing, else a law that is missing would pass for
+correlated errors. Listed effects, places and instruments keep their kinds and chances. Products are tested at the flow
+with the law; what else could explain what is left competes: a second law of any quantity, in any form, listed effects,
+places and instruments. The listed ones have the fingerprints of the flow without the law, which costs nothing.
 """
 
 from collections import Counter
@@ -19,13 +16,19 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.calibration.candidates import cause_of
 from vegglue.calibration.fingerprints import Fingerprints, fingerprints_of
 from vegglue.calibration.laws_in_case import LawInCase, law_traces, laws_in_case, products_in_case
 from vegglue.calibration.residual_screening import GROUPS, Screening, kind_of_listed, screen
-from vegglue.calibration.score_test import HypothesisKind, alarm_p, family_of, kind_of_hypotheses
+from vegglue.calibration.score_test import (
+    HypothesisKind,
+    Projected,
+    alarm_p,
+    cosines,
+    family_of,
+    kind_of_hypotheses,
+)
 from vegglue.case.channel_geometry import half_width
 from vegglue.decision_constants import constants
 
@@ -97,70 +100,61 @@ def law_fingerprints(
 ) -> LawFingerprints:
     """Of a calibrated model; without: listed effects that are left out; known: fingerprints of what is listed."""
     search = search_model(base)
-    listed = _left(known or fingerprints_of(search, half_width(base.model.site)), without)
-    laws = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
-    return LawFingerprints(listed, laws, with_laws(listed, laws, search) if laws else listed)
-
-
-def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...] = ()) -> LawScreening:
-    """Score tests of a calibrated model with laws, one at least; flagged: readings that were set aside."""
-    listed, laws, every = found.listed, found.laws, found.every
-    full = screen(base, flagged, every, LAW_SEED)
-    count = len(listed.settings)
-    columns = [numbers - count for numbers in every.columns[len(listed.candidates) :]]
-    kind = kind_of_laws(full, laws, columns, slice(count, None))
-    return LawScreening(
-        listed=of_listed(full, listed),
-        laws=laws,
-        kind=kind,
-        columns=columns,
-        settings=every.settings[count:],
-        p=alarm_p([kind], full.errors, LAW_SEED),
-        cosine=score_test.cosines(full.projected),
-    )
-
-
-def _left(found: Fingerprints, without: tuple[str, ...]) -> Fingerprints:
-    """Fingerprints but for those of some listed effects."""
+    found = known or fingerprints_of(search, half_width(base.model.site))
     kept = [j for j, one in enumerate(found.candidates) if one.effect.name not in without]
     columns = np.concatenate([np.zeros(0), *(found.columns[j] for j in kept)]).astype(int)
-    starts = np.cumsum([0, *(found.columns[j].size for j in kept)])
-    return replace(
+    listed = replace(
         found,
         candidates=[found.candidates[j] for j in kept],
-        columns=[np.arange(first, last) for first, last in pairwise(starts)],
+        columns=_consecutive([found.columns[j].size for j in kept]),
         settings=[found.settings[c] for c in columns],
         amplitudes=[found.amplitudes[c] for c in columns],
         causes=[found.causes[c] for c in columns],
         values=found.values[:, columns],
     )
+    laws = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
+    return LawFingerprints(listed, laws, _with_laws(listed, laws, search) if laws else listed)
 
 
-def with_laws(listed: Fingerprints, laws: list[LawInCase], search: SearchModel) -> Fingerprints:
+def _consecutive(sizes: Sequence[int]) -> list[np.ndarray]:
+    """Numbers of columns that stand one group after another, by group."""
+    return [np.arange(*ends) for ends in pairwise(accumulate(sizes, initial=0))]
+
+
+def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...] = ()) -> LawScreening:
+    """Score tests of a calibrated model with laws, one at least; flagged: readings that are excluded."""
+    full, count = screen(base, flagged, found.every, LAW_SEED), len(found.listed.settings)
+    columns = [numbers - count for numbers in found.every.columns[len(found.listed.candidates) :]]
+    kind = _kind_of_laws(full, found.laws, columns, slice(count, None))
+    return LawScreening(
+        listed=_of_listed(full, found.listed),
+        laws=found.laws,
+        kind=kind,
+        columns=columns,
+        settings=found.every.settings[count:],
+        p=alarm_p([kind], full.errors, LAW_SEED),
+        cosine=cosines(full.projected),
+    )
+
+
+def _with_laws(listed: Fingerprints, laws: list[LawInCase], search: SearchModel) -> Fingerprints:
     """Fingerprints of listed effects, then of laws."""
-    first = len(listed.settings)
-    columns, settings, amplitudes, causes = list(listed.columns), list(listed.settings), list(listed.amplitudes), []
-    for one in laws:
-        tried = one.candidate.settings()
-        columns.append(first + np.arange(len(tried)))
-        settings += tried
-        amplitudes += [one.candidate.amplitude] * len(tried)
-        causes += [cause_of(search.model.case, one.candidate, shapes) for shapes in tried]
-        first += len(tried)
-    traces = law_traces(search.model, search.point)
-    values = np.hstack([traces.of(one.law, one.candidate.settings()) for one in laws])
+    first, traces = len(listed.settings), law_traces(search.model, search.point)
+    tried = [one.candidate.settings() for one in laws]
+    pairs = [(one.candidate, shapes) for one, some in zip(laws, tried, strict=True) for shapes in some]
+    values = np.hstack([traces.of(one.law, some) for one, some in zip(laws, tried, strict=True)])
     return replace(
         listed,
         candidates=[*listed.candidates, *(one.candidate for one in laws)],
-        columns=columns,
-        settings=settings,
-        amplitudes=amplitudes,
-        causes=[*listed.causes, *causes],
+        columns=[*listed.columns, *(first + some for some in _consecutive([len(some) for some in tried]))],
+        settings=[*listed.settings, *(shapes for _, shapes in pairs)],
+        amplitudes=[*listed.amplitudes, *(one.amplitude for one, _ in pairs)],
+        causes=[*listed.causes, *(cause_of(search.model.case, one, shapes) for one, shapes in pairs)],
         values=np.hstack([listed.values, values]),
     )
 
 
-def _part(projected: score_test.Projected, columns: slice) -> score_test.Projected:
+def _part(projected: Projected, columns: slice) -> Projected:
     return replace(
         projected,
         fingerprints=projected.fingerprints[:, columns],
@@ -169,7 +163,7 @@ def _part(projected: score_test.Projected, columns: slice) -> score_test.Project
     )
 
 
-def kind_of_laws(
+def _kind_of_laws(
     full: Screening, laws: Sequence[LawInCase], columns: Sequence[np.ndarray], part: slice
 ) -> HypothesisKind:
     """All quantities of all terms are as likely before, all forms of one, and all references of a form.
@@ -184,7 +178,7 @@ def kind_of_laws(
     return kind_of_hypotheses("law", _part(full.projected, part), plausible, prior)
 
 
-def of_listed(full: Screening, listed: Fingerprints) -> Screening:
+def _of_listed(full: Screening, listed: Fingerprints) -> Screening:
     """The screening of the listed effects alone, with the noise that was estimated with laws."""
     count, projected = len(listed.settings), _part(full.projected, slice(len(listed.settings)))
     return replace(
@@ -221,9 +215,8 @@ class ProductScreening:
             for one, some in zip(found.candidates, found.columns, strict=True)
             if some.max(initial=0) < cosine.size
         }
-        return tuple(
-            name for name in sorted(near, key=lambda name: -near[name]) if near[name] > constants().alike_cosine
-        )
+        least = constants().alike_cosine
+        return tuple(name for name in sorted(near, key=lambda name: -near[name]) if near[name] > least)
 
 
 def screen_products(
@@ -231,37 +224,30 @@ def screen_products(
 ) -> ProductScreening | None:
     """Of a model calibrated with a law; listed: fingerprints of what is listed; reference: of the law, if it has one.
 
-    None where the data have seen too little of every other quantity.
+    None if the data have seen too little of every other quantity.
     """
     search = search_model(base)
     products = products_in_case(search.model, search.point, law, reference)
     if not products:
         return None
     singles = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
-    every = with_laws(listed, [*singles, *products], search)
+    every = _with_laws(listed, [*singles, *products], search)
     full, first = screen(base, (), every, LAW_SEED), len(listed.settings)
-    middle = first + sum(len(one.candidate.settings()) for one in singles)
-    kind = kind_of_laws(full, products, _columns(products), slice(middle, None))
-    single = kind_of_laws(full, singles, _columns(singles), slice(first, middle))
+    of_singles, of_products = (
+        _consecutive([len(one.candidate.settings()) for one in some]) for some in (singles, products)
+    )
+    middle = first + sum(some.size for some in of_singles)
+    kind = _kind_of_laws(full, products, of_products, slice(middle, None))
+    single = _kind_of_laws(full, singles, of_singles, slice(first, middle))
+    # Something at a place is as vague as a law.
+    without, places = _of_listed(full, listed), {one.term for one in listed.places}
+    totals = [one.total - np.log(constants().listed_over_laws) * (one.name in places) for one in without.kinds]
     return ProductScreening(
         full=full,
         products=products,
         kind=kind,
-        law_of=np.repeat(np.arange(len(products)), [some.size for some in _columns(products)]),
+        law_of=np.repeat(np.arange(len(products)), [some.size for some in of_products]),
         settings=every.settings[middle:],
-        others=_all_else(of_listed(full, listed), single),
+        others=float(np.logaddexp.reduce([*totals, single.total])),
         p=alarm_p([kind], full.errors, LAW_SEED),
     )
-
-
-def _columns(laws: Sequence[LawInCase]) -> list[np.ndarray]:
-    """The columns of each law where only these stand."""
-    ends = accumulate((len(one.candidate.settings()) for one in laws), initial=0)
-    return [np.arange(*pair) for pair in pairwise(ends)]
-
-
-def _all_else(listed: Screening, laws: HypothesisKind) -> float:
-    """ln evidence of all that is no product; something at a place is as vague as a law."""
-    places = {one.term for one in listed.fingerprints.places}
-    totals = [kind.total - np.log(constants().listed_over_laws) * (kind.name in places) for kind in listed.kinds]
-    return float(np.logaddexp.reduce([*totals, laws.total]))

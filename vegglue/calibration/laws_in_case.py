@@ -1,17 +1,14 @@
-"""Laws of the grammar as candidates of a case: which of them have something to act on, with references from its flow.
+"""Laws of the grammar as candidates of a case: which of them have something to act on, with references from its flow,
+and their fingerprints by the answers of predictions to each cell.
 
 A law is measured by what its term has seen: the quantity in the cells of the term that lie under water at the measured
-sections, at the calibrated flow; in all cells of the term under water where hardly any lie there, for what is beside a
+sections, at the calibrated flow; in all cells of the term under water if hardly any lie there, for what is beside a
 section shows in it too. Of these the references and the range of validity are quantiles.
-
-Fingerprints of laws by the answers of predictions to each cell: one product for a law, and no flow.
 
     d prediction_n / d a = sum_cells  d prediction_n / d ln k  g share,   the same with ln nu and ln h U U
 
-Terms of the grammar are multiplied by exp(a g), and g at the flow of the point says how much in each cell. So a form
-may be tried at many references for nothing.
-
-Laws where nobody has seen them: experiments in which a discovered law is used beyond the range it was found in.
+Terms of the grammar are multiplied by exp(a g), and g at the flow of the point says how much in each cell: one product
+for a law, and no flow. So a form may be tried at many references for nothing.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,24 +22,31 @@ from vegglue.calibration.fingerprints import LEAST_DEPTH
 from vegglue.calibration.model_error import CellResponses, cell_responses
 from vegglue.case.case_effects import effect_of
 from vegglue.case.channel_geometry import channel_geometry
-from vegglue.effects.definition import Effect, SeenRange, Shape
+from vegglue.effects.definition import Shape
 from vegglue.effects.grammar import LAWS, PLAUSIBLE_STRENGTH, PRODUCTS, SAME_AS, Law
 from vegglue.effects.surroundings import Cells
 from vegglue.engine.interface import Model, Point, by_itself, flow_at_centres
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
 
-# Quantiles between which a law counts as seen, and the fewest cells that say what a term sees. Chosen, not measured.
+# Quantiles between which a law counts as seen, and the fewest cells that show what a term sees. Chosen, not measured.
 SEEN, FEWEST_SEEN = (0.05, 0.95), 10
 # Fewest values of a quantity: of the stems of two patches a law says no more than that one of them is denser.
 FEWEST_VALUES = 3
-# Relative spread of a quantity, from the 5 to the 95 % quantile over the median, below which no law of it can be told
+# Relative spread of a quantity, from the 5 to the 95 % quantile over the median, below which no law of it differs
 # from a constant: a factor exp(a g) of plausible size then changes its term by less than 5 %, an error of friction.
 LEAST_SPREAD = 0.1
 # Values of a quantity over what was seen, enough to meet the top of a hump to a few per cent.
 VALUES_SEEN = 41
 # Significant digits of a reference: a person reads it.
 DIGITS = 2
+# Share of the cells above which a law is used beyond its range. A range holds 90 % of what was seen, so that a tenth
+# lies outside by definition; twice that is another flow.
+SHARE_BEYOND = 0.2
+# What a law changes, relative to what is there, by the name of its term.
+RELATIVE_TERM: Mapping[str, Term] = {
+    "floor": "friction", "bank": "friction", "plants": "friction", "viscosity": "mixing", "advection": "advection",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ class LawInCase:
 
 
 def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawInCase]:
-    """Laws that have something to act on, without those that restate an effect that is `listed` as a suspect."""
+    """Laws that have something to act on, without those that restate a candidate effect that is `listed`."""
     water = _water_of(model, point)
     return [
         found
@@ -68,40 +72,53 @@ def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawI
 
 
 def products_in_case(model: Model, point: Point, law: LawInCase, reference: float | None) -> list[LawInCase]:
-    """Products of a law that is in the model with other quantities; reference: of that law, where it has one."""
+    """Products of a law that is in the model with other quantities; reference: of that law, if it has one."""
     water, change = _water_of(model, point), _change_of(law.law, law.seen, reference)
     products = [_in_case(product, water, reference, change) for product in PRODUCTS[law.law.name]]
     return [product for product in products if product is not None]
 
 
-@dataclass(frozen=True)
-class _Water:
-    """The flow of each experiment: in all cells, and dry but for the sections that were measured."""
-
-    everywhere: list[Cells]
-    measured: list[Cells]
+# The flow of each experiment, twice: in all cells, and dry but for the sections that were measured.
+_Water = tuple[list[Cells], list[Cells]]
 
 
 def _water_of(model: Model, point: Point) -> _Water:
-    experiments = list(model.case.experiments)
-    flows = [centre_cells(model, point, experiment) for experiment in experiments]
-    return _Water(flows, [at_sections(model, cells, name) for cells, name in zip(flows, experiments, strict=True)])
+    flows = {name: centre_cells(model, point, name) for name in model.case.experiments}
+    return list(flows.values()), [at_sections(model, cells, name) for name, cells in flows.items()]
 
 
 def _in_case(law: Law, water: _Water, first: float | None = None, change: float = 1.0) -> LawInCase | None:
-    """A law with its references and a plausible strength; None where the data have seen too little of its quantity.
+    """A law with its references and a plausible strength; None if the data have seen too little of its quantity.
 
     first, change: reference of the law that it multiplies, and how much the g of that law changes over what was seen.
     """
-    values = np.concatenate([_values(law, cells) for cells in water.measured])
+
+    def values_in(flows: list[Cells]) -> Array:
+        """The quantity in the cells of the term that are under water, where it is finite."""
+        parts = []
+        for cells in flows:
+            q = np.broadcast_to(law.quantity.of(cells), cells.depth.shape)
+            share = np.broadcast_to(law.term.share(cells), cells.depth.shape)
+            found = q[(share > 0.0) & (cells.depth > LEAST_DEPTH)]
+            parts.append(found[np.isfinite(found)])
+        return np.concatenate(parts)
+
+    def with_references(shape: Shape) -> Shape:
+        if shape.name == "reference":
+            return replace(shape, default=tried[len(tried) // 2], grid=tuple(tried))
+        return shape if first is None else replace(shape, default=first)
+
+    everywhere, measured = water
+    values = values_in(measured)
     if values.size < FEWEST_SEEN:
-        values = np.concatenate([_values(law, cells) for cells in water.everywhere])
+        values = values_in(everywhere)
     if values.size < FEWEST_SEEN or np.unique(values).size < FEWEST_VALUES:
         return None
     low, middle, high = (float(q) for q in np.quantile(values, (SEEN[0], 0.5, SEEN[1])))
     if high - low < LEAST_SPREAD * abs(middle):
         return None
-    effect = _with_references(law, values, first)
+    tried = sorted({float(f"{value:.{DIGITS}g}") for value in np.quantile(values, law.form.quantiles)})
+    effect = replace(law.effect, shapes=tuple(map(with_references, law.shapes)))
     default = next((shape.default for shape in effect.shapes if shape.name == "reference"), None)
     whole = max(change * _change_of(law, (low, high), default), 1e-9)
     scale = min(PLAUSIBLE_STRENGTH / whole, 0.5 * effect.amplitude.high)
@@ -109,35 +126,11 @@ def _in_case(law: Law, water: _Water, first: float | None = None, change: float 
 
 
 def _change_of(law: Law, seen: tuple[float, float], reference: float | None) -> float:
-    """How much g changes over what was seen [-]. A strength a is plausible where a times that is PLAUSIBLE_STRENGTH.
+    """How much g changes over what was seen [-]. A strength a is plausible if a times that is PLAUSIBLE_STRENGTH.
 
     So all laws are as free to change what the data see, however g is counted; at most half way to the support's end.
     """
     return float(np.ptp(law.form.of(np.linspace(*seen, VALUES_SEEN), 1.0 if reference is None else reference)))
-
-
-def _with_references(law: Law, values: Array, first: float | None) -> Effect:
-    """The effect of a law that is tried with the quantiles of its quantity as references; first: as in `_in_case`."""
-    tried = sorted({_rounded(value) for value in np.quantile(values, law.form.quantiles)})
-
-    def told(shape: Shape) -> Shape:
-        if shape.name == "reference":
-            return replace(shape, default=tried[len(tried) // 2], grid=tuple(tried))
-        return shape if first is None else replace(shape, default=first)
-
-    return replace(law.effect, shapes=tuple(map(told, law.shapes)))
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
-
-
-def _values(law: Law, cells: Cells) -> Array:
-    """The quantity of a law in the cells of its term that are under water, where it is finite."""
-    q = np.broadcast_to(law.quantity.of(cells), cells.depth.shape)
-    share = np.broadcast_to(law.term.share(cells), cells.depth.shape)
-    values = q[(share > 0.0) & (cells.depth > LEAST_DEPTH)]
-    return np.asarray(values[np.isfinite(values)])
 
 
 def centre_cells(model: Model, point: Point, experiment: str) -> Cells:
@@ -168,12 +161,6 @@ def at_sections(model: Model, cells: Cells, experiment: str) -> Cells:
     return replace(cells, depth=np.where(measured, cells.depth, 0.0))
 
 
-# What a law changes, relative to what is there, by the name of its term.
-RELATIVE_TERM: Mapping[str, Term] = {
-    "floor": "friction", "bank": "friction", "plants": "friction", "viscosity": "mixing", "advection": "advection",
-}  # fmt: skip
-
-
 @dataclass(frozen=True)
 class LawTraces:
     """Answers to each cell (station, nx, ny) by term, and the flow of each experiment with the rows of its stations."""
@@ -200,42 +187,42 @@ def law_traces(model: Model, point: Point) -> LawTraces:
     return LawTraces(responses, flows)
 
 
-# Share of the cells above which a law is said to be used beyond its range. A range holds 90 % of what was seen, so that
-# a tenth lies outside by definition; twice that is another flow.
-SHARE_BEYOND = 0.2
+@dataclass(frozen=True)
+class LawBeyondRange:
+    """A law of the case that is used beyond the range that it was found in [unit]; share: of the cells that it acts on
+    [-], those under the measured sections if any lie there.
+    """
+
+    effect: str
+    symbol: str
+    unit: str
+    low: float
+    high: float
+    experiment: str
+    share: float
+    at_sections: bool
 
 
-def laws_beyond_their_range(model: Model, point: Point) -> Iterator[str]:
-    """One sentence for each experiment in which a law of the case is used where it was not seen; point: of its flow."""
+def laws_beyond_their_range(model: Model, point: Point) -> Iterator[LawBeyondRange]:
+    """One for each experiment in which more than SHARE_BEYOND of the cells are beyond; point: of its flow."""
     for key in model.case.effects:
         effect, only = effect_of(model.case, key), model.case.effects[key].experiments
-        if effect.seen is None:
+        seen = effect.seen
+        if seen is None:
             continue
+        shapes = {shape.name: np.array(shape.default) for shape in effect.shapes}
+        strength = {effect.amplitude.name: np.array(effect.amplitude.scale)}
         for experiment in (one for one in model.case.experiments if only is None or one in only):
-            cells = centre_cells(model, point, experiment)
-            measured = at_sections(model, cells, experiment)
-            at_stations = _seen_values(effect, effect.seen, measured)
-            q = at_stations if at_stations.size else _seen_values(effect, effect.seen, cells)
-            beyond = float(np.mean((q < effect.seen.low) | (q > effect.seen.high))) if q.size else 0.0
-            if beyond > SHARE_BEYOND:
-                where = "under its measured sections" if at_stations.size else "under water"
-                yield _beyond_sentence(key, effect.seen, experiment, beyond, where)
-
-
-def _beyond_sentence(key: str, seen: SeenRange, experiment: str, beyond: float, where: str) -> str:
-    unit = "" if seen.unit == "-" else f" {seen.unit}"
-    return (
-        f"`{key}` was seen for {seen.symbol} from {seen.low:g} to {seen.high:g}{unit}; in experiment `{experiment}` "
-        f"{beyond:.0%} of the cells that it acts on {where} lie outside, where it is a guess."
-    )
-
-
-def _seen_values(effect: Effect, seen: SeenRange, cells: Cells) -> Array:
-    """The quantity (k,) of the cells under water that the effect changes."""
-    shapes = {shape.name: np.array(shape.default) for shape in effect.shapes}
-    # Of a flux the part along x says where it acts.
-    strength = {effect.amplitude.name: np.array(effect.amplitude.scale)}
-    changed = next(iter(effect.act(cells, **strength, **shapes).values()))
-    off = 0.0 if effect.stage == "exchange" else cells.rate
-    q = np.broadcast_to(seen.of(cells), cells.depth.shape)
-    return np.asarray(q[(changed != off) & (cells.depth > LEAST_DEPTH) & np.isfinite(q)])
+            everywhere = centre_cells(model, point, experiment)
+            found = []
+            for cells in (at_sections(model, everywhere, experiment), everywhere):
+                # Of a flux the part along x shows where it acts.
+                changed = next(iter(effect.act(cells, **strength, **shapes).values()))
+                off = 0.0 if effect.stage == "exchange" else cells.rate
+                q = np.broadcast_to(seen.of(cells), cells.depth.shape)
+                found.append(q[(changed != off) & (cells.depth > LEAST_DEPTH) & np.isfinite(q)])
+            measured = bool(found[0].size)
+            q = found[0] if measured else found[1]
+            share = float(np.mean((q < seen.low) | (q > seen.high))) if q.size else 0.0
+            if share > SHARE_BEYOND:
+                yield LawBeyondRange(key, seen.symbol, seen.unit, seen.low, seen.high, experiment, share, measured)

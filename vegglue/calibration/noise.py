@@ -4,11 +4,9 @@
 
 D are the standard errors of the measurements and s their scale. rho is the correlation of neighbours in a section, d
 their usual spacing and d_ij the distance between stations i and j, across the channel where they were measured together
-across it. R_ij is 0 between sections, experiments and kinds.
-g is the error of discretisation and c its correlation between two stations. M is the model's own error, see
-`model_error`. The columns of O are of instruments found to be off: what their readings share counts for nothing.
-
-The correlation and the size of the errors, from the residual of a calibrated model, by maximum likelihood.
+across it. R_ij is 0 between sections, experiments and kinds. g is the error of discretisation and c its correlation
+between two stations. M is the model's own error, see `model_error`. The columns of O are of instruments that are off:
+what their readings share counts for nothing. rho and s are estimated from the residual of a calibrated model.
 """
 
 import itertools
@@ -31,6 +29,15 @@ from vegglue.parallel import in_threads
 # What an instrument that is off adds, over the largest standard error of its readings [-]: so large that it is free,
 # and the covariance can still be factored.
 UNKNOWN_ERROR = 1e3
+# Correlations rho and sizes t [-] of a coarse grid, from the best pair of which the maximum likelihood is searched.
+# Chosen, not measured: more pairs cost time and guard against a local maximum.
+START_CORRELATIONS, START_SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
+# rho is searched below this [-]: a covariance of rho = 1 has no inverse.
+LARGEST_RHO = 0.98
+# Values of rho [-] of which the posterior probability is computed, and the prior probability of rho = 0: the data alone
+# decide between some correlation and none. Chosen, not measured: closer levels only cost time.
+LEVEL_STEP, UNCORRELATED_CHANCE = 0.05, 0.5
+CORRELATION_LEVELS = LEVEL_STEP * np.arange(1, 20)
 
 
 @dataclass(frozen=True)
@@ -41,13 +48,13 @@ class Noise:
     value: Array  # measured (n,) [m/s or m]
     error: Array  # standard errors as stated (n,) [m/s or m]
     separation: Array  # d_ij / d (n, n) [-], infinite between sections
-    grid_error: Array  # g (n,) [m/s or m], zero when unknown
+    grid_error: Array  # g (n,) [m/s or m], zero if unknown
     grid_correlation: float  # c [-]
     correlation: float  # rho [-]
     scale: float  # s [-]
     lower: Array  # lower Cholesky factor of the covariance (n, n)
     correlation_chances: Array  # values of rho, and the posterior probability of each (2, k)
-    model_error: Array  # M (n, n), zero when the model is taken to be right
+    model_error: Array  # M (n, n), zero if the model is taken to be right
     unknown: Array  # O (n, k), of instruments that are off by an unknown amount [m/s or m]
 
     def used(self, values: Array) -> Array:
@@ -72,44 +79,76 @@ class Noise:
     def whiten(self, values: Array) -> Array:
         """W values (n, ...) [-], W = L^-1 with cov = L L': whitened errors are independent and standard normal."""
         wide = values.reshape(len(values), -1)
-        # x' L' = values': as it lies in memory. scipy's own words copy thousands of columns into another order first.
+        # x' L' = values': as it lies in memory. scipy's own interface copies thousands of columns into another order.
         solved = scipy.linalg.blas.dtrsm(1.0, self.lower, wide.T, side=1, lower=1, trans_a=1).T
         return np.asarray(solved).reshape(values.shape)
 
 
 def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) -> Noise:
-    """Independent errors as stated in the data; fallback: standard errors by kind, for stations that state none.
+    """Independent errors as stated in the data.
 
-    Errors: InputError when a used station has neither.
+    Parameters
+    ----------
+    station : DataFrame
+        All stations.
+    fallback : dict of float, optional
+        Standard errors by kind [unit of the kind], for stations that state none.
+
+    Returns
+    -------
+    Noise
+        With rho = 0, s = 1 and no error of grid or model.
+
+    Raises
+    ------
+    InputError
+        If no station is used, or a used one has no standard error.
     """
     used = station[station["used"]]
     if used.empty:
-        raise InputError("observations: no station is used, nothing can be inferred; `vegglue check` says why.")
+        raise InputError(
+            "observations: no station is used, nothing can be inferred; see the output of `vegglue check`."
+        )
     error = used["standard_error"].to_numpy(float).copy()
     for kind, value in (fallback or {}).items():
         error[(used["kind"] == kind).to_numpy() & ~(error > 0)] = value
     if not (error > 0).all():
         raise InputError(f"observations: {unstated_errors(used.assign(standard_error=error))}")
-    zero = np.zeros(len(used))
-    rows = np.flatnonzero(station["used"].to_numpy())
-    value = used["value"].to_numpy(float)
-    certain = np.array([[0.0], [1.0]])
-    return _with_cholesky(
-        Noise(
-            rows=rows,
-            value=value,
-            error=error,
-            separation=_separation(used),
-            grid_error=zero,
-            grid_correlation=constants().grid_error_correlation,
-            correlation=0.0,
-            scale=1.0,
-            lower=np.diag(error),
-            correlation_chances=certain,
-            model_error=np.zeros((len(used), len(used))),
-            unknown=np.zeros((len(used), 0)),
-        )
+    noise = Noise(
+        rows=np.flatnonzero(station["used"].to_numpy()),
+        value=used["value"].to_numpy(float),
+        error=error,
+        separation=_separation(used),
+        grid_error=np.zeros(len(used)),
+        grid_correlation=constants().grid_error_correlation,
+        correlation=0.0,
+        scale=1.0,
+        lower=np.diag(error),
+        correlation_chances=np.array([[0.0], [1.0]]),
+        model_error=np.zeros((len(used), len(used))),
+        unknown=np.zeros((len(used), 0)),
     )
+    return _with_cholesky(noise)
+
+
+def _separation(used: pd.DataFrame) -> Array:
+    """d_ij / d (n, n) [-]: distance over the median spacing of a section; infinite between sections and kinds, and for
+    kinds whose errors are not correlated. Where two of a section stand at one y it is no line: d_ij is then as it is.
+    """
+    separation = np.full((len(used), len(used)), np.inf)
+    np.fill_diagonal(separation, 0.0)
+    correlated = np.array([kind_of(str(name)).correlated for name in used["kind"]], dtype=bool)
+    keys = used[["experiment", "section", "kind"]].agg("\n".join, axis=1).to_numpy()
+    own = used[["x", "y"]].to_numpy(float)
+    in_line = np.column_stack([section_places(used).to_numpy(float), own[:, 1]])
+    for key in np.unique(keys[correlated]):
+        here = np.flatnonzero(keys == key)
+        line = np.unique(in_line[here], axis=0)
+        spacing = np.median(np.hypot(*np.diff(line, axis=0).T)) if len(line) > 1 else 1.0
+        x, y = (in_line if len(line) == here.size else own)[here].T
+        distance = np.hypot(x[:, None] - x, y[:, None] - y)
+        separation[np.ix_(here, here)] = distance / max(spacing, 1e-9)
+    return separation
 
 
 def with_grid_error(noise: Noise, difference: Array) -> Noise:
@@ -143,8 +182,8 @@ def with_model_error(noise: Noise, columns: Array) -> Noise:
 
 
 def with_unknown_errors(noise: Noise, columns: Array) -> Noise:
-    """The noise with one instrument off by an unknown amount of each of columns (n, k) [-], zero but in its readings:
-    what they can make counts for nothing any more. See `screening.instruments.error_columns`.
+    """The noise with one more instrument that is off: what columns (n, k) [-] can make in its readings, zero elsewhere,
+    counts for nothing, see `candidates.error_columns`.
     """
     largest = np.where(columns != 0.0, noise.error[:, None], 0.0).max()
     unknown = UNKNOWN_ERROR * largest * columns / np.abs(columns).max(axis=0)
@@ -154,7 +193,7 @@ def with_unknown_errors(noise: Noise, columns: Array) -> Noise:
 def draw_whitened_errors(noise: Noise, draws: int, random: np.random.Generator) -> Array:
     """Whitened errors W e (draws, n) [-], e ~ N(0, cov(rho)), rho drawn from its posterior probabilities.
 
-    They are independent and standard normal only when rho is certain.
+    They are independent and standard normal only if rho is certain.
     """
     parts = []
     levels, chances = noise.correlation_chances
@@ -169,64 +208,49 @@ def _with_cholesky(noise: Noise) -> Noise:
 
 
 def covariance_of(noise: Noise) -> Array:
-    """s^2 D R D + E + M + O O' of the used stations (n, n)."""
+    """s^2 D R D + E + M + O O' of the used stations (n, n) [unit of a station, squared]."""
     shared = noise.grid_correlation * np.outer(noise.grid_error, noise.grid_error)
     own = np.diag((1.0 - noise.grid_correlation) * noise.grid_error**2)
     return np.asarray(covariance_of_data(noise) + shared + own + noise.model_error + noise.unknown @ noise.unknown.T)
 
 
 def covariance_of_data(noise: Noise) -> Array:
-    """s^2 D R D of the used stations (n, n)."""
+    """s^2 D R D of the used stations (n, n) [unit of a station, squared]."""
     rho, size = noise.correlation, noise.rows.size
     correlations = np.eye(size) if rho == 0.0 else np.exp(noise.separation * np.log(rho))
     return np.asarray(noise.scale**2 * correlations * np.outer(noise.error, noise.error))
 
 
-def _separation(used: pd.DataFrame) -> Array:
-    """d_ij / d (n, n) [-]: distance over the median spacing of a section; infinite between sections and kinds, and for
-    kinds whose errors are not correlated. Where two of a section stand at one y it is no line: d_ij is then as it is.
-    """
-    separation = np.full((len(used), len(used)), np.inf)
-    np.fill_diagonal(separation, 0.0)
-    correlated = np.array([kind_of(str(name)).correlated for name in used["kind"]], dtype=bool)
-    keys = used[["experiment", "section", "kind"]].agg("\n".join, axis=1).to_numpy()
-    own = used[["x", "y"]].to_numpy(float)
-    in_line = np.column_stack([section_places(used).to_numpy(float), own[:, 1]])
-    for key in np.unique(keys[correlated]):
-        here = np.flatnonzero(keys == key)
-        line = np.unique(in_line[here], axis=0)
-        spacing = np.median(np.hypot(*np.diff(line, axis=0).T)) if len(line) > 1 else 1.0
-        x, y = (in_line if len(line) == here.size else own)[here].T
-        distance = np.hypot(x[:, None] - x, y[:, None] - y)
-        separation[np.ix_(here, here)] = distance / max(spacing, 1e-9)
-    return separation
-
-
-# Correlations rho and sizes t [-] of a coarse grid, from the best pair of which the maximum likelihood is searched.
-# Chosen, not measured: more pairs cost time and guard against a local maximum.
-START_CORRELATIONS, START_SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
-# rho is searched below this [-]: a covariance of rho = 1 has no inverse.
-LARGEST_RHO = 0.98
-# Values of rho [-] of which the posterior probability is computed, and the prior probability of rho = 0: the data alone
-# decide between some correlation and none. Chosen, not measured: closer levels only cost time.
-LEVEL_STEP, UNCORRELATED_CHANCE = 0.05, 0.5
-CORRELATION_LEVELS = LEVEL_STEP * np.arange(1, 20)
-
-
 def estimate_noise(noise: Noise, residual: Array, gram: Array) -> Noise:
-    """rho and s of the errors by maximum likelihood of the residual r (n,), measured minus predicted.
+    """rho and s of the errors by maximum likelihood of the residual r.
 
         r ~ N(0, cov(rho, s) + t^2 F F')
 
-    gram: F F' (n, n), F (n, k) changes of the predictions that calibration and missing effects could make, each of
-    plausible size; t scales them all. A misfit that they could make is not taken for errors. rho >= 0; s differs from 1
-    only when the likelihood rejects the stated errors at 1 %, and is never below 1.
+    F (n, k) are changes of the predictions that calibration and missing effects could make, each of plausible size; t
+    scales them all. A misfit that they could make is not taken for errors. rho >= 0; s differs from 1 only if the
+    likelihood rejects the stated errors at 1 %, and is never below 1.
 
     Errors that are smaller than stated look correlated where s is 1: a covariance with rho near 1 expects smaller
-    differences. So the chances of each rho are those of the s that fits best, where this is below 1; rho is the median
-    of these chances, 0 unless some correlation is likelier than none.
+    differences. So the probabilities of each rho are those of the s that fits best, if this is below 1; rho is their
+    median, 0 unless some correlation is likelier than none.
+
+    Parameters
+    ----------
+    noise : Noise
+        As far as it is known.
+    residual : array (n,)
+        Measured minus predicted [m/s or m].
+    gram : array (n, n)
+        F F' [squares of the units of the stations].
+
+    Returns
+    -------
+    Noise
+        With rho, s and the posterior probabilities of rho.
     """
-    deviance, neighbours = _deviance_of(noise, residual, gram), _has_neighbours(noise)
+    deviance = _deviance_of(noise, residual, gram)
+    # Without two stations in one section the data know nothing of a correlation.
+    neighbours = bool((np.isfinite(noise.separation) & ~np.eye(noise.rows.size, dtype=bool)).any())
     correlations = [[0.0], START_CORRELATIONS] if neighbours else [[0.0]]
     fits = in_threads(partial(_likeliest, deviance), itertools.product(correlations, [False, True]))
     (stated_without, free_without), (stated, free) = fits[:2], fits[-2:]
@@ -235,10 +259,16 @@ def estimate_noise(noise: Noise, residual: Array, gram: Array) -> Noise:
     if not neighbours:
         return with_correlation(noise, 0.0, scale)
     best, none = (free, free_without) if rejected or free.scale < 1.0 else (stated, stated_without)
-    chances = _correlation_chances(lambda rho: deviance(rho, best.scale, best.log_size), none.deviance)
-    rho = _median(chances)
+    at_levels = [deviance(float(rho), best.scale, best.log_size) for rho in CORRELATION_LEVELS]
+    costs = np.array([none.deviance, *at_levels])
+    share = (1.0 - UNCORRELATED_CHANCE) / CORRELATION_LEVELS.size
+    chance = np.array([UNCORRELATED_CHANCE, *[share] * CORRELATION_LEVELS.size]) * np.exp(-0.5 * (costs - costs.min()))
+    chance = chance / chance.sum()
+    # The median; each level stands for what is nearest.
+    edges, below = [0.5 * LEVEL_STEP, *(CORRELATION_LEVELS + 0.5 * LEVEL_STEP)], np.cumsum(chance)
+    rho = 0.0 if below[0] >= 0.5 else float(np.interp(0.5, below, edges))
     found = with_correlation(noise, rho if rho > LEVEL_STEP else 0.0, scale)
-    return replace(found, correlation_chances=chances)
+    return replace(found, correlation_chances=np.stack([np.concatenate([[0.0], CORRELATION_LEVELS]), chance]))
 
 
 @dataclass(frozen=True)
@@ -251,11 +281,9 @@ class _Likeliest:
 
 
 def _likeliest(
-    deviance: Callable[[float, float, float], float],
-    correlations: Sequence[float],
-    scale_free: bool,
+    deviance: Callable[[float, float, float], float], correlations: Sequence[float], scale_free: bool
 ) -> _Likeliest:
-    """The least of -2 ln L by Nelder and Mead, from the best pair of rho and ln t; rho stays 0 where that is given."""
+    """The least of -2 ln L by Nelder and Mead, from the best pair of rho and ln t; rho stays 0 if that is given."""
     from scipy.optimize import minimize  # late: many a command and every worker estimates nothing
 
     pairs = itertools.product(correlations, np.log(START_SIZES))
@@ -275,11 +303,6 @@ def _likeliest(
     return _Likeliest(float(end.fun), scale, log_size)
 
 
-def _has_neighbours(noise: Noise) -> bool:
-    """Whether two stations share a section, so that the data know of a correlation."""
-    return bool((np.isfinite(noise.separation) & ~np.eye(noise.rows.size, dtype=bool)).any())
-
-
 def _deviance_of(noise: Noise, residual: Array, gram: Array) -> Callable[[float, float, float], float]:
     """-2 ln likelihood (rho, s, ln t) up to a constant; infinite where t is so large that nothing can be factored."""
     known = covariance_of(replace(noise, scale=0.0))
@@ -293,7 +316,7 @@ def _deviance_of(noise: Noise, residual: Array, gram: Array) -> Callable[[float,
         np.einsum("ii->i", covariance)[:] += scale**2 * own
         if rho > 0.0:
             covariance[pairs] += scale**2 * shared * np.exp(apart * np.log(rho))
-        # Asked by name, and for the transpose, which it need not copy: half the time of scipy's own words for it.
+        # Called by name, and for the transpose, which it need not copy: half the time of scipy's own interface.
         factor, failed = scipy.linalg.lapack.dpotrf(covariance.T, lower=1, clean=0, overwrite_a=1)
         if failed:
             return np.inf
@@ -301,21 +324,3 @@ def _deviance_of(noise: Noise, residual: Array, gram: Array) -> Callable[[float,
         return float(2.0 * np.log(np.diag(factor)).sum() + residual @ solved)
 
     return deviance
-
-
-def _correlation_chances(deviance: Callable[[float], float], uncorrelated: float) -> Array:
-    """Values of rho, 0 the first, and the posterior probability of each (2, k).
-
-    deviance: rho -> -2 ln likelihood; uncorrelated: the least one with rho = 0, whose s and t are its own.
-    """
-    costs = np.array([uncorrelated, *(deviance(float(level)) for level in CORRELATION_LEVELS)])
-    share = (1.0 - UNCORRELATED_CHANCE) / CORRELATION_LEVELS.size
-    chance = np.array([UNCORRELATED_CHANCE, *[share] * CORRELATION_LEVELS.size]) * np.exp(-0.5 * (costs - costs.min()))
-    return np.stack([np.concatenate([[0.0], CORRELATION_LEVELS]), chance / chance.sum()])
-
-
-def _median(chances: Array) -> float:
-    """Median rho [-] of values, 0 the first, and their chances (2, k); each other value stands for what is nearest."""
-    (_, *levels), below = chances[0], np.cumsum(chances[1])
-    edges = [levels[0] - 0.5 * LEVEL_STEP, *(np.array(levels) + 0.5 * LEVEL_STEP)]
-    return 0.0 if below[0] >= 0.5 else float(np.interp(0.5, below, edges))

@@ -1,11 +1,10 @@
-"""Score tests of a calibrated model: which effect, place or instrument explains its residual best.
-
-Second looks at effects, from where a parameter that lies off its prior is back in its middle.
+"""Score tests of a calibrated model: which effect, place or instrument explains its residual best; and the same given
+one parameter that is back in the middle of its prior.
 
     z' = z - z_j V_j / V_jj,   V = (J' W' W J + 1)^-1
 
-Where a parameter j has taken over what an effect should explain, such as a canopy that is calibrated too low in place
-of plants that bend, the score at the best place z is small, and only another place shows how far down the effect leads.
+If a parameter j has taken over what an effect should explain, such as a canopy that is calibrated too low in place of
+plants that bend, the score at the best place z is small, and only another place shows how far down the effect leads.
 z' is the best place of the other parameters with z_j = 0, to first order (the mean of a normal distribution given one
 of its components); V_j is column j of V. There the least objective with each effect is predicted from slopes and
 fingerprints, as at the best place.
@@ -29,7 +28,7 @@ from vegglue.calibration.candidates import (
     with_effect,
 )
 from vegglue.calibration.fingerprints import Fingerprints, fingerprints_of
-from vegglue.calibration.fit import MapEstimate, at_point, objective
+from vegglue.calibration.fit import at_point, objective
 from vegglue.calibration.noise import Noise, draw_whitened_errors, estimate_noise
 from vegglue.calibration.score_test import (
     Family,
@@ -56,6 +55,10 @@ FREE_SIZE = 1e4
 LONGEST_FREE = 3e6
 # Groups of kinds that are as likely before the data [-]: listed effects, places, instruments, fields (`field_scan`).
 GROUPS = 4
+# Standard deviations of its prior from which a parameter is off, and conditional screenings at most, of those furthest
+# off: each costs 1.5 s of a core on 9,600 cells. Half a standard deviation was taken back after site 7049 of
+# `drawn_sites`, where a canopy too low by 0.46 of them hid streamlining.
+OFF, MOST_CONDITIONAL = 0.25, 2
 
 
 @dataclass(frozen=True)
@@ -63,10 +66,10 @@ class Screening:
     """Score tests of the residual of a calibrated model against all that could be missing, or wrong with the data.
 
     base: with the noise as estimated here, at the place of its fit; search: its model that is fitted again and again;
-    flagged: readings of instruments found to be off, indices among the used ones.
-    whitened_slopes (n, p): W df/dz; whitened_fingerprints (n, c): of candidates; projected: these with the slopes
-    projected out. effects: score tests of candidates. kinds: evidence of all kinds, that of
-    listed effects first, then of places by term, then of `instruments`; errors (draws, n): whitened errors alone.
+    flagged: readings of instruments found to be off, indices among the used ones. whitened_slopes (n, p): W df/dz;
+    whitened_fingerprints (n, c): of candidates; projected: these with the slopes projected out. effects: score tests of
+    candidates. kinds: evidence of all kinds, that of listed effects first, then of places by term, then of
+    `instruments`; errors (draws, n): whitened errors alone.
     """
 
     base: Baseline
@@ -109,8 +112,23 @@ def screen(
 ) -> Screening:
     """Score tests of the residual against all candidates, places everywhere and instruments.
 
-    The correlation of the errors is estimated first. known: fingerprints at the point of the search model, where they
-    are at hand; seed: of the draws of errors alone.
+    The correlation of the errors is estimated first.
+
+    Parameters
+    ----------
+    base : Baseline
+        The calibrated model.
+    flagged : tuple of int
+        Readings that are excluded, indices of used stations.
+    known : Fingerprints, optional
+        At the point of the search model, if they are at hand.
+    seed : int
+        Of the draws of errors alone.
+
+    Returns
+    -------
+    Screening
+        Under the noise as estimated.
     """
     base = searched_by_itself(base)
     search = search_model(base)
@@ -125,7 +143,11 @@ def screen(
     def against(values: Array) -> score_test.Projected:
         return score_test.project(noise.whiten(slope), noise.whiten(residual), z, noise.whiten(values))
 
-    projected, with_noise = against(of_effects), replace(base, noise=noise, fitted=_known_under(noise, base.fitted))
+    # Under the errors as estimated parameters are known no better than under those of the fit.
+    here = at_point(noise, base.fitted.point)
+    wider = max(base.fitted, here, key=lambda one: float(np.linalg.slogdet(one.covariance)[1]))
+    projected = against(of_effects)
+    with_noise = replace(base, noise=noise, fitted=replace(here, covariance=wider.covariance))
     in_places = {one.term: against(base.noise.used(one.fingerprints)) for one in fingerprints.places}
     of_instruments = {name: against(offset_columns(some, residual.size)) for name, some in instruments.items() if some}
     return Screening(
@@ -148,7 +170,7 @@ def screen(
 
 
 def noise_given_all(base: Baseline) -> Noise:
-    """The noise that `screen` estimates, where nothing else of a screening is asked for."""
+    """The noise that `screen` estimates, if nothing else of a screening is needed."""
     search = search_model(base)
     fingerprints = fingerprints_of(search, half_width(base.model.site))
     instruments = instruments_of(base.model.station.iloc[base.noise.rows])
@@ -185,9 +207,8 @@ def kinds_of_instruments(
     """A kind each for single readings, probes and gauges, without those that are known to be off."""
     kinds = []
     for name, of_kind in projected.items():
-        plausible = plausible_offset(name) * np.array(
-            [np.median(noise.error[list(i.readings)]) for i in instruments[name]]
-        )
+        medians = [np.median(noise.error[list(i.readings)]) for i in instruments[name]]
+        plausible = plausible_offset(name) * np.array(medians)
         known = np.array([set(i.readings) <= set(flagged) for i in instruments[name]])
         prior = np.full(plausible.size, 1.0 / (GROUPS * len(projected) * plausible.size))
         kinds.append(kind_of_hypotheses(name, of_kind, np.where(known, 0.0, plausible), prior))
@@ -210,17 +231,10 @@ def _plausible(
     return np.hstack(parts)
 
 
-def _known_under(noise: Noise, fitted: MapEstimate) -> MapEstimate:
-    """A fit under the errors as they are told now; its parameters are known no better than under those of the fit."""
-    here = at_point(noise, fitted.point)
-    wider = max(fitted, here, key=lambda one: float(np.linalg.slogdet(one.covariance)[1]))
-    return replace(here, covariance=wider.covariance)
-
-
 def _estimated_noise(noise: Noise, used: tuple[Array, Array], residual: Array, z: Array) -> Noise:
     """The noise of a residual (n,); used: slopes, and changes by all that could be missing (n, ...), at used stations.
 
-    Estimated twice: the second time the amplitude of the change with the best score is free. Where nothing is missing
+    Estimated twice: the second time the amplitude of the change with the best score is free. If nothing is missing
     that is the slope of the parameter furthest off its prior, of which calibration leaves next to nothing.
     """
     slope, changes = used
@@ -248,52 +262,45 @@ def refit_start(screening: Screening, candidate: int, column: int) -> Array:
     return np.append(point.z + step, z_of(changed.parameters[one.parameter], start_amplitude(one.amplitude, gain)))
 
 
-# Standard deviations of its prior from which a parameter is off, and looks at most, of those furthest off: each costs
-# 1.5 s of a core on 9,600 cells. Half a standard deviation was taken back after site 7049 of `drawn_sites`, where a
-# canopy too low by 0.46 of them hid streamlining.
-OFF, MOST_LOOKS = 0.25, 2
-
-
 @dataclass(frozen=True)
-class SecondLook:
-    """log_factor (c,): ln B of each column of the fingerprints as predicted from the point; gain (c,): size there."""
+class ConditionalScreening:
+    """From a point where one parameter is back in the middle of its prior; log_factor (c,): ln B of each column of the
+    fingerprints as predicted from there; gain (c,): size there.
+    """
 
     point: Point
     log_factor: Array
     gain: Array
 
 
-def second_looks(screening: Screening) -> tuple[SecondLook, ...]:
-    """The looks from all such places where a steady flow is found; none where no parameter is off."""
-    tasks = [(screening, place) for place in places_of_looks(screening.search)]
-    return tuple(one for one in in_threads(_look, tasks) if one is not None)
+def conditional_screenings(screening: Screening) -> tuple[ConditionalScreening, ...]:
+    """Those from all such places where a steady flow is found; none if no parameter is off."""
+    search, fingerprints = screening.search, screening.fingerprints
+    model, noise = search.model, search.noise
+
+    def screened_at(place: Array) -> ConditionalScreening | None:
+        point = linearise(model, place, search.point)
+        if point is None:
+            return None
+        found = responses(model, point, fingerprints.causes)
+        slope, residual = noise.whiten(noise.used(point.slope)), noise.whiten(noise.residual(point.prediction))
+        projected = score_test.project(slope, residual, point.z, noise.whiten(noise.used(found)))
+        score = score_test.scores(projected, fingerprints.only_sign)
+        size = projected.length * np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
+        nothing = float(projected.residual @ projected.residual)
+        log_factor = 0.5 * (objective(noise, search.point) - nothing) + log_factors(score, size)
+        return ConditionalScreening(point, log_factor, expected_gain(score, projected.length, size))
+
+    tasks = [(place,) for place in conditional_places(search)]
+    return tuple(one for one in in_threads(screened_at, tasks) if one is not None)
 
 
-def places_of_looks(search: SearchModel) -> list[Array]:
-    """z' (p,) of each parameter that is off, the furthest first. Amplitudes of effects are not: `rivals_again` has
-    those.
-    """
+def conditional_places(search: SearchModel) -> list[Array]:
+    """z' (p,) of each parameter that is off, the furthest first; not of amplitudes of effects, see `rivals_again`."""
     noise, z = search.noise, search.point.z
     of_effects = parameters_of_effects(search.model.case)
     own = [j for j, name in enumerate(search.model.names) if name not in of_effects]
     off = sorted((j for j in own if abs(z[j]) > OFF), key=lambda j: -abs(z[j]))
     white = noise.whiten(noise.used(search.point.slope))
     covariance = np.linalg.inv(white.T @ white + np.eye(z.size))
-    return [z - z[j] * covariance[:, j] / covariance[j, j] for j in off[:MOST_LOOKS]]
-
-
-def _look(screening: Screening, place: Array) -> SecondLook | None:
-    """The look from one place; None where no steady flow is found there."""
-    search, fingerprints = screening.search, screening.fingerprints
-    model, noise = search.model, search.noise
-    point = linearise(model, place, search.point)
-    if point is None:
-        return None
-    found = responses(model, point, fingerprints.causes)
-    slope, residual = noise.whiten(noise.used(point.slope)), noise.whiten(noise.residual(point.prediction))
-    projected = score_test.project(slope, residual, point.z, noise.whiten(noise.used(found)))
-    score = score_test.scores(projected, fingerprints.only_sign)
-    size = projected.length * np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
-    nothing = float(projected.residual @ projected.residual)
-    log_factor = 0.5 * (objective(noise, search.point) - nothing) + log_factors(score, size)
-    return SecondLook(point, log_factor, expected_gain(score, projected.length, size))
+    return [z - z[j] * covariance[:, j] / covariance[j, j] for j in off[:MOST_CONDITIONAL]]

@@ -1,27 +1,17 @@
-"""Score tests of a residual against many fingerprints, after what calibration can mimic is projected out.
+"""Score tests of a residual against many fingerprints, after what calibration can mimic is projected out; the evidence
+of each hypothesis, and the alarm that any of them stands out.
 
     T = S_perp' r / |S_perp|,   S_perp = (I - P) S,   P the projection onto the slopes of the calibrated parameters
+    ln B = -1/2 ln(1 + a^2) + 1/2 T^2 a^2 / (1 + a^2),   a = s |S_perp|
 
 Everything here is whitened: errors are independent and standard normal. Rows of the prior stand below those of the
 data, so that a calibrated parameter is as free as its prior says.
 
-Family-wise p: the chance that errors alone make the best of many score tests score as high as one does.
-
-    p = (1 + #{b: T_b^2 >= T^2}) / (1 + draws)
-
-Residuals that are errors only are drawn, and T_b^2 is the largest of the squared scores of draw b. It is told beside
-each effect; the alarm is another sum over the same draws, see `evidence`. No form of the tail is assumed; p is never
-below 1 / (1 + draws).
-
-The evidence for hypotheses of every kind, to first order in their size, and the alarm that any of them stands out.
-
-    ln B = -1/2 ln(1 + a^2) + 1/2 T^2 a^2 / (1 + a^2),   a = s |S_perp|
-
 B is the Bayes factor of a hypothesis of size N(0, s^2) against nothing, T its score and |S_perp| the length of its
-fingerprint per unit of size, both in standard errors (see `score_test`): the width of its prior is charged (Occam's
-factor). Groups of kinds (listed effects, places, instruments) are as likely before; of a group all kinds are, of a kind
-all hypotheses, of one hypothesis all settings. What is missing is one of them or nothing. The alarm is sounded by the
-sum over all, against the same sum in draws of errors alone.
+fingerprint per unit of size, both in standard errors: the width of its prior is charged (Occam's factor). Groups of
+kinds (listed effects, places, instruments) are as likely before; of a group all kinds are, of a kind all hypotheses, of
+one hypothesis all settings. What is missing is one of them or nothing. The sum over all sounds the alarm, against the
+same sum in draws of errors alone.
 Source: Kass and Raftery (1995), doi:10.2307/2291091, for Bayes factors; not checked against it.
 """
 
@@ -39,6 +29,8 @@ from vegglue.parallel import in_threads
 Name = TypeVar("Name", str, int)
 # Residuals drawn of errors alone [-]: 150 of them lie beyond the 95 % point, so that p = 0.05 is known to 8 %.
 NULL_DRAWS = 3000
+# Draws of errors alone that are worked on together: what lies between them then fits the memory.
+NULL_DRAWS_TOGETHER = 250
 
 
 @dataclass(frozen=True)
@@ -65,37 +57,99 @@ class Projected:
 
 
 def project(slopes: Array, residual: Array, z: Array, fingerprints: Array) -> Projected:
-    """(I - P) [r; -z] and (I - P) [S; 0], P onto [J; 1]: J (n, p), r (n,) and S (n, c) whitened, z (p,)."""
+    """(I - P) [r; -z] and (I - P) [S; 0], P onto [J; 1].
+
+    Parameters
+    ----------
+    slopes : array (n, p)
+        J, whitened [-].
+    residual : array (n,)
+        r, whitened [-].
+    z : array (p,)
+        Parameters on the scale of their priors [-].
+    fingerprints : array (n, c)
+        S, whitened [per unit of amplitude].
+
+    Returns
+    -------
+    Projected
+        Of n + p rows, those of the prior last.
+    """
     rows, p = slopes.shape
     basis, _ = np.linalg.qr(np.vstack([slopes, np.eye(p)]))
     remaining = np.concatenate([residual, -z])
     seen = -(basis @ (basis[:rows].T @ fingerprints))
     seen[:rows] += fingerprints
-    length = _lengths(seen)
-    visible = length / np.maximum(_lengths(fingerprints), 1e-300)
-    return Projected(remaining - basis @ (basis.T @ remaining), seen, length, visible)
+    # One pass, where `norm` makes three.
+    length, whole = (np.sqrt(np.einsum("ij,ij->j", columns, columns)) for columns in (seen, fingerprints))
+    return Projected(remaining - basis @ (basis.T @ remaining), seen, length, length / np.maximum(whole, 1e-300))
 
 
 def scores(projected: Projected, only_sign: np.ndarray) -> Array:
-    """T = S_perp' r / |S_perp| (c,); 0 where an effect that only has one sign would need the other."""
+    """T = S_perp' r / |S_perp| (c,); 0 if an effect that only has one sign would need the other."""
     return _signed(projected.score, only_sign)
 
 
-def null_draws(projected: Projected, only_sign: np.ndarray, errors: Array, seed: int) -> Array:
-    """T (draws, c) of residuals that are errors (draws, n) only; the rows of the prior are drawn here."""
+def _signed(values: Array, only_sign: np.ndarray) -> Array:
+    return np.where(only_sign * values < 0, 0.0, values)
+
+
+@dataclass(frozen=True)
+class Family:
+    """Score tests of fingerprints that are one hypothesis.
+
+        p = (1 + #{b: T_b^2 >= T^2}) / (1 + draws)
+
+    scores: T (c,) [standard errors]; maxima: the largest T_b^2 of each draw b of errors alone (draws,). No form of the
+    tail is assumed.
+    """
+
+    scores: Array
+    maxima: Array
+
+    def p_of(self, score: float) -> float:
+        """P(max_j T_j^2 >= T^2) under the null, for one score T."""
+        return float((1 + np.sum(self.maxima >= score**2)) / (1 + self.maxima.size))
+
+    def threshold(self, rate: float) -> float:
+        """|T| that the best one exceeds by errors alone at a rate."""
+        return float(np.sqrt(np.quantile(self.maxima, 1.0 - rate)))
+
+
+def family_of(projected: Projected, only_sign: np.ndarray, errors: Array, seed: int) -> Family:
+    """Scores of fingerprints against their residual, and against whitened errors (draws, n) alone."""
+    drawn = with_rows_of_prior(errors, projected, seed) @ projected.units.astype(np.float32)
+    squares = _signed(np.asarray(drawn, dtype=np.float64), only_sign) ** 2
+    return Family(scores(projected, only_sign), np.asarray(squares.max(axis=1, initial=0.0)))
+
+
+def with_rows_of_prior(errors: Array, projected: Projected, seed: int) -> Single:
+    """Draws of errors alone (draws, n) with the rows of the prior drawn too (draws, rows), in single precision."""
     of_prior = np.random.default_rng(seed).standard_normal((len(errors), projected.residual.size - errors.shape[1]))
-    noise = np.hstack([errors, of_prior]).astype(np.float32)
-    return _signed(np.asarray(noise @ projected.units.astype(np.float32), dtype=np.float64), only_sign)
+    return np.hstack([errors, of_prior]).astype(np.float32)
 
 
 def chances(projected: Projected, family: Sequence[np.ndarray], allowed: Mapping[float, np.ndarray]) -> Array:
-    """Chance of each fingerprint (c,) [-] to be the one missing effect, whose length L [standard errors] is one of a
-    few, all as likely before.
+    """Probability of each fingerprint to be the one missing effect (Bayes), of one of a few lengths L.
 
         p_i ~ sum_L sum_s exp(s L T_i - L^2 / 2) / n_jL,  s = +1, -1
 
-    allowed {L: (2, c)}: whether it may have either sign at that length; n_jL: number of fingerprints and signs of its
-    family that are allowed. All families with any allowed are as likely before (Bayes).
+    n_jL is the number of fingerprints and signs of family j that are allowed. All L are as likely before, and so are
+    all families with any allowed.
+
+    Parameters
+    ----------
+    projected : Projected
+        Of c fingerprints.
+    family : sequence of arrays
+        Columns of each family of fingerprints, which is one effect.
+    allowed : dict of arrays (2, c)
+        By L [standard errors], whether a fingerprint may have either sign at that length.
+
+    Returns
+    -------
+    array (c,)
+        Of sum 1 [-].
     """
     score = projected.score
     signed, highest = np.stack([score, -score]), float(np.abs(score).max(initial=0.0))
@@ -135,7 +189,7 @@ def cosines(projected: Projected) -> Array:
 
 
 def alike_groups(names: Sequence[Name], cosine: Array) -> list[list[Name]]:
-    """Names, or numbers, that the data cannot tell apart, linked where |cosine| > alike_cosine."""
+    """Names, or numbers, that the data cannot separate, linked where |cosine| > alike_cosine."""
     remaining, found = list(range(len(names))), []
     while remaining:
         group, grown = [remaining.pop(0)], True
@@ -146,45 +200,6 @@ def alike_groups(names: Sequence[Name], cosine: Array) -> list[list[Name]]:
             remaining = [j for j in remaining if j not in near]
         found.append([names[j] for j in sorted(group)])
     return found
-
-
-def _lengths(columns: Array) -> Array:
-    """|column| of each (c,); one pass, where `norm` makes three."""
-    return np.asarray(np.sqrt(np.einsum("ij,ij->j", columns, columns)))
-
-
-def _signed(values: Array, only_sign: np.ndarray) -> Array:
-    return np.where(only_sign * values < 0, 0.0, values)
-
-
-@dataclass(frozen=True)
-class Family:
-    """Score tests of fingerprints that are one hypothesis.
-
-    scores: T (c,) [standard errors]; maxima: largest T^2 of each draw of errors alone (draws,).
-    """
-
-    scores: Array
-    maxima: Array
-
-    def p_of(self, score: float) -> float:
-        """P(max_j T_j^2 >= T^2) under the null, for one score T."""
-        return float((1 + np.sum(self.maxima >= score**2)) / (1 + self.maxima.size))
-
-    def threshold(self, rate: float) -> float:
-        """|T| that the best one exceeds by errors alone at a rate."""
-        return float(np.sqrt(np.quantile(self.maxima, 1.0 - rate)))
-
-
-def family_of(projected: Projected, only_sign: np.ndarray, errors: Array, seed: int) -> Family:
-    """Scores of fingerprints against their residual, and what they come to in whitened errors (draws, n) alone."""
-    drawn = null_draws(projected, only_sign, errors, seed) ** 2
-    maxima = np.asarray(drawn.max(axis=1, initial=0.0))
-    return Family(scores(projected, only_sign), maxima)
-
-
-# Draws of errors alone that are worked on together: what lies between them then fits the memory.
-NULL_DRAWS_TOGETHER = 250
 
 
 @dataclass(frozen=True)
@@ -260,16 +275,39 @@ def prior_shrinkage(size: Array) -> Array:
 def alarm_p(kinds: Sequence[HypothesisKind], errors: Array, seed: int, slack: float = 0.0) -> float:
     """P(errors alone give as large a sum of Bayes factors over all kinds), counted, (1 + count) / (1 + draws).
 
-    errors (draws, n): whitened; slack: by how much scores are made smaller first [standard errors].
+    Parameters
+    ----------
+    kinds : sequence of HypothesisKind
+        One at least.
+    errors : array (draws, n)
+        Whitened errors alone [-].
+    seed : int
+        Of the rows of the prior.
+    slack : float
+        By how much scores are made smaller first [standard errors].
+
+    Returns
+    -------
+    float
+        Never below 1 / (1 + draws).
     """
     found = logsumexp([logsumexp(kind.of_scores(np.maximum(np.abs(kind.scores) - slack, 0.0))) for kind in kinds])
-    rows = kinds[0].projected.residual.size
-    of_prior = np.random.default_rng(seed).standard_normal((len(errors), rows - errors.shape[1]))
-    drawn = np.hstack([errors, of_prior]).astype(np.float32)
-    terms = [_drawn_terms(kind) for kind in kinds]
-    parts = [(terms, drawn[k : k + NULL_DRAWS_TOGETHER]) for k in range(0, len(drawn), NULL_DRAWS_TOGETHER)]
-    count = sum(int(np.sum(sums >= found)) for sums in in_threads(_sums_of_draws, parts))
-    return (1 + count) / (1 + len(errors))
+    drawn = with_rows_of_prior(errors, kinds[0].projected, seed)
+    terms = [
+        _DrawnTerms(
+            kind.projected.units.astype(np.float32),
+            kind.only_sign,
+            kind.of_scores(np.zeros(kind.size.size)),
+            0.5 * prior_shrinkage(kind.size),
+        )
+        for kind in kinds
+    ]
+
+    def count_of(part: Single) -> int:
+        return int(np.sum(logsumexp([one.sums(part) for one in terms], axis=0) >= found))
+
+    parts = [(drawn[k : k + NULL_DRAWS_TOGETHER],) for k in range(0, len(drawn), NULL_DRAWS_TOGETHER)]
+    return (1 + sum(in_threads(count_of, parts))) / (1 + len(errors))
 
 
 @dataclass(frozen=True)
@@ -281,30 +319,17 @@ class _DrawnTerms:
     constant: Array
     factor: Array
 
-
-def _drawn_terms(kind: HypothesisKind) -> _DrawnTerms:
-    constant = kind.of_scores(np.zeros(kind.size.size))
-    return _DrawnTerms(
-        kind.projected.units.astype(np.float32), kind.only_sign, constant, 0.5 * prior_shrinkage(kind.size)
-    )
-
-
-def _sums_of_draws(terms: Sequence[_DrawnTerms], drawn: Single) -> Array:
-    """ln of the sum over all kinds of each draw (draws, n) of errors alone, (draws,)."""
-    return np.asarray(logsumexp([_sums_of_kind(one, drawn) for one in terms], axis=0))
-
-
-def _sums_of_kind(one: _DrawnTerms, drawn: Single) -> Array:
-    """The same of one kind; in place, which takes a third of the time."""
-    if not one.constant.size:
-        return np.full(len(drawn), -np.inf)
-    values = (drawn @ one.units).astype(np.float64)
-    values[:, one.only_sign > 0] = np.maximum(values[:, one.only_sign > 0], 0.0)
-    values[:, one.only_sign < 0] = np.minimum(values[:, one.only_sign < 0], 0.0)
-    np.square(values, out=values)
-    values *= one.factor
-    values += one.constant
-    most = values.max(axis=1)
-    values -= most[:, None]
-    np.exp(values, out=values)
-    return np.asarray(most + np.log(values.sum(axis=1)))
+    def sums(self, drawn: Single) -> Array:
+        """ln of the sum over the columns for each draw (draws, rows), (draws,); in place, in a third of the time."""
+        if not self.constant.size:
+            return np.full(len(drawn), -np.inf)
+        values = (drawn @ self.units).astype(np.float64)
+        values[:, self.only_sign > 0] = np.maximum(values[:, self.only_sign > 0], 0.0)
+        values[:, self.only_sign < 0] = np.minimum(values[:, self.only_sign < 0], 0.0)
+        np.square(values, out=values)
+        values *= self.factor
+        values += self.constant
+        most = values.max(axis=1)
+        values -= most[:, None]
+        np.exp(values, out=values)
+        return np.asarray(most + np.log(values.sum(axis=1)))

@@ -20,7 +20,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Instrument, place_candidate
 from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Places
-from vegglue.calibration.residual_screening import Screening, SecondLook, refit_start, second_looks
+from vegglue.calibration.residual_screening import ConditionalScreening, Screening, conditional_screenings, refit_start
 from vegglue.calibration.score_test import HypothesisKind, kind_named
 from vegglue.diagnosis.place_search import found_place
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
@@ -58,7 +58,7 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
     To first order an effect may promise more than it keeps, or have no flow at all. Then what is within reach of the
     rest is refitted, too, until nothing is.
     """
-    kind, looks = screening.kinds[0], second_looks(screening)
+    kind, looks = screening.kinds[0], conditional_screenings(screening)
     linear = _linear_evidence(kind, looks)
     best = max(*(kind.total for kind in screening.kinds), float(linear.max(initial=-np.inf)), elsewhere)
     found, tried = _instrument_hypotheses(screening), set[str]()
@@ -107,9 +107,9 @@ def _promises(screening: Screening, linear: Array, tried: set[str]) -> list[floa
 
 
 def _refitted(
-    screening: Screening, of_round: _Round, promised: tuple[Array, Sequence[SecondLook]], watch: Watch
+    screening: Screening, of_round: _Round, promised: tuple[Array, Sequence[ConditionalScreening]], watch: Watch
 ) -> list[Hypothesis]:
-    """Hypotheses of one round, those that found a flow; promised: evidence to first order, and the second looks."""
+    """Hypotheses of one round that found a flow; promised: evidence to first order, and conditional screenings."""
     linear = promised[0]
     effects, spots = of_round.effects, [(one, spot) for one, some in of_round.places for spot in some]
     trials = [_effect_trial(screening, j, *promised) for j in effects]
@@ -149,7 +149,7 @@ def _within_reach(evidence: float, best: float) -> bool:
     return bool((best - evidence) / tempering(np.array(best)) < REACH)
 
 
-def _linear_evidence(kind: HypothesisKind, looks: Sequence[SecondLook]) -> Array:
+def _linear_evidence(kind: HypothesisKind, looks: Sequence[ConditionalScreening]) -> Array:
     """E of every column of the listed effects (c,), from the place that promises most."""
     promised = [kind.log_evidence, *(one.log_factor + kind.log_prior for one in looks)]
     return np.asarray(np.max(promised, axis=0))
@@ -190,7 +190,9 @@ def _column_of(screening: Screening, candidate: int, linear: Array) -> int:
     return int(columns[np.argmax(linear[columns])])
 
 
-def _effect_trial(screening: Screening, candidate: int, linear: Array, looks: Sequence[SecondLook]) -> RefitTrial:
+def _effect_trial(
+    screening: Screening, candidate: int, linear: Array, looks: Sequence[ConditionalScreening]
+) -> RefitTrial:
     """A listed effect at its best setting, from the best place, and from others that promise more there."""
     column, one = _column_of(screening, candidate, linear), screening.fingerprints.candidates[candidate]
     shapes, case = screening.fingerprints.settings[column], screening.search.model.case

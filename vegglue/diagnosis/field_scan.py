@@ -16,7 +16,7 @@ import scipy.linalg
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
-from vegglue.calibration.model_error import Bumps, CellResponses, bumps, cell_responses, field_columns
+from vegglue.calibration.model_error import CellResponses, GaussianBasis, cell_responses, field_columns, gaussian_basis
 from vegglue.calibration.noise import covariance_of
 from vegglue.calibration.residual_screening import GROUPS
 from vegglue.flow.local_changes import Term
@@ -42,7 +42,7 @@ class FieldHypothesis:
     """
 
     term: Term
-    over: Bumps
+    over: GaussianBasis
     size: float
     log_factor: float
 
@@ -62,7 +62,7 @@ def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHy
     nothing = log_density_of_residual(whole, residual)
 
     def fields_of(term: Term, length: float, width: float) -> list[FieldHypothesis]:
-        over = bumps(responses.grid, length * half_width, width * half_width)
+        over = gaussian_basis(responses.grid, length * half_width, width * half_width)
         columns = search.noise.used(field_columns(responses, term, over))
         gram = columns @ columns.T
         gained = [log_density_of_residual(whole + size**2 * gram, residual) for size in FIELD_SIZES[term]]

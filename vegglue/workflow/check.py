@@ -15,6 +15,7 @@ from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.measurements.section_discharge import CarriedDischarge, carried_discharges
 from vegglue.parallel import one_thread
+from vegglue.wording.sentences import sentence
 from vegglue.workflow.case_run import CaseRun, case_run
 from vegglue.workflow.command_model import command_tried
 
@@ -62,7 +63,7 @@ def doubts_of(run: CaseRun) -> list[str]:
 
 
 def beyond_seen(run: CaseRun) -> list[str]:
-    """Laws that are used where nobody has seen them, in the experiments of the case and of its validation.
+    """Laws that are used beyond the range they were found in, in the experiments of the case and of its validation.
 
     Told of the flow in the middle of the prior on coarse cells: depths and speeds hang on discharge and outlet most.
     """
@@ -73,7 +74,7 @@ def beyond_seen(run: CaseRun) -> list[str]:
     for model in filter(None, (run.model, run.validation_model)):
         cheap = coarser(model) or model
         point = linearise(cheap, np.zeros(len(cheap.names)))
-        found += [] if point is None else list(laws_beyond_their_range(cheap, point))
+        found += [] if point is None else map(sentence, laws_beyond_their_range(cheap, point))
     return list(dict.fromkeys(found))
 
 

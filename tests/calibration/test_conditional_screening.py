@@ -1,4 +1,4 @@
-"""Second looks at effects: one parameter that is off is back in the middle, and all others fit best there."""
+"""Conditional screenings: one parameter that is off is back in the middle, and all others fit best there."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_
 
 from vegglue.calibration.baseline import SearchModel, search_model
 from vegglue.calibration.fit import objective
-from vegglue.calibration.residual_screening import MOST_LOOKS, OFF, places_of_looks
+from vegglue.calibration.residual_screening import MOST_CONDITIONAL, OFF, conditional_places
 from vegglue.case.schema import EffectEntry
 from vegglue.engine.interface import Point
 
@@ -21,8 +21,8 @@ def calibrated() -> SearchModel:
 
 def test_there_one_parameter_is_in_the_middle_and_the_others_fit_best() -> None:
     search = calibrated()
-    z, places = search.point.z, places_of_looks(search)
-    off = sorted(np.flatnonzero(np.abs(z) > OFF), key=lambda j: -abs(z[j]))[:MOST_LOOKS]
+    z, places = search.point.z, conditional_places(search)
+    off = sorted(np.flatnonzero(np.abs(z) > OFF), key=lambda j: -abs(z[j]))[:MOST_CONDITIONAL]
     assert len(places) == len(off) > 0
     for j, place in zip(off, places, strict=True):
         assert abs(place[j]) < 1e-12
@@ -42,7 +42,7 @@ def test_amplitudes_of_effects_and_what_lies_as_expected_are_left_alone() -> Non
     search = calibrated()
     case, names = search.model.case, search.model.names
     middle = replace(search.point, z=np.zeros(PARAMETERS))
-    assert places_of_looks(replace(search, point=middle)) == []
+    assert conditional_places(replace(search, point=middle)) == []
     entry = EffectEntry(effect="wind", values=dict(zip("abcdefgh", names, strict=False)))
     of_effects = replace(search.model, case=case.model_copy(update={"effects": {"wind": entry}}))
-    assert places_of_looks(replace(search, model=of_effects)) == []
+    assert conditional_places(replace(search, model=of_effects)) == []
