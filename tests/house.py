@@ -1,18 +1,23 @@
-"""The package as it stands: its folders, what they import, how long things are.
+"""The package as it stands: its folders, what they import, and counts for a reader, none of which is a test.
 
-`python tests/house.py` prints it, and brings the table of ARCHITECTURE.md up to date.
+`make house` prints them, and brings the table of ARCHITECTURE.md up to date.
 """
 
 import ast
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from statistics import median
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "vegglue"
+# Calls and keywords whose texts are entries of a registry: effects, schemas, options, constants.
+REGISTERED = {
+    "Effect", "Amplitude", "Shape", "Quantity", "Term", "Kind", "Constant", "Field", "Option", "Argument",
+    "description", "help", "source", "meaning", "title", "provenance",
+}  # fmt: skip
 FILES = sorted(PACKAGE.rglob("*.py"))
 DOCSTRING = re.compile(r"(?P<purpose>.*?)\n\nMay import: (?P<may>.*?)\.\nOpen first: (?P<first>.*?)\.\s*$", re.DOTALL)
 
@@ -87,14 +92,6 @@ def imports_of(folder: str) -> frozenset[str]:
     return frozenset(name for name in names if (PACKAGE / name).is_dir()) - {folder}
 
 
-def functions(path: Path) -> Iterator[tuple[str, int]]:
-    """Name and length in lines of every function of a file."""
-    for node in ast.walk(tree_of(path)):
-        if isinstance(node, ast.FunctionDef):
-            assert node.end_lineno is not None
-            yield node.name, node.end_lineno - node.lineno + 1
-
-
 def public_names(path: Path) -> set[str]:
     """Public functions, classes and constants that a file defines."""
     found: set[str] = set()
@@ -120,16 +117,72 @@ def write_page() -> None:
     path.write_text(re.sub(r"\| folder \|.*?\n(?!\|)", page() + "\n", text, flags=re.DOTALL), encoding="utf-8")
 
 
+def single_caller_helpers() -> list[str]:
+    """Private functions and methods whose name occurs once in their file beside its definition."""
+    found = []
+    for path in FILES:
+        used = Counter(
+            node.id if isinstance(node, ast.Name) else node.attr
+            for node in ast.walk(tree_of(path))
+            if isinstance(node, ast.Name | ast.Attribute)
+        )
+        own = [node.name for node in ast.walk(tree_of(path)) if isinstance(node, ast.FunctionDef)]
+        private = [name for name in own if name.startswith("_") and not name.startswith("__")]
+        found += [f"{module_of(path)}.{name}" for name in private if used[name] == 1]
+    return found
+
+
+def printed_words(path: Path) -> int:
+    """Words of texts of four words or more, without docstrings, errors that are raised, and entries of a registry."""
+    left_out: set[int] = set()
+    for node in ast.walk(tree_of(path)):
+        called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+        registered = called in REGISTERED or (isinstance(node, ast.keyword) and node.arg in REGISTERED)
+        if isinstance(node, ast.Raise) or registered:
+            left_out |= {id(one) for one in ast.walk(node)}
+        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            left_out.add(id(node.value))
+    texts = [
+        node.value
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in left_out
+    ]
+    counts = [len(re.findall(r"[A-Za-z][A-Za-z'-]+", text)) for text in texts]
+    return sum(count for count in counts if count >= 4)
+
+
+def structured_share() -> float:
+    """Share of public functions and classes whose docstring has a numpydoc section [-]."""
+    public = [
+        ast.get_docstring(node) or ""
+        for path in FILES
+        for node in tree_of(path).body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
+    ]
+    return sum("\n---" in text for text in public) / len(public)
+
+
+def lines_of(paths: Iterable[Path]) -> int:
+    return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in paths)
+
+
 def main() -> None:
     write_page()
-    print(page())
-    lengths = [len(path.read_text(encoding="utf-8").splitlines()) for path in FILES]
-    sizes = sorted((size, f"{module_of(path)}.{name}") for path in FILES for name, size in functions(path))
-    print(f"\n{len(FILES)} files, median {median(lengths):g} lines, longest {max(lengths)}")
-    print(f"{len(sizes)} functions, median {median(size for size, _ in sizes):g} lines, longest {sizes[-3:]}")
-    for path, length in sorted(zip(FILES, lengths, strict=True), key=lambda pair: pair[1]):
-        if length < 60 and path.name != "__init__.py":
-            print(f"{length:4d} {path.relative_to(ROOT)}")
+    lines, helpers = lines_of(FILES), single_caller_helpers()
+    words = sum(printed_words(path) for path in FILES if path.parent.name != "wording")
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+    print(f"package  {len(folders())} folders, {len(FILES)} files, {lines:,} lines")
+    print(f"tests    {lines_of((ROOT / 'tests').rglob('*.py')):,} lines")
+    print(f"docs     {sum(len(path.read_text(encoding='utf-8').split()) for path in pages):,} words")
+    print(f"private helpers with one caller    {len(helpers)}, {1000 * len(helpers) / lines:.1f} per 1,000 lines")
+    print(f"words printed outside wording/     {words:,}, {1000 * words / lines:.0f} per 1,000 lines")
+    print(f"public definitions with numpydoc   {structured_share():.0%}")
+    by_folder = Counter(name.split(".")[1] for name in helpers)
+    for folder in folders():
+        files = list((PACKAGE / folder).rglob("*.py"))
+        said = sum(map(printed_words, files))
+        counts = f"{len(files):4d} files{lines_of(files):7,} lines{by_folder[folder]:5d} helpers{said:6,} words"
+        print(f"  {folder:13s}{counts}")
 
 
 if __name__ == "__main__":

@@ -124,7 +124,7 @@ def test_tests_mirror_the_folders() -> None:
 
 def test_the_map_is_made_of_the_docstrings() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    assert page() in text, "`python tests/house.py` prints the table"
+    assert page() in text, "`make house` writes the table"
 
 
 def tracked() -> list[Path]:
