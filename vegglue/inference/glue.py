@@ -1,12 +1,11 @@
-"""How well each member of an ensemble predicts what was measured: residuals, efficiency and likelihood.
+"""GLUE: the members of an ensemble weighed by how well they predict what was measured.
 
-GLUE: weigh the members of an ensemble by how well they predict what was measured.
+    p(theta | u) ~ L(u | theta) p(theta):   a member drawn from the prior weighs w_k = L_k / sum L
 
 Beven and Binley (1992), https://doi.org/10.1002/hyp.3360060305; the Gaussian likelihood and its sigma as in
 Berends et al. (2020), https://doi.org/10.1016/j.advwatres.2020.103675.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,46 +41,77 @@ class MemberFit:
 
 
 def fit_members(prediction: Array, station: pd.DataFrame, rule: str) -> MemberFit:
-    """Efficiency and Gaussian log-likelihood of each member at the stations, with the errors that `rule` asks for.
+    """Efficiency and Gaussian log-likelihood of each member at the stations.
 
-    prediction (member, station), NaN where a member failed.
+        E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2)
+        ln p(u_i | U_i) = -ln(2 pi s_i^2) / 2 - (u_i - U_i)^2 / (2 s_i^2)
 
-    best-member: s_k^2 = mean (u - U)^2 over the stations of kind k, of the member with the least sum_k n_k ln s_k^2,
-    and as `sizes_as_stated` says where they are few; known: the standard errors of the data.
+    Parameters
+    ----------
+    prediction : array (member, station)
+        U [m/s or m], NaN where a member failed.
+    station : DataFrame
+        All stations, their measured values u among them.
+    rule : str
+        `known`: s are the standard errors of the data. `best-member`: s_k^2 = mean (u - U)^2 over the stations of kind
+        k, of the member with the least sum_k n_k ln s_k^2, and as in `sizes_as_stated` if they are few.
 
-    E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2).
+    Returns
+    -------
+    MemberFit
+        Of all members.
 
-    Errors: InputError when no member was solved, a standard error is missing, or sigma would be zero.
+    Raises
+    ------
+    InputError
+        If no member was solved, a standard error is missing, or sigma would be zero.
     """
     kinds = stations_by_kind(station)
     used = np.concatenate(list(kinds.values()))
     solved = np.asarray(np.isfinite(prediction[:, used]).all(axis=1))
     if not solved.any():
         raise InputError(f"ensemble: none of the {len(solved)} members was solved; see the reasons stored with them.")
-    value = station["value"].to_numpy(float)
-    residual = np.where(solved[:, None], value - prediction, np.nan)
+    residual = np.where(solved[:, None], station["value"].to_numpy(float) - prediction, np.nan)
     mean_square = {kind: np.mean(residual[:, rows] ** 2, axis=1) for kind, rows in kinds.items()}
-    errors, few = (_known_errors(station, used) if rule == "known" else None), sizes_as_stated(station)
-    if errors is None:
-        misfit = _profile_misfit(mean_square, kinds, few)
+    few = sizes_as_stated(station)
+    if rule == "known":
+        noise = station["standard_error"].to_numpy(float)
+        if not (noise[used] > 0).all():
+            raise InputError(
+                f"observations: `infer.sigma: known` needs standard errors, but {unstated_errors(station)} "
+                "`sigma: best-member` estimates them from the residual of the best member."
+            )
+        best = int(np.nanargmin(np.sum((residual / noise)[:, used] ** 2, axis=1)))
+        sigma = {kind: root_mean_square(noise[rows]) for kind, rows in kinds.items()}
     else:
-        misfit = np.sum((residual / errors)[:, used] ** 2, axis=1)
-    best = int(np.nanargmin(misfit))
-    sigma = {kind: float(np.sqrt(each[best])) for kind, each in mean_square.items()} | few
-    noise = station["kind"].map(sigma).to_numpy(float) if errors is None else errors
+        for kind, each in mean_square.items():
+            if kind not in few and np.nanmin(each) == 0:
+                raise InputError(
+                    f"observations: a member reproduces every {kind} exactly, so sigma cannot be taken from the "
+                    "residual; give standard errors and use `infer.sigma: known`."
+                )
+        # Minus twice the likelihood at its best sigma of each kind; of those that are few at their standard errors.
+        terms = [
+            len(kinds[kind]) * (each / few[kind] ** 2 if kind in few else np.log(each))
+            for kind, each in mean_square.items()
+        ]
+        best = int(np.nanargmin(np.sum(terms, axis=0)))
+        sigma = {kind: float(np.sqrt(each[best])) for kind, each in mean_square.items()} | few
+        noise = station["kind"].map(sigma).to_numpy(float)
+    of_used = np.where(station["used"].to_numpy(), noise, np.nan)
     return MemberFit(
         solved=solved,
         best=best,
-        sigma=sigma if errors is None else {kind: root_mean_square(errors[rows]) for kind, rows in kinds.items()},
+        sigma=sigma,
         noise=noise,
         efficiency=efficiency(residual, station),
-        log_likelihood=_log_likelihood(residual, noise, station["used"].to_numpy()),
+        log_likelihood=-0.5 * np.log(2 * np.pi * of_used**2) - 0.5 * (residual / of_used) ** 2,
     )
 
 
 def sizes_as_stated(station: pd.DataFrame) -> dict[str, float]:
     """Standard errors of kinds with fewer than LEAST_FOR_SIZE used readings [unit of the kind]: the root mean square of
-    those stated, the usual one where any is not.
+    those stated, the usual one if any is not.
     """
     error = station["standard_error"].to_numpy(float)
     few = {kind: error[rows] for kind, rows in stations_by_kind(station).items() if rows.size < LEAST_FOR_SIZE}
@@ -92,68 +122,54 @@ def sizes_as_stated(station: pd.DataFrame) -> dict[str, float]:
 
 
 def efficiency(residual: Array, station: pd.DataFrame) -> Array:
-    """E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2) over kinds k, (member,); residual (member, station)."""
+    """E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2) over kinds k, (member,) [-]; residual (member, station).
+
+    NaN if all values of a kind are equal: against a constant no efficiency is defined.
+    """
     value = station["value"].to_numpy(float)
     kinds = stations_by_kind(station).values()
-    return 1 - np.mean([np.mean(residual[:, rows] ** 2, axis=1) / _variance(value[rows]) for rows in kinds], axis=0)
-
-
-def _known_errors(station: pd.DataFrame, used: NDArray[np.intp]) -> Array:
-    errors = station["standard_error"].to_numpy(float)
-    if not (errors[used] > 0).all():
-        raise InputError(
-            f"observations: `infer.sigma: known` needs standard errors, but {unstated_errors(station)} "
-            "`sigma: best-member` estimates them from what the best member leaves."
-        )
-    return errors
-
-
-def _profile_misfit(
-    mean_square: dict[str, Array], kinds: dict[str, NDArray[np.intp]], few: Mapping[str, float]
-) -> Array:
-    """sum_k n_k ln s_k^2: minus twice the likelihood at its best sigma of each kind, up to a constant [-]; of those
-    that are few sum_k n_k s_k^2 / e_k^2, e_k their standard errors.
-    """
-    for kind, each in mean_square.items():
-        if kind not in few and np.nanmin(each) == 0:
-            raise InputError(
-                f"observations: a member reproduces every {kind} exactly, so sigma cannot be taken from the residual; "
-                "give standard errors and use `infer.sigma: known`."
-            )
-    terms = [
-        len(kinds[kind]) * (each / few[kind] ** 2 if kind in few else np.log(each))
-        for kind, each in mean_square.items()
-    ]
-    return np.sum(terms, axis=0)
-
-
-def _variance(values: Array) -> float:
-    """NaN instead of zero: against a constant no efficiency is defined."""
-    return float(np.var(values)) or float("nan")
-
-
-def _log_likelihood(residual: Array, noise: Array, used: NDArray[np.bool_]) -> Array:
-    """ln p(u_i | U_i) = -ln(2 pi s_i^2) / 2 - (u_i - U_i)^2 / (2 s_i^2)."""
-    noise = np.where(used, noise, np.nan)
-    return -0.5 * np.log(2 * np.pi * noise**2) - 0.5 * (residual / noise) ** 2
+    variances = [float(np.var(value[rows])) or float("nan") for rows in kinds]
+    squares = [np.mean(residual[:, rows] ** 2, axis=1) for rows in kinds]
+    return 1 - np.mean([square / variance for square, variance in zip(squares, variances, strict=True)], axis=0)
 
 
 def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterior:
-    """p(theta | u) ~ L(u | theta) p(theta): a member drawn from the prior weighs w_k = L_k / sum L.
+    """The posterior of an ensemble, its members weighed by likelihood.
 
-    gaussian: L = prod_i (2 pi s_i^2)^(-1/2) exp(-(u_i - U_i)^2 / (2 s_i^2)) over the used stations i, with s the root
-    mean square residual of the best member, one for each kind of measurement (best-member), or the standard errors of
-    the data (known). nse and inverse-variance: see member_weights. `behavioural` is the smallest Nash-Sutcliffe
-    efficiency of a member with weight, for any of the three; failed members have none.
+        gaussian: L = prod_i (2 pi s_i^2)^(-1/2) exp(-(u_i - U_i)^2 / (2 s_i^2)) over the used stations i
 
-    Errors: InputError when nothing can be weighed: stations other than those simulated, none used, no member solved,
-    standard errors missing, sigma zero, no member above the threshold.
+    with s the root mean square residual of the best member, one for each kind of measurement (`infer.sigma:
+    best-member`), or the standard errors of the data (`known`). nse and inverse-variance: see `member_weights`.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+        Members drawn from the prior, and their predictions.
+    case : Case
+        `infer.likelihood`, `infer.sigma`, and `infer.behavioural`: the smallest Nash-Sutcliffe efficiency of a member
+        with weight [-], for any of the three likelihoods; failed members have no weight.
+    observations : Observations
+        The stations that were simulated, with measured values.
+
+    Returns
+    -------
+    Posterior
+        Without a refinement.
+
+    Raises
+    ------
+    InputError
+        If stations are not those simulated, none is used, no member was solved, standard errors are missing, sigma is
+        zero, or no member is above the threshold.
+
+    References
+    ----------
+    Beven and Binley (1992), https://doi.org/10.1002/hyp.3360060305.
     """
     station = observations.table
     check_stations(ensemble, station, case.source)
     fit = fit_members(ensemble.prediction, station, case.infer.sigma)
     threshold = -np.inf if case.infer.behavioural is None else case.infer.behavioural
-    weights = member_weights(fit, case.infer.likelihood, threshold)
     settings = InferenceSettings(
         method="glue",
         likelihood=case.infer.likelihood,
@@ -163,25 +179,22 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
         seed=ensemble.seed,
         version=ensemble.version,
     )
-    return posterior_of(settings, _weighted_sample(ensemble, case, fit, weights), case, station, fit.noise, fit.sigma)
-
-
-def _weighted_sample(ensemble: Ensemble, case: Case, fit: MemberFit, weights: Array) -> WeightedSample:
-    return WeightedSample(
-        members=len(weights),
+    sample = WeightedSample(
+        members=len(fit.solved),
         failed=int(np.sum(~fit.solved)),
         best=fit.best,
         unit={name: case.parameters[name].unit for name in ensemble.parameters},
         theta=ensemble.parameters,
-        weights=weights,
+        weights=member_weights(fit, case.infer.likelihood, threshold),
         efficiency=fit.efficiency,
         log_likelihood=fit.log_likelihood,
         prediction=ensemble.prediction,
     )
+    return posterior_of(settings, sample, case, station, fit.noise, fit.sigma)
 
 
 def check_stations(ensemble: Ensemble, station: pd.DataFrame, config: Path | None = None) -> None:
-    """Errors: InputError when the stations are not those that were simulated, or none is used."""
+    """Raise InputError if the stations are not those that were simulated, or none is used."""
     same = len(station) == len(ensemble.station) and all(
         np.array_equal(station[column].to_numpy(), ensemble.station[column].to_numpy())
         for column in ("experiment", "kind", "x", "y")
@@ -193,20 +206,42 @@ def check_stations(ensemble: Ensemble, station: pd.DataFrame, config: Path | Non
         )
     if not station["used"].any():
         command = shown_command("check", config)
-        raise InputError(f"observations: no station is used, nothing can be inferred; {command} says why.")
+        raise InputError(f"observations: no station is used, nothing can be inferred; {command} shows why.")
 
 
 def member_weights(fit: MemberFit, likelihood: str, threshold: float) -> Array:
-    """w_k = L_k / sum L (member,) [-]; zero for failed members and those of an efficiency below the threshold.
+    """w_k = L_k / sum L, zero for failed members and those of an efficiency E below the threshold.
 
-    gaussian: L = prod_i p(u_i | U_i). nse: L = max(E, 0). inverse-variance: L = 1 / (1 - E), proportional to the
-    inverse error variance of Beven and Binley (1992), https://doi.org/10.1002/hyp.3360060305, with their shape 1.
+        gaussian: L = prod_i p(u_i | U_i);   nse: L = max(E, 0);   inverse-variance: L = 1 / (1 - E)
 
-    Errors: InputError when no member has weight.
+    The last is proportional to the inverse error variance of Beven and Binley (1992), with their shape 1.
+
+    Parameters
+    ----------
+    fit : MemberFit
+        Of all members.
+    likelihood : str
+        `gaussian`, `nse` or `inverse-variance`.
+    threshold : float
+        Smallest efficiency of a member with weight [-], -inf for none.
+
+    Returns
+    -------
+    array (member,)
+        Of sum 1 [-].
+
+    Raises
+    ------
+    InputError
+        If no member has weight.
+
+    References
+    ----------
+    Beven and Binley (1992), https://doi.org/10.1002/hyp.3360060305.
     """
     if (likelihood != "gaussian" or threshold > -np.inf) and np.isnan(fit.efficiency[fit.best]):
         raise InputError(
-            "observations: no efficiency is defined where all measured values of a kind are equal, as a single one is; "
+            "observations: no efficiency is defined if all measured values of a kind are equal, as a single one is; "
             "use gaussian."
         )
     kept = fit.solved & ((threshold == -np.inf) | (fit.efficiency >= threshold))
@@ -218,19 +253,15 @@ def member_weights(fit: MemberFit, likelihood: str, threshold: float) -> Array:
         weights[kept] = np.maximum(fit.efficiency[kept], 0)
     else:
         weights[kept] = 1 / np.maximum(1 - fit.efficiency[kept], np.finfo(float).tiny)
-    if not weights.sum() > 0:
-        raise _no_weight(threshold, float(np.nanmax(fit.efficiency)))
-    return weights / weights.sum()
-
-
-def _no_weight(threshold: float, best: float) -> InputError:
-    """Why no member has weight; best: the largest efficiency of any [-]."""
-    if threshold > best:
-        return InputError(
+    if weights.sum() > 0:
+        return weights / weights.sum()
+    largest = float(np.nanmax(fit.efficiency))
+    if threshold > largest:
+        raise InputError(
             f"infer.behavioural: expected a member with an efficiency of at least {threshold:g}, the best has "
-            f"{best:.3g}; lower the threshold or widen the priors."
+            f"{largest:.3g}; lower the threshold or widen the priors."
         )
-    return InputError(
-        f"infer.likelihood: nse expected a member with an efficiency above 0, the best has {best:.3g}: it predicts no "
-        "better than the mean of what was measured; widen the priors or use gaussian."
+    raise InputError(
+        f"infer.likelihood: nse expected a member with an efficiency above 0, the best has {largest:.3g}, no better "
+        "than the mean of the measured values; widen the priors or use gaussian."
     )

@@ -40,7 +40,21 @@ Estimate = tuple[NDArray[np.int64], Array, Array]
 def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer | None:
     """Tests of homogeneity, with each experiment fitted alone from the joint estimate; None with fewer than two.
 
-    stated: whether standard errors are known; they are then only made larger, where the separate fits ask for it.
+    Parameters
+    ----------
+    model : Model
+        Of all experiments.
+    noise : Noise
+        Their errors.
+    joint : Point
+        The estimate from all experiments together.
+    stated : bool
+        Whether standard errors are known; they are then only made larger, if the separate fits need it.
+
+    Returns
+    -------
+    Transfer or None
+        Estimates of each parameter from each experiment, chi2, degrees of freedom and p.
     """
     names = model.station["experiment"].to_numpy()
     here = [name for name in model.case.experiments if (names[noise.rows] == name).any()]
@@ -49,20 +63,31 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
     noise = with_correlation(noise, noise.correlation, 1.0)
     parts = [one_experiment(model, noise, name) for name in here]
     fits = parallel_map(partial(_alone, joint), parts)
-    scale, free = _scale(fits, [part.rows.size for _, part in parts], 1.0 if stated else 0.0)
+    # s^2 = sum_e chi2_e / sum_e (n_e - p_e), p_e: effective number of parameters of experiment e; and the degrees of
+    # freedom that s is estimated from, infinite if it is the least, which is known.
+    least, known = 1.0 if stated else 0.0, [(one, part) for one, (_, part) in zip(fits, parts, strict=True) if one]
+    left = sum(one.chi2 for one, _ in known)
+    free = sum(part.rows.size - determined(one.covariance) for one, part in known)
+    scale = float(np.sqrt(left / free)) if free > 0 and left > 0 else 1.0
+    scale, free = (scale, free) if free > 0 and scale > least else (max(scale, least), math.inf)
     value, error = (np.full((len(here), len(model.names)), np.nan) for _ in range(2))
-    for e, fitted in enumerate(fits):
-        if fitted is not None:
-            value[e], error[e] = without_prior(model.case, fitted.point.z, np.diag(fitted.covariance))
+    estimates: list[Estimate | None] = []
+    for e, (fitted, (_, part), name) in enumerate(zip(fits, parts, here, strict=True)):
+        if fitted is None:
+            estimates.append(None)
+            continue
+        value[e], error[e] = without_prior(model.case, fitted.point.z, np.diag(fitted.covariance))
+        rows = np.flatnonzero(names[noise.rows] == name)
+        estimates.append((rows, part.used(fitted.point.slope), fitted.covariance))
     error *= scale
-    together = [
-        squared_misfit(part, joint.prediction[names == name]) for (_, part), name in zip(parts, here, strict=True)
-    ]
-    alone = [np.nan if fitted is None else fitted.chi2 for fitted in fits]
-    gain = float(np.nansum(np.array(together) - np.array(alone)) / scale**2)
-    separate = sum(determined(one.covariance) for one in fits if one is not None)
+    together = np.array(
+        [squared_misfit(part, joint.prediction[names == name]) for (_, part), name in zip(parts, here, strict=True)]
+    )
+    alone = np.array([np.nan if fitted is None else fitted.chi2 for fitted in fits])
+    gain = float(np.nansum(together - alone) / scale**2)
+    separate = sum(determined(one.covariance) for one, _ in known)
     more = max(round(separate - determined(covariance(noise, joint))), 1)
-    alike = _alike(noise, model, here, [part for _, part in parts], fits)
+    alike = correlations_of_estimates(noise, estimates, len(model.names))
     tested = [equal_values_test(value[:, j], error[:, j], alike[j], free) for j in range(len(model.names))]
     return Transfer(
         scale=scale,
@@ -75,33 +100,15 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
         chi2=np.array([one[0] for one in tested]),
         freedom=np.array([one[1] for one in tested]),
         p=np.array([one[2] for one in tested]),
-        misfit_together=np.array(together) / scale**2,
-        misfit_alone=np.array(alone) / scale**2,
+        misfit_together=together / scale**2,
+        misfit_alone=alone / scale**2,
         stations=np.array([part.rows.size for _, part in parts]),
     )
 
 
-def _alike(
-    noise: Noise, model: Model, here: Sequence[str], parts: Sequence[Noise], fits: Sequence[MapEstimate | None]
-) -> Array:
-    """rho_ef of each parameter (p, e, e), of experiments `here` that were fitted alone."""
-    names = model.station["experiment"].to_numpy()[noise.rows]
-    estimates = [
-        None if fitted is None else (np.flatnonzero(names == name), part.used(fitted.point.slope), fitted.covariance)
-        for name, part, fitted in zip(here, parts, fits, strict=True)
-    ]
-    return correlations_of_estimates(noise, estimates, len(model.names))
-
-
-def _scale(fits: Sequence[MapEstimate | None], stations: Sequence[int], least: float) -> tuple[float, float]:
-    """s^2 = sum_e chi2_e / sum_e (n_e - p_e), p_e: effective number of parameters of experiment e [-]; and the degrees
-    of freedom that s is estimated from, infinite where it is the least, which is known.
-    """
-    pairs = [(one, count) for one, count in zip(fits, stations, strict=True) if one is not None]
-    left = sum(one.chi2 for one, _ in pairs)
-    free = sum(count - determined(one.covariance) for one, count in pairs)
-    found = float(np.sqrt(left / free)) if free > 0 and left > 0 else 1.0
-    return (found, free) if free > 0 and found > least else (max(found, least), math.inf)
+def _alone(joint: Point, own: Model, errors: Noise) -> MapEstimate | None:
+    start = linearise(own, joint.z, joint)
+    return None if start is None else fit(own, errors, start)
 
 
 def chance_of_as_much(chi2: float, freedom: int, free: float = math.inf) -> float:
@@ -148,7 +155,7 @@ def equal_values_test(
 ) -> tuple[float, int, float]:
     """chi2, degrees of freedom and p of equal values (e,); error NaN or 0: unknown; NaN for fewer than two known.
 
-    alike: rho (e, e), independent where it is not given; free: see `chance_of_as_much`.
+    alike: rho (e, e), independent if it is not given; free: see `chance_of_as_much`.
     """
     known = np.isfinite(value) & (error > 0)  # zero at an end of its support, where no step leads
     if known.sum() < 2:
@@ -181,8 +188,3 @@ def one_experiment(model: Model, noise: Noise, experiment: str) -> tuple[Model, 
         unknown=noise.unknown[kept],
     )
     return replace(model, case=case, station=model.station[here].reset_index(drop=True)), part
-
-
-def _alone(joint: Point, own: Model, errors: Noise) -> MapEstimate | None:
-    start = linearise(own, joint.z, joint)
-    return None if start is None else fit(own, errors, start)

@@ -1,16 +1,10 @@
-"""A mixture of Student's t distributions, the proposal of importance sampling: drawn from, evaluated and adapted.
-
-A polynomial emulator of the flow model, fitted to its runs.
-
-It only proposes where to run the model next. Every weight comes from a true run, so the numbers below change how many
-runs are needed and not what is found.
-
-Draws from a posterior by adaptive importance sampling.
+"""Draws from a posterior by adaptive importance sampling.
 
     w_i = p(z_i) / q(z_i),   q the mixture of the proposals of all rounds
 
-p comes from a run of the flow model at every draw. Between rounds an emulator of the model shapes the next proposal: it
-decides how many draws are effective, and never what the result is.
+p comes from a run of the flow model at every draw. A proposal is a mixture of Student's t distributions. Between rounds
+a polynomial emulator of the model, fitted to its runs, shapes the next proposal: it decides how many draws are
+effective, and never what the result is.
 """
 
 import math
@@ -79,15 +73,12 @@ def _parts(mixture: Mixture, z: Array) -> tuple[Array, Array]:
     """ln share_k t_k(z) and the squared distance from each centre, (m, k) both."""
     p = z.shape[1]
     pairs = zip(mixture.centre, mixture.lower, strict=True)
-    away = np.stack([_distance(lower, z - centre) for centre, lower in pairs], axis=1)
+    inside = [scipy.linalg.solve_triangular(lower, (z - centre).T, lower=True) for centre, lower in pairs]
+    away = np.stack([np.sum(one**2, axis=0) for one in inside], axis=1)
     scale = np.log(np.diagonal(mixture.lower, axis1=1, axis2=2)).sum(axis=1)
     constant = gammaln(0.5 * (FREEDOM + p)) - gammaln(0.5 * FREEDOM) - 0.5 * p * np.log(FREEDOM * np.pi)
     logs = np.log(mixture.share) + constant - scale - 0.5 * (FREEDOM + p) * np.log1p(away / FREEDOM)
     return logs, away
-
-
-def _distance(lower: Array, away: Array) -> Array:
-    return np.asarray(np.sum(scipy.linalg.solve_triangular(lower, away.T, lower=True) ** 2, axis=0))
 
 
 def pooled_weights(log_target: Array, z: Array, rounds: list[tuple[int, Mixture]]) -> Array:
@@ -104,31 +95,37 @@ def pooled_weights(log_target: Array, z: Array, rounds: list[tuple[int, Mixture]
 
 def adapt(target: Callable[[Array], Array], start: Mixture, seed: int) -> Mixture:
     """The start moved, reshaped and split until it resembles the density; target: z (m, p) -> log density (m,)."""
-    random = np.random.default_rng(seed)
-    mixture, before, power = start, 0.0, _power(start.centre.shape[1])
+    random, p = np.random.default_rng(seed), start.centre.shape[1]
+    # b < 1 with (b (2 - b))^(p / 2) = 1 - TAIL_SHARE, the effective share of draws from p^b, p normal.
+    power = float(1.0 - np.sqrt(1.0 - (1.0 - TAIL_SHARE) ** (2.0 / p)))
+    mixture, before = start, 0.0
     rounds: list[tuple[int, Mixture]] = []
     parts: list[tuple[Array, Array]] = []
     for _ in range(ADAPTATION_ROUNDS):
-        new = draw(mixture, random.random((EMULATED_DRAWS, start.centre.shape[1] + 2)))
+        new = draw(mixture, random.random((EMULATED_DRAWS, p + 2)))
         logs = power * target(new)
         rounds = [*rounds[1 - ROUNDS_POOLED :], (EMULATED_DRAWS, mixture)]
         parts = [*parts[1 - ROUNDS_POOLED :], (new, logs)]
-        worth = effective_size(pooled_weights(logs, new, rounds[-1:])) / EMULATED_DRAWS
-        if worth > WELL_ADAPTED or 0.5 < worth < LEAST_GAIN * before:
+        share = effective_size(pooled_weights(logs, new, rounds[-1:])) / EMULATED_DRAWS
+        if share > WELL_ADAPTED or 0.5 < share < LEAST_GAIN * before:
             break
-        before = worth
+        before = share
         z, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
         weights = tempered(pooled_weights(logs, z, rounds), EFFECTIVE_TO_FIT)
         equal = z[systematic_draws(weights, DRAWS_FITTED, random)]
-        mixture = _grown(mixture, equal, min(COMPONENTS_ADDED, MOST_COMPONENTS - mixture.share.size), random)
+        more, k = min(COMPONENTS_ADDED, MOST_COMPONENTS - mixture.share.size), mixture.share.size
+        if more > 0:
+            # More components at some of the draws, half as wide as all of them together.
+            spread = np.cov(equal.T, ddof=0).reshape(p, -1) / 4.0
+            lower = np.linalg.cholesky(spread + 1e-6 * np.diag(np.diag(spread)) + 1e-300 * np.eye(p))
+            mixture = Mixture(
+                np.concatenate([mixture.share * k, np.ones(more)]) / (k + more),
+                np.concatenate([mixture.centre, equal[random.choice(len(equal), more, replace=False)]]),
+                np.concatenate([mixture.lower, np.tile(lower, (more, 1, 1))]),
+            )
         for _ in range(FIT_STEPS):
-            mixture = _fitted(mixture, equal, effective_size(weights))
+            mixture = _expectation_maximisation(mixture, equal, effective_size(weights))
     return mixture
-
-
-def _power(dimensions: int) -> float:
-    """b < 1 with (b (2 - b))^(dimensions / 2) = 1 - TAIL_SHARE, the effective share of draws from p^b, p normal."""
-    return float(1.0 - np.sqrt(1.0 - (1.0 - TAIL_SHARE) ** (2.0 / dimensions)))
 
 
 def tempered(weights: Array, wanted: float) -> Array:
@@ -145,24 +142,10 @@ def tempered(weights: Array, wanted: float) -> Array:
     return np.asarray(np.exp(low * logs) / np.exp(low * logs).sum())
 
 
-def _grown(mixture: Mixture, z: Array, more: int, random: np.random.Generator) -> Mixture:
-    """With `more` components at some of the draws z (m, p), half as wide as all of them together."""
-    if more <= 0:
-        return mixture
-    spread = np.cov(z.T, ddof=0).reshape(z.shape[1], -1) / 4.0
-    lower = np.linalg.cholesky(spread + 1e-6 * np.diag(np.diag(spread)) + 1e-300 * np.eye(z.shape[1]))
-    k = mixture.share.size
-    return Mixture(
-        np.concatenate([mixture.share * k, np.ones(more)]) / (k + more),
-        np.concatenate([mixture.centre, z[random.choice(len(z), more, replace=False)]]),
-        np.concatenate([mixture.lower, np.tile(lower, (more, 1, 1))]),
-    )
-
-
-def _fitted(mixture: Mixture, z: Array, worth: float) -> Mixture:
+def _expectation_maximisation(mixture: Mixture, z: Array, worth: float) -> Mixture:
     """One step of expectation and maximisation for a mixture of t's (Cappé et al. 2008, doi:10.1007/s11222-008-9059-x).
 
-    z (m, p): draws of equal weight, worth that many independent ones. A component that few of them belong to keeps most
+    z (m, p): draws of equal weight; worth: their effective number. A component that few of them belong to keeps most
     of its shape.
     """
     logs, away = _parts(mixture, z)
@@ -325,12 +308,41 @@ def sample(
 ) -> Sample:
     """Draws until `wanted` of them are effective, or SAMPLING_ROUNDS are over.
 
-    predict: z (m, p) -> values (m, n); density: z, values -> ln p(z) up to a constant (m,); finished: is told how many
-    of those wanted are effective after each round.
+        w_i = p(z_i) / sum_r (n_r / n) q_r(z_i),   n_r draws of each round r from its own mixture q_r
 
-    Errors: InputError when fewer than FEWEST_SOLVED of the draws have a density.
+    Parameters
+    ----------
+    predict : callable
+        z (m, p) -> values (m, n), NaN where a run failed.
+    density : callable
+        z (m, p), values (m, n) -> ln p(z) up to a constant (m,).
+    start : Mixture
+        The proposal of the first round.
+    wanted : int
+        Effective draws.
+    seed : int
+        Of the Halton points that draws are made from.
+    finished : callable
+        Is called with the number of effective draws, `wanted` at most, after each round.
+
+    Returns
+    -------
+    Sample
+        All draws, with weights of sum 1.
+
+    Raises
+    ------
+    InputError
+        If fewer than FEWEST_SOLVED of the draws have a density.
+
+    References
+    ----------
+    Cornuet et al. (2012), https://doi.org/10.1111/j.1467-9469.2011.00756.x.
     """
     from scipy.stats import qmc  # late: other commands need not wait for it
+
+    def emulated(by: Emulator, at: Array) -> Array:
+        return density(at, by.predict(at))
 
     points = qmc.Halton(start.centre.shape[1] + 2, seed=seed)
     mixture, size = start, FIRST_DRAWS
@@ -341,7 +353,8 @@ def sample(
     while True:
         new = draw(mixture, points.random(size))
         values = predict(new)
-        parts.append((new, values, _impossible_where_nan(density(new, values))))
+        of_new = density(new, values)
+        parts.append((new, values, np.where(np.isnan(of_new), -np.inf, of_new)))
         rounds.append((size, mixture))
         z, values, logs = (np.concatenate(part) for part in zip(*parts, strict=True))
         if (solved := int(np.isfinite(logs).sum())) < FEWEST_SOLVED:
@@ -355,29 +368,14 @@ def sample(
         finished(min(int(effective[-1]), wanted))
         if effective[-1] >= wanted or len(rounds) == SAMPLING_ROUNDS:
             return Sample(z, values, logs, weights, tuple(drawn), tuple(effective))
-        last = _effective_share(parts[-1][2], new, rounds[-1:])
+        last, share = parts[-1][2], 0.0
+        if np.isfinite(last).any():
+            share = effective_size(pooled_weights(last, new, rounds[-1:])) / len(new)
         emulator = emulator_of_density(z, values, density, mixture.centre[0], mixture.lower[0])
-        mixture = adapt(partial(_emulated, emulator, density), mixture, seed + len(rounds))
-        size = min(_next_size(wanted - effective[-1], last), GROWTH * len(z))
-
-
-def _emulated(emulator: Emulator, density: LogDensity, z: Array) -> Array:
-    return density(z, emulator.predict(z))
-
-
-def _impossible_where_nan(logs: Array) -> Array:
-    return np.where(np.isnan(logs), -np.inf, logs)
-
-
-def _effective_share(logs: Array, z: Array, own: list[tuple[int, Mixture]]) -> float:
-    """Share of the draws z (m, p) of one round that is effective [-]; 0 where none of them was solved."""
-    return effective_size(pooled_weights(logs, z, own)) / len(z) if np.isfinite(logs).any() else 0.0
-
-
-def _next_size(missing: float, share: float) -> int:
-    """Draws of the next round: few while only a small `share` of the draws is effective, else what is missing."""
-    if share < POOR_SHARE:
+        mixture = adapt(partial(emulated, emulator), mixture, seed + len(rounds))
+        # Few while only a small share of the draws is effective, else what is missing.
         size = 2 * FIRST_DRAWS
-    else:
-        size = np.clip(OVER_MISSING * missing / max(share, HOPED_SHARE), DRAWS_TOGETHER, MOST_DRAWS)
-    return int(DRAWS_TOGETHER * np.ceil(size / DRAWS_TOGETHER))
+        if share >= POOR_SHARE:
+            hoped = OVER_MISSING * (wanted - effective[-1]) / max(share, HOPED_SHARE)
+            size = np.clip(hoped, DRAWS_TOGETHER, MOST_DRAWS)
+        size = min(int(DRAWS_TOGETHER * np.ceil(size / DRAWS_TOGETHER)), GROWTH * len(z))

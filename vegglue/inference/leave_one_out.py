@@ -1,11 +1,11 @@
-"""Whether a posterior predicts what it has not seen: leave-one-out scores and where measurements fall in their bands.
+"""Whether a posterior predicts held-out data: leave-one-out scores and where measurements fall in their bands.
 
 With errors of covariance C and Q = C^-1, the density of stations g given all others and one draw is normal with
 
     covariance Q_gg^-1,   y_g - mean = Q_gg^-1 (Q r)_g,   r the residual of the draw
 
 (Buerkner, Gabry and Vehtari 2021, doi:10.1007/s00180-020-01045-4). Draws of the posterior without g have the weights
-w / p(y_g | others), smoothed (Vehtari et al. 2024); their k-hat says whether that is to be trusted.
+w / p(y_g | others), smoothed (Vehtari et al. 2024); their k-hat shows whether these are to be trusted.
 """
 
 from dataclasses import dataclass

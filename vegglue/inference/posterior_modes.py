@@ -1,6 +1,4 @@
-"""Members that a search for modes begins with: those of an ensemble, or points of the prior on coarse cells.
-
-The modes of the posterior (MAP estimates) and the errors of the data, which importance sampling starts from.
+"""The modes of the posterior (MAP estimates) and the errors of the data, which importance sampling starts from.
 
 Fits start from several of the best members of an ensemble, or of points of the prior, on cells of four times the size
 where the grid can be coarsened so far, and are finished on ever finer ones. Fits that end at the same point count once.
@@ -11,7 +9,6 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, grid_difference, with_own_error
@@ -33,11 +30,19 @@ from vegglue.results.ensemble import Ensemble
 # fourth hardly resolves a section.
 MOST_GRIDS = 3
 # Cells across the floor of the channel below which a grid is left out: with two of them, two patches beside each other
-# had one mode, which way round they lay was no longer told (DECISIONS), with four both were found.
+# had one mode whichever way round they lay, with four both were found.
 FEWEST_ACROSS = 4.0
-# Points of the prior that are tried where there is no ensemble: as many as the best members that starts are chosen
-# from. Chosen: on 100 x 12 cells with three experiments they take 1.5 s of a core.
+# Points of the prior that are tried without an ensemble: as many as the best members that starts are chosen from.
+# Chosen: on 100 x 12 cells with three experiments they take 1.5 s of a core.
 TRIED_POINTS = 64
+# Members that fits start from at most, among how many of the best, and their least distance [standard deviations of the
+# prior]. Chosen, not measured: more starts find more modes and each costs a fit.
+MOST_STARTS, BEST_MEMBERS, START_DISTANCE = 4, 64, 0.7
+# Rise of the objective [-] above that of the best mode from which a mode is left out: its weight is below exp(-15).
+NEGLIGIBLE_MODE = 30.0
+# Times that the size of the errors is estimated from the residual, each followed by a fit. Chosen, not measured:
+# further ones cost runs of the model.
+SIZE_ESTIMATES = 2
 
 
 @dataclass(frozen=True)
@@ -56,7 +61,7 @@ def members_of(ensemble: Ensemble, model: Model) -> TriedMembers:
 def points_of_prior(model: Model) -> TriedMembers:
     """TRIED_POINTS of the prior, Sobol' points, on the coarsest cells that fits go through.
 
-    Errors: InputError for a case without parameters.
+    InputError if the case has no parameters.
     """
     refuse_without_parameters(model.case)
     coarsest = grids_of(model)[0]
@@ -75,17 +80,10 @@ def grids_of(model: Model) -> list[Model]:
     return [replace(model, case=case, site=site) for case, site in places]
 
 
-# Members that fits start from at most, among how many of the best, and their least distance [standard deviations of the
-# prior]. Chosen, not measured: more starts find more modes and each costs a fit.
-MOST_STARTS, BEST_MEMBERS, START_DISTANCE = 4, 64, 0.7
-# Rise of the objective [-] above that of the best mode from which a mode is left out: its weight is below exp(-15).
-NEGLIGIBLE_MODE = 30.0
-
-
 @dataclass(frozen=True)
 class FoundModes:
     """MAP estimates on the case's own grid, the best first; starts: number of members that the search started from;
-    on_coarse: those on cells of twice the size that led there, none where there are no such cells.
+    on_coarse: those on cells of twice the size that led there, none if there are no such cells.
     """
 
     fits: tuple[MapEstimate, ...]
@@ -100,21 +98,29 @@ class FoundModes:
 
 
 def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch) -> FoundModes:
-    """The modes of the posterior under given errors. Where none is refined on finer cells, the members start there.
+    """The modes of the posterior under given errors. If none is refined on finer cells, the members start there.
 
-    Errors: InputError when no steady flow is found from any of the members.
+    InputError if no steady flow is found from any of the members.
     """
     starts, grids = starting_points(noise, tried.z, tried.prediction), grids_of(model)
+
+    def fit_all(on: Model) -> list[MapEstimate]:
+        finished = counted(watch, "fitting the best members", len(starts), "members")
+        ends = parallel_map(partial(_fit_from, on, noise), [(z,) for z in starts], finished)
+        return [end for end in ends if end is not None]
+
     before: list[MapEstimate] = []
-    ends = _apart(_fit_all(grids[0], noise, starts, watch))
+    ends = _apart(fit_all(grids[0]))
     for coarse, finer in pairwise(grids):
-        refined = _refine_all(finer, coarse, noise, ends, watch)
-        before, ends = ends, distinct_modes(refined or _fit_all(finer, noise, starts, watch))
+        finished = counted(watch, "refining modes on finer cells", len(ends), "modes")
+        refined = parallel_map(partial(_refine, finer, coarse, noise), [(end,) for end in ends], finished)
+        found = [end for end in refined if end is not None]
+        before, ends = ends, distinct_modes(found or fit_all(finer))
     if not ends:
+        source = model.case.source
         raise InputError(
-            f"{model.case.name}: no steady flow was found from the best members; solve some by "
-            f"{shown_command('simulate', model.case.source)} and weigh them by "
-            f"{shown_command('infer', model.case.source, '--method', 'glue')}."
+            f"{model.case.name}: no steady flow was found from the best members; run "
+            f"{shown_command('simulate', source)} and {shown_command('infer', source, '--method', 'glue')}."
         )
     return FoundModes(tuple(ends), len(starts), tuple(before))
 
@@ -122,7 +128,7 @@ def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch) ->
 def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:
     """The best members (k, p), more than START_DISTANCE apart, by |W (y - f)|^2 + |z|^2; z (m, p), prediction (m, n).
 
-    Errors: InputError when no member has a prediction at all used stations.
+    InputError if no member has a prediction at all used stations.
     """
     residual = noise.value - prediction[:, noise.rows]
     known = np.flatnonzero(np.isfinite(residual).all(axis=1))
@@ -137,21 +143,9 @@ def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:
     return np.asarray(z[chosen])
 
 
-def _fit_all(model: Model, noise: Noise, starts: Array, watch: Watch) -> list[MapEstimate]:
-    finished = counted(watch, "following the best members downhill", len(starts), "members")
-    ends = parallel_map(partial(_fit_from, model, noise), [(z,) for z in starts], finished)
-    return [end for end in ends if end is not None]
-
-
 def _fit_from(model: Model, noise: Noise, z: Array) -> MapEstimate | None:
     start = linearise(model, z)
     return None if start is None else fit(model, noise, start)
-
-
-def _refine_all(model: Model, coarse: Model, noise: Noise, ends: list[MapEstimate], watch: Watch) -> list[MapEstimate]:
-    finished = counted(watch, "refining modes on finer cells", len(ends), "modes")
-    finer = parallel_map(partial(_refine, model, coarse, noise), [(end,) for end in ends], finished)
-    return [end for end in finer if end is not None]
 
 
 def _refine(model: Model, coarse: Model, noise: Noise, end: MapEstimate) -> MapEstimate | None:
@@ -174,23 +168,18 @@ def distinct_modes(ends: list[MapEstimate]) -> list[MapEstimate]:
 def _apart(ends: list[MapEstimate]) -> list[MapEstimate]:
     """The fits, best first, but none within one standard deviation of a better one.
 
-    On coarse cells that is all that may be said: their errors move objectives by more than NEGLIGIBLE_MODE.
+    On coarse cells no more can be left out: their errors move objectives by more than NEGLIGIBLE_MODE.
     """
+
+    def distance(end: MapEstimate, z: Array) -> float:
+        away = z - end.point.z
+        return float(np.sqrt(away @ np.linalg.solve(end.covariance, away)))
+
     found: list[MapEstimate] = []
     for end in sorted(ends, key=lambda one: one.objective):
-        if all(_distance(other, end.point.z) > 1.0 for other in found):
+        if all(distance(other, end.point.z) > 1.0 for other in found):
             found.append(end)
     return found
-
-
-def _distance(end: MapEstimate, z: Array) -> float:
-    away = z - end.point.z
-    return float(np.sqrt(away @ np.linalg.solve(end.covariance, away)))
-
-
-# Times that the size of the errors is estimated from the residual, each followed by a fit. Chosen, not measured:
-# further ones cost runs of the model.
-SIZE_ESTIMATES = 2
 
 
 @dataclass(frozen=True)
@@ -212,29 +201,61 @@ class ModesAndErrors:
 def modes_and_errors(model: Model, tried: TriedMembers, rule: str, watch: Watch) -> ModesAndErrors:
     """The modes from the best of the members that were tried; then the errors, and the modes under these.
 
-    rule known: errors as stated, the error of the grid from the difference to cells of twice the size, and that of the
-    model as the case allows it. rule best-member: errors of one size for each kind of measurement, from the residual at
-    the best mode (which holds both). The correlation along a section is estimated in both, see `estimate_noise`.
-    Errors: InputError when a standard error is missing (known) or no flow is found.
+    The correlation along a section is estimated under both rules, see `estimate_noise`.
+
+    Parameters
+    ----------
+    model : Model
+        On the case's own grid.
+    tried : TriedMembers
+        Of an ensemble or of the prior.
+    rule : str
+        `known`: errors as stated, the error of the grid from the difference to cells of twice the size, and that of the
+        model as the case allows it. `best-member`: errors of one size for each kind of measurement, from the residual
+        at the best mode, which holds both.
+    watch : callable
+        Is called with each phase.
+
+    Returns
+    -------
+    ModesAndErrors
+        One mode at least.
+
+    Raises
+    ------
+    InputError
+        If a standard error is missing (`known`) or no flow is found.
     """
-    noise = _initial_noise(model, tried, rule)
+    without_errors = model.station.assign(standard_error=np.nan)
+    if rule == "known":
+        noise = noise_of(model.station)
+    else:
+        noise = noise_of(without_errors, fit_members(tried.prediction, model.station, rule).sigma)
     modes = find_modes(model, noise, tried, watch)
     watch(Progress("estimating the errors"))
     fits, coarse = list(modes.fits), coarser(model)
     on_coarse = None if coarse is None else modes.coarse_point(coarse)
+
+    def refitted() -> list[MapEstimate]:
+        return distinct_modes(in_threads(fit, [(model, noise, one.point) for one in fits]))
+
     if rule == "known":
         noise = with_grid_error(noise, grid_difference(fits[0].point, on_coarse))
         noise = with_own_error(Baseline(model, noise, fits[0], coarse, on_coarse)).noise
     for _ in range(SIZE_ESTIMATES if rule != "known" else 0):
-        noise = _with_estimated_sizes(noise, fits[0], model.station)
-        fits = _refitted(model, noise, fits)
+        # s_k^2 = sum_k r^2 / (n_k (1 - p / n)) for each kind k of enough readings; p: effective number of parameters.
+        residual = noise.residual(fits[0].point.prediction)
+        kind = model.station["kind"].to_numpy()[noise.rows]
+        free = max(1.0 - determined(fits[0].covariance) / residual.size, 1.0 / residual.size)
+        sigma = {str(k): float(np.sqrt(np.mean(residual[kind == k] ** 2) / free)) for k in np.unique(kind)}
+        noise = noise_of(without_errors, sigma | sizes_as_stated(model.station))
+        fits = refitted()
     estimated = noise_given_all(Baseline(model, noise, fits[0], coarse, on_coarse))
     noise = estimated if rule == "known" else with_scale(estimated, 1.0)
-    fits = _refitted(model, noise, fits)
+    fits = refitted()
     standardised = standardised_residual(noise, fits[0].point)
-    return ModesAndErrors(
-        model, noise, tuple(fits), modes.starts, standardised, rule == "known" and on_coarse is not None
-    )
+    grid_error_known = rule == "known" and on_coarse is not None
+    return ModesAndErrors(model, noise, tuple(fits), modes.starts, standardised, grid_error_known)
 
 
 def standardised_residual(noise: Noise, point: Point) -> Array:
@@ -246,24 +267,3 @@ def standardised_residual(noise: Noise, point: Point) -> Array:
     projected = inverse - pulled @ middle @ pulled.T
     force = projected @ noise.residual(point.prediction) + pulled @ middle @ point.z
     return np.asarray(force / np.sqrt(np.diag(projected)))
-
-
-def _initial_noise(model: Model, tried: TriedMembers, rule: str) -> Noise:
-    if rule == "known":
-        return noise_of(model.station)
-    sigma = fit_members(tried.prediction, model.station, rule).sigma
-    return noise_of(model.station.assign(standard_error=np.nan), sigma)
-
-
-def _with_estimated_sizes(noise: Noise, fitted: MapEstimate, station: pd.DataFrame) -> Noise:
-    """s_k^2 = sum_k r^2 / (n_k (1 - p / n)) for each kind k of enough readings; p: effective number of parameters."""
-    residual = noise.residual(fitted.point.prediction)
-    kind = station["kind"].to_numpy()[noise.rows]
-    free = max(1.0 - determined(fitted.covariance) / residual.size, 1.0 / residual.size)
-    sigma = {str(k): float(np.sqrt(np.mean(residual[kind == k] ** 2) / free)) for k in np.unique(kind)}
-    return noise_of(station.assign(standard_error=np.nan), sigma | sizes_as_stated(station))
-
-
-def _refitted(model: Model, noise: Noise, fits: list[MapEstimate]) -> list[MapEstimate]:
-    """The modes under other errors, from where they were."""
-    return distinct_modes(in_threads(fit, [(model, noise, one.point) for one in fits]))

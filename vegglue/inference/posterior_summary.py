@@ -1,6 +1,5 @@
-"""phi of a stand for another canopy height, as Berends et al. (2020) corrected it.
-
-What weighted members say of each parameter and of each prediction.
+"""The posterior of weighted members: location and spread of each parameter and of each prediction, and phi of a
+vegetation type for another canopy height, as Berends et al. (2020) corrected it.
 """
 
 import numpy as np
@@ -41,55 +40,9 @@ from vegglue.results.posterior import (
     WeightStatistics,
 )
 
-
-def correct_phi_for_canopy(
-    phi: Array, from_height: float, to_height: float, depth: float, bare_chezy: float | Array
-) -> Array:
-    """phi' with C(phi', to_height) = C(phi, from_height) at the same depth h [-], C of `baptist_chezy`.
-
-        phi' = 2 g ((C - C_above)^-2 - 1/C_b^2), C_above the part of the water above plants of to_height
-
-    phi: any shape; heights h_d and depth h [m]; bare_chezy C_b [m^1/2/s]. 0 where even the bare bed would be too rough,
-    infinite where no plants would be rough enough. Berends et al. (2020) corrected D3b like this and do not print the
-    formula: equal C is the natural reading. C: Baptist et al. (2007), https://doi.org/10.1080/00221686.2007.9521778.
-    """
-    chezy = np.vectorize(baptist_chezy, otypes=[np.float64])(phi, from_height, depth, bare_chezy)
-    within = chezy - above_canopy(to_height, depth)
-    with np.errstate(divide="ignore"):
-        corrected = 2 * GRAVITY * (np.maximum(within, 0.0) ** -2 - 1 / np.square(bare_chezy))
-    return np.maximum(corrected, 0.0)
-
-
-def corrected_canopy(theta: dict[str, Array], case: Case, weights: Array) -> CorrectedCanopy | None:
-    """phi of the stand that the case asks to correct, for all members; None when it asks for nothing."""
-    asked = case.canopy_correction
-    if asked is None:
-        return None
-    stand = case.plants.stands[asked.stand]
-    if not isinstance(stand.phi, str):
-        raise InputError(f"canopy_correction: phi of the stand {asked.stand} is a number; make it a parameter.")
-    bare = theta[stand.bare_chezy] if isinstance(stand.bare_chezy, str) else stand.bare_chezy
-    raw = theta[stand.phi]
-    phi = correct_phi_for_canopy(raw, asked.from_height, asked.to_height, asked.depth, bare)
-    with np.errstate(divide="ignore"):
-        log10_phi = np.log10(phi)
-    return CorrectedCanopy(
-        parameter=stand.phi,
-        from_height=asked.from_height,
-        to_height=asked.to_height,
-        depth=asked.depth,
-        phi=phi,
-        median=weighted_median(phi, weights),
-        sd=weighted_sd(phi, weights),
-        quantiles=weighted_quantile(phi, weights, LEVELS),
-        log10_median=weighted_median(log10_phi, weights),
-        log10_sd=weighted_sd(log10_phi, weights),
-    )
-
-
 # Posterior mass near a bound from which a parameter may press against it; one left at a flat prior has NEAR_BOUND.
 PRESSES_ABOVE = 0.05
-# A bound cuts the 95 % range off when it lies within this share of the range from its end: for half a normal density at
+# A bound cuts the 95 % range off if it lies within this share of the range from its end: for half a normal density at
 # the bound the share is 0.014, for a normal density two standard deviations away from it 0.09.
 CUT_OFF_WITHIN = 0.05
 
@@ -103,33 +56,28 @@ def posterior_of(
     sigma: dict[str, float],
     factor: Array | None = None,
 ) -> Posterior:
-    """The posterior of a weighted sample, without what only a refinement tells.
+    """The posterior of a weighted sample, without what only a refinement gives.
 
     station: table of all stations; noise: standard deviation of their errors (station,), and sigma its root mean square
-    by kind [m/s or m]; factor: L with L L' the covariance of the errors (station, station), where they are correlated.
+    by kind [m/s or m]; factor: L with L L' the covariance of the errors (station, station), if they are correlated.
     """
-    predicted = predictive_distribution(sample.prediction, noise, sample.weights, settings.seed, factor)
+    weights, predicted = sample.weights, predictive_distribution(sample, noise, settings.seed, factor)
     return Posterior(
         settings=settings,
         sample=sample,
-        weighting=weight_statistics(sample.weights),
-        marginals=marginals(sample.theta, case, sample.weights),
+        weighting=WeightStatistics(
+            weighed=int(np.sum(weights > 0)),
+            effective_size=effective_size(weights),
+            largest_weight=float(weights.max()),
+            pareto_k=pareto_shape(weights),
+        ),
+        marginals=marginals(sample.theta, case, weights),
         fit=goodness_of_fit(station, noise, sigma, predicted.model_band, sample.prediction[sample.best]),
         predicted=predicted,
         station=station,
-        canopy=corrected_canopy(sample.theta, case, sample.weights),
+        canopy=corrected_canopy(sample.theta, case, weights),
         refinement=None,
         transfer=None,
-    )
-
-
-def weight_statistics(weights: Array) -> WeightStatistics:
-    """What weights (member,) of a sum of 1 are worth."""
-    return WeightStatistics(
-        weighed=int(np.sum(weights > 0)),
-        effective_size=effective_size(weights),
-        largest_weight=float(weights.max()),
-        pareto_k=pareto_shape(weights),
     )
 
 
@@ -142,13 +90,24 @@ def marginals(theta: dict[str, Array], case: Case, weights: Array) -> Marginals:
     scaled = {name: _on_flat_scale(values, priors[name]) for name, values in theta.items()}
     logs = [name for name in theta if _has_log_scale(priors[name])]
     prior_quantiles = {name: quantile(priors[name], LEVELS) for name in theta}
-    prior_width = {name: _width(_on_flat_scale(prior_quantiles[name], priors[name])) for name in theta}
-    ratio = {name: _width(weighted_quantile(scaled[name], weights, LEVELS)) / prior_width[name] for name in theta}
     bounds = {name: quantile(priors[name], (0.0, 1.0)) for name in theta}
-    ends = {name: _on_flat_scale(bounds[name], priors[name]) for name in theta}
-    mass = {name: _mass_near_bounds(scaled[name], weights, ends[name]) for name in theta}
-    before = {name: prior_mass_near_bounds(priors[name]) for name in theta}
-    effective = effective_size(weights)
+    ratio, mass, hit, effective = {}, {}, {}, effective_size(weights)
+    for name, values in scaled.items():
+        of_prior, ends = (_on_flat_scale(some[name], priors[name]) for some in (prior_quantiles, bounds))
+        of_posterior = weighted_quantile(values, weights, LEVELS)
+        width = float(of_posterior[-1] - of_posterior[0])
+        ratio[name] = width / float(of_prior[-1] - of_prior[0])
+        near = NEAR_BOUND * (ends[1] - ends[0])
+        mass[name] = np.full(2, np.nan)
+        if np.isfinite(near):
+            sides = values < ends[0] + near, values > ends[1] - near
+            mass[name] = np.array([weights[side].sum() for side in sides])
+        # Beyond chance: three standard errors above the mass of a parameter that is left at its prior.
+        before = prior_mass_near_bounds(priors[name])
+        beyond = np.maximum(PRESSES_ABOVE, before + 3.0 * np.sqrt(before * (1.0 - before) / effective))
+        # The bound, and not the data, ends the 95 % range.
+        cut_off = np.abs(of_posterior[[0, -1]] - ends) <= CUT_OFF_WITHIN * (of_posterior[-1] - of_posterior[0])
+        hit[name] = (mass[name] > beyond) & cut_off
     return Marginals(
         median={name: weighted_median(values, weights) for name, values in theta.items()},
         sd={name: weighted_sd(values, weights) for name, values in theta.items()},
@@ -161,11 +120,7 @@ def marginals(theta: dict[str, Array], case: Case, weights: Array) -> Marginals:
         identified={name: ratio[name] < IDENTIFIED_BELOW for name in theta},
         bounds=bounds,
         bound_mass=mass,
-        bound_hit={
-            name: (mass[name] > _mass_beyond_chance(before[name], effective))
-            & _cut_off_by_bounds(scaled[name], weights, ends[name])
-            for name in theta
-        },
+        bound_hit=hit,
     )
 
 
@@ -184,26 +139,6 @@ def on_flat_scale(case: Case, theta: dict[str, Array]) -> Array:
     return np.column_stack([_on_flat_scale(theta[name], prior) for name, prior in case.parameters.items()])
 
 
-def _width(quantiles: Array) -> float:
-    return float(quantiles[-1] - quantiles[0])
-
-
-def _mass_near_bounds(scaled: Array, weights: Array, ends: Array) -> Array:
-    """Posterior mass within NEAR_BOUND of the prior's range of its low and high bound [-]; NaN without both bounds."""
-    low, high = ends
-    near = NEAR_BOUND * (high - low)
-    if not np.isfinite(near):
-        return np.full(2, np.nan)
-    return np.array([weights[scaled < low + near].sum(), weights[scaled > high - near].sum()])
-
-
-def _cut_off_by_bounds(scaled: Array, weights: Array, ends: Array) -> np.ndarray:
-    """Whether the low and the high bound, and not the data, end the 95 % range."""
-    quantiles = weighted_quantile(scaled, weights, LEVELS)
-    distance = np.abs(quantiles[[0, -1]] - ends)
-    return np.asarray(distance <= CUT_OFF_WITHIN * (quantiles[-1] - quantiles[0]))
-
-
 def prior_mass_near_bounds(prior: Parameter) -> Array:
     """Mass of the prior itself within NEAR_BOUND of its range of its low and high bound (2,) [-]: NEAR_BOUND of a flat
     one, and more of one that ends where it is largest; NaN without both bounds.
@@ -216,22 +151,14 @@ def prior_mass_near_bounds(prior: Parameter) -> Array:
     return np.array([below[0], 1.0 - below[1]])
 
 
-def _mass_beyond_chance(before: Array, effective: float) -> Array:
-    """Mass near each bound that is not chance (2,) [-]: three standard errors above that of a parameter left at its
-    prior, before (2,).
-    """
-    return np.maximum(PRESSES_ABOVE, before + 3.0 * np.sqrt(before * (1.0 - before) / effective))
-
-
 def predictive_distribution(
-    prediction: Array, noise: Array, weights: Array, seed: int, factor: Array | None = None
+    sample: WeightedSample, noise: Array, seed: int, factor: Array | None = None
 ) -> PredictiveDistribution:
     """Bands at all stations, and draws of equal weight, f(theta) + e: e = noise * normal, or factor @ normal.
 
-    prediction f: (member, station); noise: standard deviation of the errors (station,); weights: (member,);
-    factor: L with L L' the covariance of correlated errors (station, station).
+    noise: standard deviation of the errors (station,); factor: L with L L' their covariance (station, station).
     """
-    random = np.random.default_rng(seed)
+    prediction, weights, random = sample.prediction, sample.weights, np.random.default_rng(seed)
     draws = systematic_draws(weights, CHAINS * DRAWS_PER_CHAIN, random).reshape(CHAINS, DRAWS_PER_CHAIN)
     normal = random.standard_normal((*draws.shape, prediction.shape[1]))
     weighed = weights > 0
@@ -262,4 +189,67 @@ def goodness_of_fit(
         noise=noise,
         residual=residual,
         best_residual=best_residual,
+    )
+
+
+def correct_phi_for_canopy(
+    phi: Array, from_height: float, to_height: float, depth: float, bare_chezy: float | Array
+) -> Array:
+    """phi' with C(phi', to_height) = C(phi, from_height) at the same depth h, C of `baptist_chezy`.
+
+        phi' = 2 g ((C - C_above)^-2 - 1/C_b^2), C_above the part of the water above plants of to_height
+
+    Berends et al. (2020) corrected D3b like this and do not print the formula: equal C is the natural reading.
+
+    Parameters
+    ----------
+    phi : array
+        Of any shape [-].
+    from_height, to_height : float
+        Heights h_d of the canopy [m].
+    depth : float
+        h [m].
+    bare_chezy : float or array
+        C_b of the bed [m^1/2/s].
+
+    Returns
+    -------
+    array
+        phi' [-]: 0 if even the bare bed would be too rough, infinite if no plants would be rough enough.
+
+    References
+    ----------
+    Baptist et al. (2007), https://doi.org/10.1080/00221686.2007.9521778.
+    """
+    chezy = np.vectorize(baptist_chezy, otypes=[np.float64])(phi, from_height, depth, bare_chezy)
+    within = chezy - above_canopy(to_height, depth)
+    with np.errstate(divide="ignore"):
+        corrected = 2 * GRAVITY * (np.maximum(within, 0.0) ** -2 - 1 / np.square(bare_chezy))
+    return np.maximum(corrected, 0.0)
+
+
+def corrected_canopy(theta: dict[str, Array], case: Case, weights: Array) -> CorrectedCanopy | None:
+    """phi of the vegetation type that `canopy_correction` names, for all members; None without that key."""
+    wanted = case.canopy_correction
+    if wanted is None:
+        return None
+    stand = case.plants.stands[wanted.stand]
+    if not isinstance(stand.phi, str):
+        raise InputError(f"canopy_correction: phi of the stand {wanted.stand} is a number; make it a parameter.")
+    bare = theta[stand.bare_chezy] if isinstance(stand.bare_chezy, str) else stand.bare_chezy
+    raw = theta[stand.phi]
+    phi = correct_phi_for_canopy(raw, wanted.from_height, wanted.to_height, wanted.depth, bare)
+    with np.errstate(divide="ignore"):
+        log10_phi = np.log10(phi)
+    return CorrectedCanopy(
+        parameter=stand.phi,
+        from_height=wanted.from_height,
+        to_height=wanted.to_height,
+        depth=wanted.depth,
+        phi=phi,
+        median=weighted_median(phi, weights),
+        sd=weighted_sd(phi, weights),
+        quantiles=weighted_quantile(phi, weights, LEVELS),
+        log10_median=weighted_median(log10_phi, weights),
+        log10_sd=weighted_sd(log10_phi, weights),
     )

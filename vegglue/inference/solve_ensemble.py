@@ -1,14 +1,13 @@
-"""One chunk of an ensemble: its members solved in one experiment after the other, and what is read of their flows.
+"""config -> ensemble: Sobol' members solved in fixed chunks over the cores, appended as they are finished.
 
-config -> ensemble: Sobol' members solved in fixed chunks over the cores, appended as they are finished.
-
-A chunk is neighbours in the prior, the same set whatever the number of jobs, so that the results are too. What one task
-solves is a chunk in one experiment.
+A chunk is neighbours in the prior, the same set whatever the number of jobs, so that the results are too. One task
+solves a chunk in one experiment.
 """
 
 import hashlib
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -39,159 +38,28 @@ from vegglue.results.ensemble import Header
 from vegglue.results.fields import QUANTITIES, FieldWindow, excess, window_of
 from vegglue.results.resume import EnsembleWriter, ensemble_writer
 from vegglue.version import VERSION
+from vegglue.wording.sentences import sentence
 
-# Members read by the sensors at once [-], so that their fields stay small. No number hangs on it.
+# Members of a chunk at most, to share what leads to the first of them, and chunks at least, to share the cores [-].
+# Chosen, not measured: smaller chunks share the work more evenly and lose less if a run is killed, larger ones reach
+# fewer first members from afar. No key of a config: with other chunks members have other neighbours, and last digits.
+LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
+# Members [-] up to which each is solved on coarser cells first. Of 256 on 9,600 cells that takes 70 % of the time that
+# neighbours alone take (DECISIONS); more were not tried. Chunks then hold half of the members, and at most
+# SPARSE_CHUNK, or twice as many if several experiments share the cores: larger ones share more, or leave cores idle.
+SPARSE_MEMBERS, SPARSE_CHUNK = 256, 64
+# Members read by the sensors at once [-], so that their fields stay small. No number depends on it.
 READ_TOGETHER = 16
 Rows = dict[str, np.ndarray]
 StartFrom = Mapping[str, LinearisedMember | None]
 
 
-def linearised_medians(case: Case, site: Site) -> StartFrom:
-    """Of every experiment, the member at the medians of all priors; None where it had to be marched."""
-    parameters, tolerance = len(case.parameters), case.numerics.tolerance
+@dataclass(frozen=True)
+class UnfinishedRunMoved:
+    """An unfinished run of another state of a case, moved to a file of this name."""
 
-    def median_in(experiment: str) -> LinearisedMember | None:
-        return linearised_median(partial(_problem_at, case, site, experiment), parameters, tolerance, _fall_back(case))
-
-    found = in_threads(median_in, [(experiment,) for experiment in case.experiments])
-    return dict(zip(case.experiments, found, strict=True))
-
-
-def solve_chunk(
-    case: Case, site: Site, observations: Observations, sample: PriorSample, start_from: StartFrom | None = None
-) -> Rows:
-    """The rows of the ensemble file for the members of a sample, every experiment of the case, and as `fields`
-    (member, experiment, quantity, x, y) what is kept of their flow. start_from: where members come from, coarser cells
-    if not given.
-    """
-    solve = partial(solve_in_experiment, case, site, observations, start_from)
-    return rows_of_chunk(case, observations, [solve(experiment, sample) for experiment in case.experiments])
-
-
-def solve_in_experiment(
-    case: Case,
-    site: Site,
-    observations: Observations,
-    start_from: StartFrom | None,
-    experiment: str,
-    sample: PriorSample,
-) -> Rows:
-    """What `rows_of_chunk` takes of one experiment: predictions (member, station of the experiment), section flows
-    (member, section), fields (member, quantity, x, y), and the rest as it is stored.
-    """
-    began = time.perf_counter()
-    problem = build_problem(case, site, experiment, sample.theta)
-    solved = _solved_in(case, site, experiment, sample, problem, start_from)
-    rows = _readings(case, site, observations, experiment, problem, solved)
-    rows |= {"status": solved.status.astype(np.int8), "iterations": solved.iterations.astype(np.int32)}
-    rows["reason"] = np.array([f"{experiment}: {reason}" if reason else "" for reason in solved.reason], object)
-    spent = time.perf_counter() - began
-    return rows | {"seconds": np.full(problem.members, spent / problem.members)}
-
-
-def rows_of_chunk(case: Case, observations: Observations, parts: list[Rows]) -> Rows:
-    """The rows of a chunk, of those of each experiment in the order of the case; a member that failed in one has no
-    predictions.
-    """
-    rows = {
-        "prediction": np.full((len(parts[0]["status"]), len(observations.table)), np.nan),
-        "section_flow": np.stack([part["section_flow"] for part in parts], axis=1),
-        "mass_error": np.max([part["mass_error"] for part in parts], axis=0),
-        "status": np.max([part["status"] for part in parts], axis=0),
-        "iterations": np.sum([part["iterations"] for part in parts], axis=0, dtype=np.int32),
-        "seconds": np.sum([part["seconds"] for part in parts], axis=0),
-        "fields": np.stack([part["fields"] for part in parts], axis=1),
-    }
-    reasons = zip(*(part["reason"] for part in parts), strict=True)
-    rows["reason"] = np.array([" ".join(filter(None, each)) for each in reasons], object)
-    for experiment, part in zip(case.experiments, parts, strict=True):
-        rows["prediction"][:, _stations_of(observations, experiment)] = part["prediction"]
-    for name in ("prediction", "fields"):
-        rows[name][rows["status"] == FAILED] = np.nan
-    return rows
-
-
-def _stations_of(observations: Observations, experiment: str) -> np.ndarray:
-    return np.asarray(observations.table["experiment"] == experiment)
-
-
-def _solved_in(
-    case: Case, site: Site, experiment: str, sample: PriorSample, problem: Problem, start_from: StartFrom | None
-) -> SolvedMembers:
-    """The members in one experiment, from a member they all come from, or from coarser cells, the coarsest first."""
-    build, tolerance = partial(_problem_at, case, site, experiment), case.numerics.tolerance
-    if start_from:
-        return solve_members(problem, sample.points, build, tolerance, start_from[experiment], _fall_back(case))
-    grids = [
-        GridProblem(build_problem(*place, experiment, sample.theta), partial(_problem_at, *place, experiment))
-        for place in ever_coarser(case, site)[:-1]
-    ]
-    return solve_nested([*grids, GridProblem(problem, build)], sample.points, tolerance, _fall_back(case))
-
-
-def _readings(
-    case: Case, site: Site, observations: Observations, experiment: str, problem: Problem, solved: SolvedMembers
-) -> Rows:
-    """What sensors and sections read of the members in one experiment."""
-    sections, columns = section_positions(observations), kept_columns(window_of(case, site.grid))
-    station = observations.table[_stations_of(observations, experiment)]
-    members, fields = problem.members, (len(QUANTITIES), columns.stop - columns.start, site.grid.y.size)
-    rows = {
-        "prediction": np.empty((members, len(station))),
-        "section_flow": np.empty((members, len(sections))),
-        "mass_error": np.empty(members),
-        "fields": np.empty((members, *fields), np.float32),
-    }
-    for first in range(0, members, READ_TOGETHER):
-        few = slice(first, min(first + READ_TOGETHER, members))
-        state = np.ascontiguousarray(solved.state[..., few])
-        part = take(problem, np.arange(members)[few])
-        readings = read_sensors(part, state, site.grid, station, sections, columns)
-        for name, values in rows.items():
-            values[few] = getattr(readings, name)
-    return rows
-
-
-def kept_columns(window: FieldWindow | None) -> slice:
-    return window.columns if window else slice(0, 0)
-
-
-def section_positions(observations: Observations) -> tuple[tuple[str, float], ...]:
-    """Name and mean x [m] of every section a velocity was measured in."""
-    velocity = observations.table[velocity_rows(observations.table)]
-    return tuple((str(name), float(x)) for name, x in velocity.groupby("section", sort=False)["x"].mean().items())
-
-
-def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:
-    """Steady fields of one member at cell centres, by experiment; an experiment that finds none is left out."""
-    site = build_site(case)
-    sample = sample_of(case, {name: np.array([theta[name]]) for name in case.parameters})
-
-    def fields_of(experiment: str) -> dict[str, FlowFields]:
-        problem = build_problem(case, site, experiment, sample.theta)
-        solved = _solved_in(case, site, experiment, sample, problem, None)
-        return {} if solved.status[0] == FAILED else {experiment: flow_fields(problem, solved.state, site.grid)}
-
-    found = in_threads(fields_of, [(experiment,) for experiment in case.experiments])
-    return {experiment: fields for one in found for experiment, fields in one.items()}
-
-
-def _fall_back(case: Case) -> FallBack:
-    return fall_back(case.numerics.march_step, case.numerics.march_span)
-
-
-def _problem_at(case: Case, site: Site, experiment: str, points: np.ndarray) -> Problem:
-    return build_problem(case, site, experiment, parameters_at(case, points))
-
-
-# Members of a chunk at most, to share what leads to the first of them, and chunks at least, to share the cores [-].
-# Chosen, not measured: smaller chunks share the work more evenly and lose less when a run is killed, larger ones reach
-# fewer first members from afar. No key of a config: with other chunks members have other neighbours, and last digits.
-LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
-# Members [-] up to which each is solved on coarser cells first. Of 256 on 9,600 cells that takes 70 % of the time that
-# neighbours alone take (DECISIONS); more were not tried. Chunks then hold half of the members, and at most
-# SPARSE_CHUNK, or twice as many where several experiments share the cores: larger ones share more, or leave cores idle.
-SPARSE_MEMBERS, SPARSE_CHUNK = 256, 64
+    case: str
+    file: str
 
 
 def solve_ensemble(
@@ -199,15 +67,34 @@ def solve_ensemble(
 ) -> None:
     """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
 
-    Errors: InputError when an inflow or the outlet holds no cell centre, or the fields to be kept exceed their budget;
-    StorageError when another run holds the folder or the disk is full (what was written stays).
+    Parameters
+    ----------
+    case : Case
+        With at least one parameter; `simulate` sets members, seed and fields.
+    observations : Observations
+        Stations at which flows are read.
+    path : Path
+        Of the HDF5 file.
+    jobs : int
+        Processes; -1 for one on every core.
+    watch : callable
+        Is called after each chunk.
+    site : Site, optional
+        That of the case, if it is built already.
+
+    Raises
+    ------
+    InputError
+        If an inflow or the outlet holds no cell centre, or the fields to be kept exceed their budget.
+    StorageError
+        If another run holds the folder or the disk is full; what was written stays.
     """
     wanted = simulation_hash(case)  # before anything else is read: what changes meanwhile makes it out of date
     refuse_too_many(case, observations)
     site = site or build_site(case)
     refuse_ranges_without_cells(case, site.grid)
-    if sentence := excess(case, site.grid):
-        raise InputError(f"{shown_path(case.source)}: {sentence}")
+    if problem := excess(case, site.grid):
+        raise InputError(f"{shown_path(case.source)}: {problem}")
     sample = sobol_sample(case)
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     header = make_header(case, wanted, observations, sample.theta, chunks, window_of(case, site.grid))
@@ -225,22 +112,22 @@ def solve_ensemble(
             watch(Progress(phase, flows // len(case.experiments), header.members, "members", failed, resumed))
 
 
-def left_to_do(writer: EnsembleWriter, case: Case, chunks: list[np.ndarray], watch: Watch) -> list[int]:
-    """Chunks that an earlier run has not finished, or that are damaged since; what was set aside is told."""
-    if writer.set_aside is not None:
-        watch(Progress(f"an unfinished run of another state of {case.name} was moved to {writer.set_aside.name}"))
-    writer.reopen_damaged(chunks)
-    return [index for index in range(len(chunks)) if index not in writer.done]
-
-
 def refuse_too_many(case: Case, observations: Observations) -> None:
-    """Errors: InputError for a case without parameters, or with more predictions than a file is laid out for."""
+    """Raise InputError for a case without parameters, or with more predictions than a file is laid out for."""
     refuse_without_parameters(case)
     if (predictions := case.simulate.members * len(observations.table)) > MOST_PREDICTIONS:
         raise InputError(
             f"{shown_path(case.source)}: {case.simulate.members:,} members of {len(observations.table):,} stations "
             f"have {predictions:,} predictions; expected at most {MOST_PREDICTIONS:,}, take fewer of either."
         )
+
+
+def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[StartFrom, list[np.ndarray]]:
+    """Where members come from, and the members of each chunk; those that are few come from coarser cells."""
+    size = chunk_size(len(points), len(case.experiments))
+    start_from = linearised_medians(case, site) if len(points) > SPARSE_MEMBERS else {}
+    slopes = [one.slopes for one in start_from.values() if one is not None]
+    return start_from, clusters(parameter_metric(points, slopes).coordinates, size)
 
 
 def chunk_size(members: int, experiments: int) -> int:
@@ -250,12 +137,48 @@ def chunk_size(members: int, experiments: int) -> int:
     return min(max(-(-members // FEWEST_CHUNKS), CLUSTER_SIZE), LARGEST_CHUNK)
 
 
-def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[StartFrom, list[np.ndarray]]:
-    """Where members come from, and the members of each chunk; those that are few come from coarser cells."""
-    size = chunk_size(len(points), len(case.experiments))
-    start_from = linearised_medians(case, site) if len(points) > SPARSE_MEMBERS else {}
-    slopes = [one.slopes for one in start_from.values() if one is not None]
-    return start_from, clusters(parameter_metric(points, slopes).coordinates, size)
+def linearised_medians(case: Case, site: Site) -> StartFrom:
+    """Of every experiment, the member at the medians of all priors; None if it had to be marched."""
+    parameters, tolerance = len(case.parameters), case.numerics.tolerance
+
+    def median_in(experiment: str) -> LinearisedMember | None:
+        return linearised_median(partial(_problem_at, case, site, experiment), parameters, tolerance, _fall_back(case))
+
+    found = in_threads(median_in, [(experiment,) for experiment in case.experiments])
+    return dict(zip(case.experiments, found, strict=True))
+
+
+def make_header(
+    case: Case,
+    config_hash: str,
+    observations: Observations,
+    theta: dict[str, np.ndarray],
+    chunks: list[np.ndarray],
+    window: FieldWindow | None,
+) -> Header:
+    """What an ensemble file states before its members."""
+    return Header(
+        parameters=theta,
+        units={name: parameter.unit for name, parameter in case.parameters.items()},
+        station=observations.table,
+        experiments=tuple(case.experiments),
+        sections=section_positions(observations),
+        chunks=len(chunks),
+        cut=hashlib.sha256(np.concatenate(chunks).tobytes()).hexdigest(),
+        config=resolved_yaml(case),
+        config_hash=config_hash,
+        seed=case.simulate.seed,
+        version=VERSION,
+        window=window,
+    )
+
+
+def left_to_do(writer: EnsembleWriter, case: Case, chunks: list[np.ndarray], watch: Watch) -> list[int]:
+    """Chunks that an earlier run has not finished, or that are damaged since; a run that was moved is reported."""
+    if writer.set_aside is not None:
+        watch(Progress(sentence(UnfinishedRunMoved(case.name, writer.set_aside.name))))
+    writer.reopen_damaged(chunks)
+    return [index for index in range(len(chunks)) if index not in writer.done]
 
 
 def solved_members(case: Case, observations: Observations, sample: PriorSample, jobs: int) -> np.ndarray:
@@ -304,25 +227,115 @@ def _solve_numbered(
     return index, experiment, solve_in_experiment(case, site, observations, start_from, experiment, sample)
 
 
-def make_header(
+def solve_chunk(
+    case: Case, site: Site, observations: Observations, sample: PriorSample, start_from: StartFrom | None = None
+) -> Rows:
+    """The rows of the ensemble file for the members of a sample, every experiment of the case, and as `fields`
+    (member, experiment, quantity, x, y) what is kept of their flow. start_from: where members come from, coarser cells
+    if not given.
+    """
+    solve = partial(solve_in_experiment, case, site, observations, start_from)
+    return rows_of_chunk(case, observations, [solve(experiment, sample) for experiment in case.experiments])
+
+
+def solve_in_experiment(
     case: Case,
-    config_hash: str,
+    site: Site,
     observations: Observations,
-    theta: dict[str, np.ndarray],
-    chunks: list[np.ndarray],
-    window: FieldWindow | None,
-) -> Header:
-    return Header(
-        parameters=theta,
-        units={name: parameter.unit for name, parameter in case.parameters.items()},
-        station=observations.table,
-        experiments=tuple(case.experiments),
-        sections=section_positions(observations),
-        chunks=len(chunks),
-        cut=hashlib.sha256(np.concatenate(chunks).tobytes()).hexdigest(),
-        config=resolved_yaml(case),
-        config_hash=config_hash,
-        seed=case.simulate.seed,
-        version=VERSION,
-        window=window,
-    )
+    start_from: StartFrom | None,
+    experiment: str,
+    sample: PriorSample,
+) -> Rows:
+    """What `rows_of_chunk` takes of one experiment: predictions (member, station of the experiment), section flows
+    (member, section), fields (member, quantity, x, y), and the rest as it is stored.
+    """
+    began = time.perf_counter()
+    problem = build_problem(case, site, experiment, sample.theta)
+    solved = _solved_in(case, site, experiment, sample, problem, start_from)
+    window, sections = window_of(case, site.grid), section_positions(observations)
+    columns, station = window.columns if window else slice(0, 0), _stations_in(observations, experiment)
+    members, fields = problem.members, (len(QUANTITIES), columns.stop - columns.start, site.grid.y.size)
+    rows = {
+        "prediction": np.empty((members, int(station.sum()))),
+        "section_flow": np.empty((members, len(sections))),
+        "mass_error": np.empty(members),
+        "fields": np.empty((members, *fields), np.float32),
+    }
+    for first in range(0, members, READ_TOGETHER):
+        few = slice(first, min(first + READ_TOGETHER, members))
+        state = np.ascontiguousarray(solved.state[..., few])
+        part = take(problem, np.arange(members)[few])
+        readings = read_sensors(part, state, site.grid, observations.table[station], sections, columns)
+        for name, values in rows.items():
+            values[few] = getattr(readings, name)
+    rows |= {"status": solved.status.astype(np.int8), "iterations": solved.iterations.astype(np.int32)}
+    rows["reason"] = np.array([f"{experiment}: {reason}" if reason else "" for reason in solved.reason], object)
+    return rows | {"seconds": np.full(members, (time.perf_counter() - began) / members)}
+
+
+def rows_of_chunk(case: Case, observations: Observations, parts: list[Rows]) -> Rows:
+    """The rows of a chunk, of those of each experiment in the order of the case; a member that failed in one has no
+    predictions.
+    """
+    rows = {
+        "prediction": np.full((len(parts[0]["status"]), len(observations.table)), np.nan),
+        "section_flow": np.stack([part["section_flow"] for part in parts], axis=1),
+        "mass_error": np.max([part["mass_error"] for part in parts], axis=0),
+        "status": np.max([part["status"] for part in parts], axis=0),
+        "iterations": np.sum([part["iterations"] for part in parts], axis=0, dtype=np.int32),
+        "seconds": np.sum([part["seconds"] for part in parts], axis=0),
+        "fields": np.stack([part["fields"] for part in parts], axis=1),
+    }
+    reasons = zip(*(part["reason"] for part in parts), strict=True)
+    rows["reason"] = np.array([" ".join(filter(None, each)) for each in reasons], object)
+    for experiment, part in zip(case.experiments, parts, strict=True):
+        rows["prediction"][:, _stations_in(observations, experiment)] = part["prediction"]
+    for name in ("prediction", "fields"):
+        rows[name][rows["status"] == FAILED] = np.nan
+    return rows
+
+
+def _stations_in(observations: Observations, experiment: str) -> np.ndarray:
+    return np.asarray(observations.table["experiment"] == experiment)
+
+
+def section_positions(observations: Observations) -> tuple[tuple[str, float], ...]:
+    """Name and mean x [m] of every section a velocity was measured in."""
+    velocity = observations.table[velocity_rows(observations.table)]
+    return tuple((str(name), float(x)) for name, x in velocity.groupby("section", sort=False)["x"].mean().items())
+
+
+def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:
+    """Steady fields of one member at cell centres, by experiment; an experiment that finds none is left out."""
+    site = build_site(case)
+    sample = sample_of(case, {name: np.array([theta[name]]) for name in case.parameters})
+
+    def fields_of(experiment: str) -> dict[str, FlowFields]:
+        problem = build_problem(case, site, experiment, sample.theta)
+        solved = _solved_in(case, site, experiment, sample, problem, None)
+        return {} if solved.status[0] == FAILED else {experiment: flow_fields(problem, solved.state, site.grid)}
+
+    found = in_threads(fields_of, [(experiment,) for experiment in case.experiments])
+    return {experiment: fields for one in found for experiment, fields in one.items()}
+
+
+def _solved_in(
+    case: Case, site: Site, experiment: str, sample: PriorSample, problem: Problem, start_from: StartFrom | None
+) -> SolvedMembers:
+    """The members in one experiment, from a member they all come from, or from coarser cells, the coarsest first."""
+    build, tolerance = partial(_problem_at, case, site, experiment), case.numerics.tolerance
+    if start_from:
+        return solve_members(problem, sample.points, build, tolerance, start_from[experiment], _fall_back(case))
+    grids = [
+        GridProblem(build_problem(*place, experiment, sample.theta), partial(_problem_at, *place, experiment))
+        for place in ever_coarser(case, site)[:-1]
+    ]
+    return solve_nested([*grids, GridProblem(problem, build)], sample.points, tolerance, _fall_back(case))
+
+
+def _fall_back(case: Case) -> FallBack:
+    return fall_back(case.numerics.march_step, case.numerics.march_span)
+
+
+def _problem_at(case: Case, site: Site, experiment: str, points: np.ndarray) -> Problem:
+    return build_problem(case, site, experiment, parameters_at(case, points))
