@@ -20,11 +20,15 @@ from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.results.causes import Step
 from vegglue.results.result_files import write_diagnosis
+from vegglue.wording.sentences import sentence
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import Answer, Hidden, TwinBase, errors_named, measured_twin, true_place, twin_base
 from vegglue.workflow.twin import (
+    Mark,
+    NothingHidden,
+    TrueParameters,
+    compared_with_truth,
     config_in,
-    guess_in_words,
     in_rows_of_twin,
     marks,
     opened_answer,
@@ -180,7 +184,7 @@ def test_marks_of_every_kind() -> None:
     effect, missed = Hidden("eddies", 0.3, {}, 6.0), Hidden("wind", 8.0, {}, 6.0)
     thing, probe = Hidden("unlisted:pier", 1.0, {"x": 33.0, "y": 0.4}, 6.0), Hidden("bad_probe", 9.0, {}, 0.0, 1)
     first, second, third, fourth = marks(an_answer(effect, missed, thing, probe), found)
-    assert (first.inside, first.named, first.amplitude) == (True, False, True)
+    assert (first.inside, first.named, first.holds) == (True, False, True)
     assert not second.inside
     assert third.away == pytest.approx(1.0)
     assert not third.found, "the verdict was one-of"
@@ -189,26 +193,27 @@ def test_marks_of_every_kind() -> None:
     alone = a_diagnosis(verdict={"kind": "identified"}, steps=(step,))
     assert marks(an_answer(effect), alone)[0].named
     beside = replace(effect, amplitude=2.0)
-    assert marks(an_answer(beside), alone)[0].amplitude is False
+    assert marks(an_answer(beside), alone)[0].holds is False
     location = an_anomaly(x=30.0, y=0.4)
     nowhere = a_diagnosis(verdict={"kind": "none-of-these", "anomaly": location})
     assert marks(an_answer(thing), nowhere)[0].found
 
 
-def test_what_reveal_says() -> None:
+def test_what_reveal_compares() -> None:
     effect = Hidden("eddies", 0.3, {}, 6.0)
-    said = "\n".join(guess_in_words(an_answer(effect), a_diagnosis()))
-    assert "n_b = 0.03" in said
-    assert "correlated by 0.5" in said
-    assert "the interval holds the true size" in said
-    assert "Nothing was hidden" in "\n".join(guess_in_words(an_answer(), None))
+    truth, mark = compared_with_truth(an_answer(effect), a_diagnosis())
+    assert truth == TrueParameters({"n_b": 0.03}, 1.0, 0.5)
+    assert isinstance(mark, Mark)
+    assert mark.holds
+    assert compared_with_truth(an_answer(), None)[1] == NothingHidden("")
+    assert marks(an_answer(effect), None)[0].verdict == ""
     silent = a_diagnosis(verdict={"kind": "nothing-missing"}, candidate_effects=(a_candidate_effect("wind"),), steps=())
-    assert "right" in guess_in_words(an_answer(), silent)[-1]
-    assert "missed" in guess_in_words(an_answer(effect), silent)[-1]
-    wide = Hidden("mixing[D3]", 0.3, {"width": 0.6}, 6.0)
-    assert "found with width = 0.1 instead of 0.6, on which sizes" in guess_in_words(an_answer(wide), a_diagnosis())[-1]
-    alike = Hidden("mixing[D3]", 0.3, {"width": 0.101}, 6.0)
-    assert guess_in_words(an_answer(alike), a_diagnosis())[-1].endswith("the true size.")
+    assert compared_with_truth(an_answer(), silent)[1] == NothingHidden("nothing-missing")
+    assert not marks(an_answer(effect), silent)[0].inside
+    wide, alike = (Hidden("mixing[D3]", 0.3, {"width": width}, 6.0) for width in (0.6, 0.101))
+    assert marks(an_answer(wide), a_diagnosis())[0].shapes == (("width", 0.1, 0.6),)
+    assert marks(an_answer(alike), a_diagnosis())[0].shapes == ()
+    assert all(sentence(one) for one in compared_with_truth(an_answer(effect, wide), a_diagnosis()))
 
 
 def test_a_hidden_law_is_told_by_its_term_and_quantity() -> None:
@@ -216,8 +221,6 @@ def test_a_hidden_law_is_told_by_its_term_and_quantity() -> None:
     told = replace(a_diagnosis(steps=()), laws=candidate_laws_of("law_bank_speed_step"))
     ramp, other = (Hidden(name, 0.3, {}, 6.0) for name in ("law_bank_speed_ramp", "law_floor_speed_ramp"))
     assert [one.found for one in marks(an_answer(ramp, other), told)] == [True, False]
-    assert guess_in_words(an_answer(ramp), told)[-1].endswith("tells of a law of that quantity in that term.")
-    assert guess_in_words(an_answer(ramp), a_diagnosis())[-1].endswith("tells of no such law.")
 
 
 def test_the_folder_of_a_twin(ground: TwinBase, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -20,13 +21,13 @@ from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.case.resolved_config import as_yaml, case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, case_name, read_text
-from vegglue.effects.grammar import LAWS, Law
+from vegglue.effects.grammar import LAWS
 from vegglue.errors import InputError, shown_command, shown_path
 from vegglue.measurements.kinds import KINDS, Kind, kind_of
 from vegglue.parallel import one_thread
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import diagnosis_that_fits
-from vegglue.wording.numbers import listed, so_many
+from vegglue.wording.sentences import sentence
 from vegglue.workflow.case_run import case_run
 from vegglue.workflow.command_model import refuse_command
 from vegglue.workflow.hidden_effect import BAD_PROBE, Answer, Hidden, measured_twin, true_place, twin_base
@@ -151,7 +152,7 @@ def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False
     case = load_case(config_in(folder), trust)
     there = Path(runs) / case.name
     diagnosis = diagnosis_that_fits(there / "diagnosis.h5", case_hash(case))
-    lines = guess_in_words(answer, diagnosis)
+    lines = [sentence(one) for one in compared_with_truth(answer, diagnosis)]
     if diagnosis is None:
         lines.append(f"No diagnosis of it in {there}: {shown_command('diagnose', config_in(folder))} makes one.")
     return lines
@@ -159,120 +160,95 @@ def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False
 
 @dataclass(frozen=True)
 class Mark:
-    """One hidden thing against a diagnosis. named: the verdict is this effect alone; inside: it is in the set; open:
-    nothing stands out, and it is among what is not excluded.
+    """One hidden cause compared with a diagnosis.
 
-    amplitude: whether the 95 % interval holds the true one, None when it is not in the set; away: distance [m] of the
-    place that is pointed at from the true one, NaN without either; found: what counts as success for its kind.
+    verdict: kind of the verdict, '' without a diagnosis; found: whether it counts as found for its kind of cause;
+    named: whether the verdict is this effect alone; inside: whether it is in the set; open: whether it is listed among
+    what is not excluded; holds: whether the 95 % interval holds the true amplitude, None if it is not in the set; away:
+    distance [m] of the nearest place found from the true one, NaN without either; groups: of effects that the data
+    cannot tell apart, for each step; said: the set; shapes: (name, found, true) of shapes that differ by 5 % or more.
     """
 
     hidden: Hidden
-    named: bool
-    inside: bool
-    open: bool
-    amplitude: bool | None
-    away: float
-    found: bool
+    kind: Literal["probe", "unlisted", "law", "effect"]
+    verdict: str = ""
+    found: bool = False
+    named: bool = False
+    inside: bool = False
+    open: bool = False
+    holds: bool | None = None
+    away: float = float("nan")
+    groups: tuple[int, ...] = ()
+    said: tuple[str, ...] = ()
+    shapes: tuple[tuple[str, float, float], ...] = ()
 
 
-def marks(answer: Answer, diagnosis: Diagnosis) -> list[Mark]:
-    """One for each thing that is hidden."""
-    return [_mark(hidden, diagnosis) for hidden in answer.hidden]
+@dataclass(frozen=True)
+class TrueParameters:
+    """The true parameters of a twin, and its errors: true over stated ones [-], correlation of neighbours [-]."""
+
+    theta: dict[str, float]
+    scale: float
+    correlation: float
 
 
-def _mark(hidden: Hidden, diagnosis: Diagnosis) -> Mark:
+@dataclass(frozen=True)
+class NothingHidden:
+    """A twin in which nothing is hidden; verdict: the kind found, '' without a diagnosis."""
+
+    verdict: str
+
+
+def marks(answer: Answer, diagnosis: Diagnosis | None) -> list[Mark]:
+    """Compare each hidden cause with a diagnosis, if there is one."""
+    return [mark(hidden, diagnosis) for hidden in answer.hidden]
+
+
+def mark(hidden: Hidden, diagnosis: Diagnosis | None) -> Mark:
+    """Compare one hidden cause with a diagnosis, if there is one."""
     if hidden.name == BAD_PROBE:
-        there = hidden.station in diagnosis.errors.flagged
-        return Mark(hidden, False, there, False, None, float("nan"), there)
-    if not hidden.listed:
-        away = _away(hidden, diagnosis)
-        found = diagnosis.verdict.kind == "none-of-these"
-        return Mark(hidden, False, False, False, None, away, found)
-    if hidden.name in LAWS:
-        told = _tells_of(LAWS[hidden.name], diagnosis)
-        return Mark(hidden, False, told, False, None, float("nan"), told)
-    inside = hidden.name in diagnosis.set
-    named = diagnosis.verdict.kind == "identified" and [step.accepted for step in diagnosis.steps] == [hidden.name]
-    still = hidden.name in [name for group in diagnosis.verdict.not_excluded for name in group]
-    amplitude = None
-    if inside:
-        low, high = diagnosis.candidate_effect(hidden.name).amplitude.interval95
-        amplitude = bool(low <= hidden.amplitude <= high)
-    return Mark(hidden, named, inside, still, amplitude, float("nan"), inside)
-
-
-def _tells_of(law: Law, diagnosis: Diagnosis) -> bool:
-    """Whether a law of the same quantity in the same term is among those that a diagnosis tells."""
-    laws = () if diagnosis.laws is None else diagnosis.laws.laws
-    return any((one.term, one.quantity) == (law.term.words, law.quantity.words) for one in laws)
-
-
-def _away(hidden: Hidden, diagnosis: Diagnosis) -> float:
-    """Distance of the nearest place that is pointed at [m], NaN where there is none."""
-    x, y = hidden.shapes["x"], hidden.shapes["y"]
-    return float(min((np.hypot(one.x - x, one.y - y) for one in diagnosis.places), default=np.nan))
-
-
-def groups_of(diagnosis: Diagnosis) -> list[int]:
-    """Groups that the data cannot tell apart, counted for each step."""
-    return [len(step.groups) for step in diagnosis.steps]
-
-
-def _groups_in_words(diagnosis: Diagnosis) -> str:
-    """`3 groups`, and with more than one step of how many each."""
-    counts = [so_many(number, "group") for number in groups_of(diagnosis)]
-    return counts[0] if len(counts) == 1 else f"{listed(counts)}, step by step"
-
-
-def guess_in_words(answer: Answer, diagnosis: Diagnosis | None) -> list[str]:
-    """The truth, and what the diagnosis made of it, one line each."""
-    errors = "errors as stated" if answer.scale == 1.0 else f"errors {answer.scale:g} times those stated"
-    if answer.correlation:
-        errors += f", neighbours correlated by {answer.correlation:g}"
-    parameters = ", ".join(f"{name} = {value:.4g}" for name, value in answer.parameters.items())
-    lines = [f"True parameters: {parameters}; {errors}."]
-    if not answer.hidden:
-        lines.append("Nothing was hidden.")
-        if diagnosis is not None:
-            right = {"nothing-missing": "right", "cannot-tell": "too shy"}.get(diagnosis.verdict.kind, "a false alarm")
-            lines.append(f"The diagnosis said {diagnosis.verdict.kind}: {right}.")
-        return lines
+        none = Mark(hidden, "probe")
+    elif not hidden.listed:
+        none = Mark(hidden, "unlisted")
+    else:
+        none = Mark(hidden, "law" if hidden.name in LAWS else "effect")
     if diagnosis is None:
-        return lines + [f"Hidden: {_truth(one)}." for one in answer.hidden]
-    return lines + [_told(mark, diagnosis) for mark in marks(answer, diagnosis)]
+        return none
+    none = replace(
+        none,
+        verdict=diagnosis.verdict.kind,
+        said=tuple(diagnosis.set),
+        groups=tuple(len(step.groups) for step in diagnosis.steps),
+    )
+    if none.kind == "probe":
+        excluded = hidden.station in diagnosis.errors.flagged
+        return replace(none, found=excluded, inside=excluded)
+    if none.kind == "unlisted":
+        x, y = hidden.shapes["x"], hidden.shapes["y"]
+        away = float(min((np.hypot(one.x - x, one.y - y) for one in diagnosis.places), default=np.nan))
+        return replace(none, found=none.verdict == "none-of-these", away=away)
+    if none.kind == "law":
+        law, others = LAWS[hidden.name], () if diagnosis.laws is None else diagnosis.laws.laws
+        alike = any((one.term, one.quantity) == (law.term.words, law.quantity.words) for one in others)
+        return replace(none, found=alike, inside=alike)
+    still = hidden.name in [name for group in diagnosis.verdict.not_excluded for name in group]
+    if hidden.name not in diagnosis.set:
+        return replace(none, open=still)
+    named = none.verdict == "identified" and [step.accepted for step in diagnosis.steps] == [hidden.name]
+    candidate = diagnosis.candidate_effect(hidden.name)
+    low, high = candidate.amplitude.interval95
+    differing = tuple(
+        (name, candidate.shapes.get(name, true), true)
+        for name, true in hidden.shapes.items()
+        if not np.isclose(candidate.shapes.get(name, true), true, rtol=0.05)
+    )
+    holds = bool(low <= hidden.amplitude <= high)
+    return replace(none, found=True, named=named, inside=True, open=still, holds=holds, shapes=differing)
 
 
-def _truth(hidden: Hidden) -> str:
-    if hidden.name == BAD_PROBE:
-        return f"a bad probe at station {hidden.station}, {hidden.amplitude:+.3g} standard errors off"
-    shapes = "".join(f", {name} = {value:.3g}" for name, value in hidden.shapes.items())
-    return f"{hidden.name} of {hidden.amplitude:.4g}{shapes} (signal over noise {hidden.signal:.1f})"
-
-
-def _told(mark: Mark, diagnosis: Diagnosis) -> str:
-    truth = f"Hidden: {_truth(mark.hidden)}. "
-    if mark.hidden.name == BAD_PROBE:
-        alone = " The verdict was instrument." if diagnosis.verdict.kind == "instrument" else ""
-        return truth + ("It was set aside." + alone if mark.found else "It was not noticed.")
-    if not mark.hidden.listed:
-        told = f"The verdict was {diagnosis.verdict.kind}"
-        return truth + told + (f", {mark.away:.1f} m from it." if np.isfinite(mark.away) else ".")
-    if mark.hidden.name in LAWS:
-        which = "tells of a law of that quantity in that term" if mark.found else "tells of no such law"
-        return f"{truth}The diagnosis said {diagnosis.verdict.kind}; it {which}."
-    if mark.open:
-        return truth + f"The diagnosis said {diagnosis.verdict.kind}, and lists it among what is not excluded."
-    if not mark.inside:
-        said = f"{diagnosis.verdict.kind} {', '.join(diagnosis.set)}".rstrip()
-        return f"{truth}The diagnosis missed it; it said {said}."
-    alone = "It was named alone" if mark.named else f"It is in the set, which holds {_groups_in_words(diagnosis)}"
-    told = f"{truth}{alone}; the interval {'holds' if mark.amplitude else 'misses'} the true size."
-    others = _other_shapes(mark.hidden, diagnosis)
-    return f"{told} It was found with {others}, on which sizes depend." if others else told
-
-
-def _other_shapes(hidden: Hidden, diagnosis: Diagnosis) -> str:
-    """Settings of shape the effect was found with, where they differ from those of the truth by a twentieth or more."""
-    found = diagnosis.candidate_effect(hidden.name).shapes
-    others = [name for name, true in hidden.shapes.items() if not np.isclose(found.get(name, true), true, rtol=0.05)]
-    return " and ".join(f"{name} = {found[name]:.3g} instead of {hidden.shapes[name]:.3g}" for name in others)
+def compared_with_truth(answer: Answer, diagnosis: Diagnosis | None) -> list[TrueParameters | NothingHidden | Mark]:
+    """The true parameters, and each hidden cause compared with the diagnosis, if there is one."""
+    truth = TrueParameters(answer.parameters, answer.scale, answer.correlation)
+    if not answer.hidden:
+        return [truth, NothingHidden("" if diagnosis is None else diagnosis.verdict.kind)]
+    return [truth, *marks(answer, diagnosis)]
