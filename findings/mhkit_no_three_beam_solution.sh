@@ -7,12 +7,14 @@
 # Matters:    near a bank or over plants one beam is often blocked. Those are the places at which a model of a
 #             vegetated channel needs data; they vanish from a transect recorded in beam coordinates.
 # Documented: the attribute is listed in the documentation without a remark; no public thread found.
-# Versions:   mhkit 1.1.2 (its module dolfyn).
+# Versions:   mhkit 1.1.2 (its module dolfyn, without the rest of its dependencies), numpy 2.3.1, xarray 2025.7.1.
 set -eu
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "${PYTHON:-python3}" -m venv "$work/venv"
-"$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check mhkit==1.1.2
+"$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check \
+    numpy==2.3.1 scipy==1.16.0 pandas==2.3.3 xarray==2025.7.1 matplotlib==3.10.3
+"$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check --no-deps mhkit==1.1.2
 cd "$work"
 timeout 100 "$work/venv/bin/python" -W ignore - <<'PYTHON'
 import logging
