@@ -14,6 +14,7 @@ from posteriors import a_posterior, changed
 from vegglue.cli.ensemble_commands import _in_short
 from vegglue.cli.output import command_line
 from vegglue.cli.tables import show_diagnosis, show_ladder, show_questions
+from vegglue.results.verdict import UncertainBetweenSections
 from vegglue.workflow.compare import Comparison
 
 
@@ -50,13 +51,16 @@ def test_that_no_measurement_is_proposed_claims_no_more_than_was_weighed(capsys:
 
 def test_what_a_run_found_is_a_short_line_each() -> None:
     """It ended in one paragraph of up to 200 words, without a word on phi at its bound."""
-    first, last = a_diagnosis(), a_diagnosis(verdict={"sentence": "Nothing stands out (chi2 is 29), but it may (4%)."})
+    unsure = {"kind": "cannot-tell", "effects": (), "places": (), "reasons": (UncertainBetweenSections(1.5),)}
+    first, last = a_diagnosis(), a_diagnosis(verdict=unsure)
     pressed = {name: np.array([name == "phi", False]) for name in ("n_b", "phi")}
     posterior = changed(a_posterior(False), bound_hit=pressed)
     of, child = SimpleNamespace(name="brook"), SimpleNamespace(name="brook-wind")
     extension = SimpleNamespace(sentence="Missing: wind (of 0.3; which blows).", reason="Added: wind.")
     lines = _in_short(extension, [(of, first), (child, last), (child, posterior)])
-    assert lines[:3] == ["Missing: wind.", "Added: wind.", "With that: Nothing stands out, but it may (4%)."]
+    assert lines[:2] == ["Missing: wind.", "Added: wind."]
+    assert "1.5 times" in lines[2]
+    assert "(chi2" not in lines[2]
     assert lines[3].startswith("phi ends at a bound of its prior, and the bound, not the data, ends the range")
     assert len(lines) == 4
 

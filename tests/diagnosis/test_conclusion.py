@@ -1,66 +1,54 @@
-"""What a diagnosis concludes is told in the units that its words say."""
+"""What a diagnosis concludes beside the verdict: errors, misfit, amplitudes, significant effects, and where it lies."""
 
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
+import pandas as pd
 import pytest
 from diagnoses import NOTHING, a_candidate_effect, an_anomaly, candidate_laws_of
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
-from verdicts import inputs, step
+from verdicts import step
 
 from vegglue.calibration.candidates import with_effect
 from vegglue.calibration.noise import with_correlation, with_grid_error
 from vegglue.calibration.residual_screening import Screening
+from vegglue.case.frame import Frame
 from vegglue.case.parameter_space import theta_at
+from vegglue.case.schema import Case, EffectEntry
+from vegglue.case.site_schema import CentrelineShape
 from vegglue.decision_constants import constants
 from vegglue.diagnosis import conclusion
 from vegglue.diagnosis.child_config import candidate_at
-from vegglue.diagnosis.conclusion import estimated_errors, misfit_of, significant_effects
+from vegglue.diagnosis.conclusion import (
+    estimated_errors,
+    mapped_places,
+    measured_stretch,
+    misfit_of,
+    named_places,
+    significant_effects,
+)
 from vegglue.diagnosis.search_state import SearchState, Undecided
+from vegglue.results.causes import Rival
+from vegglue.results.verdict import MeasuredStretch, PlacesOnMap
+
+WEST, EAST = CASE_OF_TWINS.grid.x
 
 
-@pytest.mark.parametrize(("kinds", "told"), [(("velocity", "discharge"), 0.001), (("level", "discharge"), np.nan)])
-def test_the_error_of_the_grid_is_that_of_velocities(kinds: tuple[str, str], told: float) -> None:
-    """With discharges, wrong by 0.02 m3/s, and levels beside them the mean of all was told as one of mm/s."""
+@pytest.mark.parametrize(("kinds", "error"), [(("velocity", "discharge"), 0.001), (("level", "discharge"), np.nan)])
+def test_the_error_of_the_grid_is_that_of_velocities(kinds: tuple[str, str], error: float) -> None:
+    """With discharges, wrong by 0.02 m3/s, and levels beside them the mean of all was reported as one of mm/s."""
     station = stations_of(CASE_OF_TWINS, ("A",), 4)
     station = station.assign(kind=np.resize(kinds, len(station)))
     base = at_best(CASE_OF_TWINS, station, np.zeros(len(station)), np.zeros((len(station), 2)))
     difference = np.where(station["kind"] == "velocity", 0.001, 0.02) / constants().grid_error_share
     screening: Any = SimpleNamespace(base=replace(base, noise=with_grid_error(base.noise, difference)))
-    assert estimated_errors(screening, SearchState()).grid_error == pytest.approx(told, nan_ok=True)
+    assert estimated_errors(screening, SearchState()).grid_error == pytest.approx(error, nan_ok=True)
 
 
-def test_where_a_law_takes_the_place_of_a_place_effects_are_those_of_the_model_without_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """They were those of the model with the place, beside scores, misfit and parameters of the one without."""
-    station = stations_of(CASE_OF_TWINS, ("A",), 4)
-    bases = [at_best(CASE_OF_TWINS, station, np.full(12, value), np.zeros((12, 4))) for value in (0.1, 0.2)]
-    first, last = (cast("Screening", SimpleNamespace(base=base)) for base in bases)
-    laws, make_verdict = candidate_laws_of("law_bank_speed_step", chance=0.99), []
-    stubs = {
-        "candidate_laws": lambda *_: laws, "candidate_effects_of": lambda one: {"wind": tested[one is first]},
-        "misfit_of": lambda *_: NOTHING.misfit, "_field": lambda *_: (None, None), "_first_screening": lambda _: None,
-        "_place_map": lambda *_: None, "_parameters": lambda *_: None,
-        "_inputs": lambda used, held, *_: make_verdict.append((used, held)) or inputs(),
-        "make_verdict": lambda *_: NOTHING.verdict,
-    }  # fmt: skip
-    tested = {
-        True: a_candidate_effect("wind", test={"score": 0.3}),
-        False: a_candidate_effect("wind", test={"score": 4.0}),
-    }
-    for name, stub in stubs.items():
-        monkeypatch.setattr(conclusion, name, stub)
-    held = SearchState(places=(an_anomaly(),), undecided=Undecided((), ()))
-    found = conclusion.assemble_diagnosis(first, last, held, {"wind": tested[False]}, None, lambda: None)
-    assert make_verdict == [(first, SearchState())]  # what competed beside the place was told beside the law
-    assert (found.places, found.candidate_effects) == ((), (tested[True],))
-
-
-def test_a_place_is_told_with_its_amplitude_in_the_last_model() -> None:
-    """The sentence told that of its refit, and the table of parameters that of the last calibration."""
+def test_a_place_comes_with_its_amplitude_in_the_last_model() -> None:
+    """The sentence held that of its refit, and the table of parameters that of the last calibration."""
     place = an_anomaly()
     one = candidate_at(CASE_OF_TWINS, place)
     case = with_effect(CASE_OF_TWINS, one, place.shapes)
@@ -72,7 +60,7 @@ def test_a_place_is_told_with_its_amplitude_in_the_last_model() -> None:
     assert found.interval95[0] < found.amplitude < found.interval95[1]
 
 
-def test_what_stands_out_in_the_last_model_is_kept_unless_it_is_in_it() -> None:
+def test_what_is_significant_in_the_last_model_is_kept_unless_it_is_in_it() -> None:
     """At the rate of the alarm beside what was accepted; what was accepted may be tested again."""
     chances = {"wind": 0.008, "elder": 0.02, "jet": 0.001}
     last: Any = SimpleNamespace(
@@ -84,8 +72,8 @@ def test_what_stands_out_in_the_last_model_is_kept_unless_it_is_in_it() -> None:
     assert significant_effects(last, SearchState(steps=(step("jet"),)), slack=1.0) == {}
 
 
-def test_a_misfit_is_told_in_the_errors_of_the_last_model() -> None:
-    """In those of the first it was told beside the errors of the last: nobody could say whose they were."""
+def test_a_misfit_is_in_the_errors_of_the_last_model() -> None:
+    """In those of the first it stood beside the errors of the last, and was in neither."""
     station = stations_of(CASE_OF_TWINS, ("A",), 4)
     base = at_best(CASE_OF_TWINS, station, np.full(12, 0.1), np.zeros((12, 4)))
     first, last = (
@@ -94,3 +82,89 @@ def test_a_misfit_is_told_in_the_errors_of_the_last_model() -> None:
     zones = misfit_of(cast("Screening", first), cast("Screening", last), ()).zones
     stated = misfit_of(cast("Screening", SimpleNamespace(base=base)), cast("Screening", SimpleNamespace(base=base)), ())
     assert 4.0 * zones["chi2"].to_numpy() == pytest.approx(stated.zones["chi2"].to_numpy())
+
+
+def on_a_map(frame: Frame | None, centreline: CentrelineShape | None = None) -> Case:
+    grid = CASE_OF_TWINS.grid.model_copy(update={"centreline": centreline})
+    return CASE_OF_TWINS.model_copy(update={"frame": frame, "grid": grid})
+
+
+@pytest.mark.parametrize(
+    ("frame", "centreline", "on_map"),
+    [
+        (None, None, None),
+        # Ten metres to the north, two to its left, which is west.
+        (Frame(origin=(155000.0, 463000.0), angle=90.0), None, (154998.0, 463010.0)),
+        (None, CentrelineShape(points=((5.0, 7.0), (25.0, 7.0), (65.0, 7.0))), (15.0, 9.0)),
+    ],
+)
+def test_a_place_lies_on_the_map_if_the_case_knows_one(
+    frame: Frame | None, centreline: CentrelineShape | None, on_map: tuple[float, float] | None
+) -> None:
+    found = list(mapped_places(on_a_map(frame, centreline), [(10.0, 2.0)]))
+    assert found == ([] if on_map is None else [PlacesOnMap(((10.0, 2.0, *map(pytest.approx, on_map)),))])
+    assert list(mapped_places(on_a_map(frame, centreline), [])) == []
+
+
+def test_places_named_are_those_found_or_else_those_that_compete() -> None:
+    rivals = (
+        Rival("a", "bed", 0.5, 1.0, 2.0, 0.1),
+        Rival("wind", "effect", 0.3),
+        Rival("probe", "probe", 0.1, 5.0, 1.0),
+    )
+    assert named_places([an_anomaly()], rivals) == [(33.0, -0.6)]
+    assert named_places([], rivals) == [(1.0, 2.0)]
+
+
+@pytest.mark.parametrize(
+    ("shares", "effects", "along"),
+    [
+        ((0.3, 0.5), ("streamlining",), ("streamlining",)),
+        ((0.3, 0.5), ("bank_vegetation", "secondary_current"), ("bank_vegetation", "secondary_current")),
+        ((0.3, 0.5), ("discharge_error", "streamlining"), ("streamlining",)),
+        ((0.3,), ("streamlining",), ("streamlining",)),
+        ((0.3, 0.85), ("streamlining",), ()),  # more than half of the channel
+        ((0.3, 0.5), ("discharge_error",), ()),  # acts at an end
+        ((0.3, 0.5), ("unlisted_object",), ()),  # at a place of its own
+        ((0.3, 0.5), (), ()),
+        ((), ("streamlining",), ()),
+    ],
+)
+def test_the_measured_stretch_is_noted_if_it_is_a_small_part(
+    shares: tuple[float, ...], effects: tuple[str, ...], along: tuple[str, ...]
+) -> None:
+    case = CASE_OF_TWINS.model_copy(update={"effects": {name: EffectEntry(values={}) for name in effects}})
+    x = [WEST + share * (EAST - WEST) for share in shares]
+    kinds = ["velocity"] * len(x) + ["level"] * 2
+    station = pd.DataFrame({"kind": kinds, "x": [*x, WEST, EAST], "used": True})
+    assert list(measured_stretch(case, station)) == (
+        [MeasuredStretch(x[0], x[-1], EAST - WEST, along)] if along else []
+    )
+    unused = station.assign(used=station["kind"] == "level")
+    assert list(measured_stretch(case, unused)) == []
+
+
+def test_with_a_law_instead_of_a_place_effects_are_those_of_the_model_without_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They were those of the model with the place, beside scores, misfit and parameters of the one without."""
+    station = stations_of(CASE_OF_TWINS, ("A",), 4)
+    bases = [at_best(CASE_OF_TWINS, station, np.full(12, value), np.zeros((12, 4))) for value in (0.1, 0.2)]
+    first, last = (cast("Screening", SimpleNamespace(base=base)) for base in bases)
+    laws, used = candidate_laws_of("law_bank_speed_step", chance=0.99), []
+    tested = {
+        True: a_candidate_effect("wind", test={"score": 0.3}),
+        False: a_candidate_effect("wind", test={"score": 4.0}),
+    }
+    stubs = {
+        "candidate_laws": lambda *_: laws, "candidate_effects_of": lambda one: {"wind": tested[one is first]},
+        "misfit_of": lambda *_: NOTHING.misfit, "_field": lambda *_: (None, None), "_first_screening": lambda _: None,
+        "_place_map": lambda *_: None, "_verdict": lambda *of, **_: used.append(of[:2]) or NOTHING.verdict,
+        "estimated_errors": lambda *_: NOTHING.errors, "_model_error": lambda *_: None,
+    }  # fmt: skip
+    for name, stub in stubs.items():
+        monkeypatch.setattr(conclusion, name, stub)
+    held = SearchState(places=(an_anomaly(),), undecided=Undecided((), ()))
+    found = conclusion.assemble_diagnosis(first, last, held, {"wind": tested[False]}, None, lambda: None)
+    assert used == [(first, SearchState())]  # what competed beside the place was named beside the law
+    assert (found.places, found.candidate_effects) == ((), (tested[True],))

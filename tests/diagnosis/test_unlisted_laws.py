@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from diagnoses import an_anomaly, candidate_laws_of
+from diagnoses import IMPLAUSIBLE, an_anomaly, candidate_laws_of
 
 from vegglue.case.config import load_case
 from vegglue.decision_constants import constants
@@ -69,7 +69,7 @@ def test_laws_compete_with_what_is_listed(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_their_alarm_keeps_its_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     assert suspected(monkeypatch, SearchState(), p=constants().law_alarm_rate) is None
-    assert suspected(monkeypatch, SearchState(absurd=("levels lie below the bed.",))) is None
+    assert suspected(monkeypatch, SearchState(implausible=(IMPLAUSIBLE,))) is None
 
 
 def test_beside_a_listed_effect_a_law_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import EVERY_KIND, NOTHING, a_candidate_effect, a_diagnosis
+from diagnoses import EVERY_KIND, NOTHING, a_candidate_effect, a_diagnosis, an_effect_found
 from drawings import off_the_sheet, points, texts
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
@@ -189,16 +189,16 @@ def crowded() -> Diagnosis:
             for zone in ("floor", "bank", "plants", "edge")]  # fmt: skip
     zones = pd.DataFrame(rows, columns=["experiment", "section", "zone"])
     zones = zones.assign(stations=3, mean=0.02, standard_error=0.004, chi2=np.linspace(1.0, 900.0, len(zones)))
-    sentence = f"Missing: {'; and '.join(names[:3])}, {8 * 'each of so and so much, '}"
     return a_diagnosis(
-        suspects, steps, verdict={"sentence": sentence}, misfit={"zones": zones},
+        suspects, steps, verdict={"effects": tuple(map(an_effect_found, names[:9])), "places": ()},
+        misfit={"zones": zones},
         first_screening={"scores": {}, "compared": tuple(names[:12]), "cosine": cosine},
     )  # fmt: skip
 
 
 SCREENS = {
     "usual": a_diagnosis(), "nothing": NOTHING, "alone": alone(a_diagnosis()),
-    "no location": replace(a_diagnosis(steps=(), verdict={"anomaly": None}), places=()), "every kind": EVERY_KIND,
+    "no location": replace(a_diagnosis(steps=(), verdict={"places": ()}), places=()), "every kind": EVERY_KIND,
 }  # fmt: skip
 
 
@@ -207,7 +207,7 @@ def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
     figure = draw_diagnosis(diagnosis, [])
     assert off_the_sheet(figure) == []
     verdict, zones, drag = diagnosis.verdict, diagnosis.misfit.zones, diagnosis.place_map
-    assert figure.get_suptitle() == f"{diagnosis.name}: {verdict.kind}. {verdict.sentence}"
+    assert " ".join(figure.get_suptitle().split()) == f"{diagnosis.name}: {verdict.kind}. {verdict.sentence}"
     scores, visible, alike, *rest = figure.axes
     assert {label.get_text().split()[0] for label in scores.get_yticklabels()} == {
         one.name for one in diagnosis.candidate_effects
@@ -225,8 +225,8 @@ def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
 
 
 def test_a_sentence_too_long_for_the_screen_is_broken() -> None:
-    told = "A sentence of many words that goes on " * 12
-    figure = draw_diagnosis(a_diagnosis(verdict={"sentence": told}), [])
+    many = tuple(an_effect_found(f"effect_{number}") for number in range(6))
+    figure = draw_diagnosis(a_diagnosis(verdict={"effects": many}), [])
     assert "\n" in figure.get_suptitle()
     assert off_the_sheet(figure) == []
 

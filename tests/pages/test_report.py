@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import NOTHING, a_diagnosis
+from diagnoses import NOTHING, a_diagnosis, an_effect_found
 from report_runs import MEMBERS, a_toy, kict, told_of, written
 
 from vegglue.errors import StorageError
@@ -212,14 +212,14 @@ def test_a_run_without_flow_fields_has_a_page(tmp_path: Path) -> None:
 
 
 def test_the_report_says_what_is_missing(tmp_path: Path) -> None:
-    found = a_diagnosis(verdict={"sentence": "Missing: eddies <b>or so</b>."})
+    found = a_diagnosis(verdict={"effects": (an_effect_found(title="<b>or so</b>"),)})
     toy = a_toy(tmp_path)
     run = replace(toy, diagnosis=told_of(toy, found))
     page = Page(text := written(run))
     assert page.open == []
     assert page.unlabelled == 0
     assert len(page.ids) == len(set(page.ids))
-    assert "Missing: eddies &lt;b&gt;or so&lt;/b&gt;." in text
+    assert "&lt;b&gt;or so&lt;/b&gt;" in text
     assert found.verdict.remarks[0] in text
     assert all(f"<b>{one.name}</b>" in text for one in found.candidate_effects)
     assert "Stations set aside" in text

@@ -20,7 +20,7 @@ ATTRIBUTES = {
     "flagged", "format", "freedom", "grid_error", "instruments", "laws", "left_over", "locations", "mapped_term",
     "model_error", "name", "not_excluded", "p_misfit", "parameters", "remarks", "scale", "sentence", "standing_out",
     "steps", "tells_laws",
-    "threshold", "verdict", "clears_the_model", "version", "where",
+    "threshold", "verdict", "verdict_value", "clears_the_model", "version", "where",
 }  # fmt: skip
 OF_STATIONS = [
     "experiment", "kind", "section", "x", "y", "value", "standard_error", "used", "reason", "depth", "device",
@@ -44,9 +44,9 @@ DATASETS = {
     "alike": ["name", "other", "cosine"],
 }
 IN_JSON = [
-    "verdict", "sentence", "left_over", "standing_out", "set", "groups", "not_excluded", "where", "effects", "steps",
-    "remarks", "chi2", "threshold", "noise", "flagged", "parameters", "first_parameters", "places", "instruments",
-    "field", "model_error", "laws", "zones",
+    "verdict", "sentence", "left_over", "verdict_value", "standing_out", "set", "groups", "not_excluded", "where",
+    "effects", "steps", "remarks", "chi2", "threshold", "noise", "flagged", "parameters", "first_parameters", "places",
+    "instruments", "field", "model_error", "laws", "zones",
 ]  # fmt: skip
 
 

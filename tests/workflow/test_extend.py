@@ -226,7 +226,7 @@ def test_a_law_that_stands_out_is_left_to_discover() -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
     found = replace(found_in(case, "none-of-these"), laws=candidate_laws_of("law_bank_speed_step"))
     assert "`vegglue discover` adds one" in in_words(case, found, Choice(((),), {}))
-    unlikely = replace(found, verdict=replace(found.verdict, kind="cannot-tell", tells_laws=False))
+    unlikely = replace(found, verdict=replace(found.verdict, kind="cannot-tell"))
     assert in_words(case, unlikely, Choice(((),), {})).endswith("the diagnosis cannot tell what is missing.")
 
 

@@ -195,7 +195,7 @@ def test_marks_of_every_kind() -> None:
     beside = replace(effect, amplitude=2.0)
     assert marks(an_answer(beside), alone)[0].holds is False
     location = an_anomaly(x=30.0, y=0.4)
-    nowhere = a_diagnosis(verdict={"kind": "none-of-these", "anomaly": location})
+    nowhere = a_diagnosis(verdict={"kind": "none-of-these", "places": (location,)})
     assert marks(an_answer(thing), nowhere)[0].found
 
 

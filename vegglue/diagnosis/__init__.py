@@ -2,5 +2,5 @@
 the library, and models side by side.
 
 May import: calibration, case, effects, engine, flow, inference, measurements, results, wording.
-Open first: diagnose.py, competition.py, verdict.py, case_check.py.
+Open first: diagnose.py, competition.py, conclusion.py, case_check.py.
 """

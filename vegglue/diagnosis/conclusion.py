@@ -37,6 +37,7 @@ from vegglue.measurements.section_discharge import mismatched_discharges
 from vegglue.results.causes import (
     TERMS_AT_PLACES,
     CandidateEffect,
+    CandidateLaws,
     FieldFound,
     FieldMapKept,
     LocalAnomaly,
@@ -51,6 +52,7 @@ from vegglue.results.verdict import (
     Note,
     PlacesOnMap,
     TooShallow,
+    Verdict,
     VerdictInputs,
     make_verdict,
 )
@@ -94,38 +96,7 @@ def assemble_diagnosis(
     field, field_map = (None, None) if likely else _field(first, last, found, misfit)
     base, before = last.base, first.base
     model_error = _model_error(last)
-    # Whether silence is earned is a question only if nothing was found.
-    silent = not (found.steps or found.places or found.undecided)
-    unseen = HeldOutErrors(float("nan"), 1.0)
-    if silent and held_out is not None:
-        unseen = held_out_errors(base, held_out)
-    beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
-    model = base.model
-    verdict = make_verdict(
-        VerdictInputs(
-            candidates=ranked,
-            errors=errors,
-            misfit=misfit.size,
-            steps=found.steps,
-            places=found.places,
-            instruments=found.instruments,
-            undecided=undecided,
-            implausible=found.implausible,
-            field=field,
-            laws=laws,
-            model_error=model_error,
-            not_excluded=() if found.implausible else not_excluded(last),
-            held_out=unseen.ratio,
-            by_chance=unseen.by_chance,
-            neighbours=_neighbours_excluded(last, found),
-            strained=_strained(last),
-            between=largest_error_between(base) if silent else 1.0,
-            carried=tuple(mismatched_discharges(model.case, model.site, model.station)),
-            significant_effects=beside,
-            remainder=bool(beside) and not significant_effects(last, found, found.slack),
-            surroundings=tuple(_surroundings(last, found, undecided)),
-        )
-    )
+    verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, held_out)
     return Diagnosis(
         name=before.model.case.name,
         version=VERSION,
@@ -155,6 +126,52 @@ def assemble_diagnosis(
     )
 
 
+def _verdict(
+    last: Screening,
+    found: SearchState,
+    ranked: tuple[CandidateEffect, ...],
+    misfit: Misfit,
+    errors: EstimatedErrors,
+    field: FieldFound | None,
+    laws: CandidateLaws | None,
+    model_error: ModelErrorUsed | None,
+    held_out: Model | None,
+) -> Verdict:
+    """The verdict on what was found, once all that it rests on is computed."""
+    # Whether silence is earned is a question only if nothing was found.
+    silent = not (found.steps or found.places or found.undecided)
+    unseen = HeldOutErrors(float("nan"), 1.0)
+    if silent and held_out is not None:
+        unseen = held_out_errors(last.base, held_out)
+    beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
+    model = last.base.model
+    return make_verdict(
+        VerdictInputs(
+            candidates=ranked,
+            errors=errors,
+            misfit=misfit.size,
+            steps=found.steps,
+            places=found.places,
+            instruments=found.instruments,
+            undecided=undecided,
+            implausible=found.implausible,
+            field=field,
+            laws=laws,
+            model_error=model_error,
+            not_excluded=() if found.implausible else not_excluded(last),
+            held_out=unseen.ratio,
+            by_chance=unseen.by_chance,
+            neighbours=_neighbours_excluded(last, found),
+            strained=_strained(last),
+            between=largest_error_between(last.base) if silent else 1.0,
+            carried=tuple(mismatched_discharges(model.case, model.site, model.station)),
+            significant_effects=beside,
+            remainder=bool(beside) and not significant_effects(last, found, found.slack),
+            surroundings=tuple(_surroundings(last, found, undecided)),
+        )
+    )
+
+
 def as_calibrated(place: LocalAnomaly, base: Baseline) -> LocalAnomaly:
     """The place with its amplitude in the last model, in which what was accepted after it is calibrated, too."""
     parameter = candidate_at(base.model.case, place).parameter
@@ -165,7 +182,7 @@ def as_calibrated(place: LocalAnomaly, base: Baseline) -> LocalAnomaly:
 def _surroundings(last: Screening, found: SearchState, undecided: Sequence[Rival]) -> Iterator[Note]:
     """Where the named places lie on the map, which part of the channel was measured, and whether it is too shallow."""
     case, station = last.base.model.case, last.base.model.station
-    yield from places_on_map(case, named_places(found.places, undecided))
+    yield from mapped_places(case, named_places(found.places, undecided))
     yield from measured_stretch(case, station)
     if not any(one.x.size for one in last.fingerprints.places):
         yield TooShallow(LEAST_DEPTH)
@@ -177,7 +194,7 @@ def named_places(places: Sequence[LocalAnomaly], undecided: Sequence[Rival]) -> 
     return [(one.x, one.y) for one in places or rivals]
 
 
-def places_on_map(case: Case, places: Sequence[tuple[float, float]]) -> Iterator[PlacesOnMap]:
+def mapped_places(case: Case, places: Sequence[tuple[float, float]]) -> Iterator[PlacesOnMap]:
     """Where places along and across the channel [m] lie on the map; none if the case knows no map."""
     line, frame = centreline_in(case), case.frame
     if not places or (line is None and frame is None):

@@ -65,11 +65,11 @@ class MeasurementWorth:
     then: Array
 
 
-Rival = tuple[Candidate, dict[str, float], float]
+Explanation = tuple[Candidate, dict[str, float], float]
 
 
 def worth_of_measurements(
-    model: Model, noise: Noise, here: Point, questions: Sequence[Sequence[Rival]]
+    model: Model, noise: Noise, here: Point, questions: Sequence[Sequence[Explanation]]
 ) -> list[list[MeasurementWorth]]:
     """For each question the worth of all plans; a question is a few rivals to be told apart, or one effect to be told
     from calibration: (effect, shapes, gain (amplitude - off)^power). here: the calibrated model.

@@ -2,5 +2,5 @@
 resumes.
 
 May import: case, effects, flow, measurements, wording.
-Open first: ensemble.py, posterior.py, diagnosis.py, result_files.py.
+Open first: verdict.py, diagnosis.py, ensemble.py, posterior.py, result_files.py.
 """

@@ -121,12 +121,18 @@ def _field_group(diagnosis: Diagnosis) -> dict[str, Group]:
 
 
 def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Attributes of diagnosis.h5: numbers and words as they are, everything else as JSON."""
+    """Attributes of diagnosis.h5: numbers and words as they are, everything else as JSON.
+
+    The verdict is read from `verdict_value` alone; its other attributes are for other programs.
+    """
     verdict, misfit, errors = diagnosis.verdict, diagnosis.misfit, diagnosis.errors
     plain = {
         "name": diagnosis.name,
         "verdict": verdict.kind,
         "sentence": verdict.sentence,
+        "clears_the_model": verdict.clears_the_model,
+        "tells_laws": verdict.tells_laws,
+        "left_over": verdict.left_over,
         "verdict_value": json.dumps(tagged(verdict)),
         "chi2_first": misfit.chi2_first,
         "chi2": misfit.chi2,
@@ -141,6 +147,10 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
     }
     composed = {
         "steps": [asdict(step) for step in diagnosis.steps],
+        "where": None if verdict.anomaly is None else asdict(verdict.anomaly),
+        "remarks": verdict.remarks,
+        "not_excluded": verdict.not_excluded,
+        "standing_out": dict(verdict.significant_effects),
         "flagged": errors.flagged,
         "first_scores": diagnosis.first_screening.scores,
         "first_parameters": diagnosis.parameters.first,

@@ -58,14 +58,14 @@ def chance_in_words(chance: float) -> str:
     return "over 99%" if chance > 0.99 else f"{chance:.0%}"
 
 
-def odds_in_words(odds: float) -> str:
+def odds_in_digits(odds: float) -> str:
     """`30 to 1`, `1 to 3` below one, `over 1,000 to 1`."""
     if odds < 1.0:
         return f"1 to {1.0 / odds:.0f}" if odds > 0.001 else "1 to over 1,000"
     return "over 1,000 to 1" if odds > 1000 else f"{odds:.0f} to 1"
 
 
-def place_in_words(x: float, y: float) -> str:
+def place_in_digits(x: float, y: float) -> str:
     """`x = 14.3, y = 1.5`, without what is NaN."""
     return ", ".join(f"{name} = {in_digits(value, 4)}" for name, value in (("x", x), ("y", y)) if math.isfinite(value))
 

@@ -13,8 +13,8 @@ from vegglue.wording.numbers import (
     experiments_in_words,
     in_digits,
     listed,
-    odds_in_words,
-    place_in_words,
+    odds_in_digits,
+    place_in_digits,
     range_in_digits,
     section_in_words,
     so_many,
@@ -97,7 +97,7 @@ def macros() -> dict[str, Callable[..., str]]:
         "many": so_many,
         "duration": duration_in_short,
         "chance": chance_in_words,
-        "odds": odds_in_words,
+        "odds": odds_in_digits,
         "experiments": experiments_in_words,
         "range": range_in_digits,
         "percent": lambda share: f"{share:.0%}",
@@ -106,7 +106,7 @@ def macros() -> dict[str, Callable[..., str]]:
         "sentence": sentence,
         "digits_of_range": telling_digits,
         "section_at": section_in_words,
-        "place_at": place_in_words,
+        "place_at": place_in_digits,
         "tag_of": tag_of,
     }
     found: dict[str, Callable[..., str]] = {}

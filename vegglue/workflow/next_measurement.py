@@ -13,7 +13,7 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.candidate_effects import POWER_QUANTILE
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
 from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.diagnosis.next_measurement import MeasurementWorth, Rival, worth_of_measurements
+from vegglue.diagnosis.next_measurement import Explanation, MeasurementWorth, worth_of_measurements
 from vegglue.effects.grammar import LAWS
 from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
@@ -95,7 +95,7 @@ def with_places(base: Baseline, found: Diagnosis) -> Baseline:
     return for_prediction(baseline(replace(base.model, case=child), known))
 
 
-def _answers(what: str, rivals: Sequence[Rival], worths: Sequence[MeasurementWorth]) -> list[Question]:
+def _answers(what: str, rivals: Sequence[Explanation], worths: Sequence[MeasurementWorth]) -> list[Question]:
     """A question with what could be measured for it. Where nothing answers it and there are more than two rivals, those
     that something tells from all others follow.
     """
@@ -122,7 +122,7 @@ def _proposed(one: MeasurementWorth, now: float, then: float) -> ProposedMeasure
     return ProposedMeasurement(plan.name, plan.experiment, plan.x, plan.rows.size, plan.hours, float(now), float(then))
 
 
-def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
+def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Explanation]]]:
     """What the diagnosis leaves open, in words, and the rivals of each question; nothing of data that it doubts."""
     if found.verdict.doubts_the_data:
         return []
@@ -140,7 +140,7 @@ def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Rival]]]:
     return [question for one in strongest for question in _asked(case, found, [one.name])]
 
 
-def _between_rivals(case: Case, found: Diagnosis, step: Step) -> tuple[str, list[Rival]]:
+def _between_rivals(case: Case, found: Diagnosis, step: Step) -> tuple[str, list[Explanation]]:
     """The question of a step: to tell its effects from each other, and from a place that is likelier than they are."""
     names, rivals = [*step.rivals], rivals_of(case, found, step.rivals)
     if step.likelier_place:
@@ -151,7 +151,7 @@ def _between_rivals(case: Case, found: Diagnosis, step: Step) -> tuple[str, list
     return " from ".join(names), rivals
 
 
-def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Rival]]]:
+def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Explanation]]]:
     """One question: to tell effects from each other, or one of a plausible size from what calibration makes of it."""
     if len(names) > 1:
         return [(" from ".join(names), rivals_of(case, found, names))]
@@ -188,9 +188,9 @@ def _raw_trace(case: Case, found: Diagnosis, candidate_effect: CandidateEffect) 
     return length * amplitude.plausible_gain / gain / max(detectability.visibility, 1e-6)
 
 
-def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Rival]:
+def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Explanation]:
     """Effects of a diagnosis by name, at the size it found or a plausible one; laws at their size to first order."""
-    rivals: list[Rival] = []
+    rivals: list[Explanation] = []
     for candidate_effect in (one for one in found.candidate_effects if one.name in names):
         candidate = candidate_named(case, found.predictions.station, candidate_effect.name)
         amplitude = candidate.effect.amplitude
