@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from channels import family, river, solved
 
-from vegglue.flow.chord import LONGEST_CORRECTION, ChordSolution, Patience, chord, is_near_enough, stream
+from vegglue.flow.chord import LONGEST_CORRECTION, ChordSolution, IterationLimits, chord, is_near_enough, stream
 from vegglue.flow.jacobian import Factors, factors
 from vegglue.flow.newton import finish
 from vegglue.flow.problem import Problem, take
@@ -33,7 +33,7 @@ def test_members_pass_through_few_lanes_as_they_would_all_at_once():
             assert member not in found
             found[int(member)] = bool(ended.converged[lane]), ended.state[..., lane]
 
-    stream(batch, np.arange(11)[::-1], starts_of, shared, 1e-9, Patience(25), 4, note)
+    stream(batch, np.arange(11)[::-1], starts_of, shared, 1e-9, IterationLimits(25), 4, note)
     assert sorted(found) == list(range(11))
     assert sum(entered) == 11
     assert max(entered) <= 4
@@ -61,7 +61,7 @@ def test_who_enters_the_lane_of_one_that_strayed_is_not_spoilt():
     def note(members: np.ndarray, ended: ChordSolution) -> None:
         found.update(zip(members.tolist(), ended.converged.tolist(), strict=True))
 
-    stream(batch, np.arange(6), lambda some: start[..., some], shared, 1e-8, Patience(25), 3, note)
+    stream(batch, np.arange(6), lambda some: start[..., some], shared, 1e-8, IterationLimits(25), 3, note)
     assert found == {0: False, 1: False, 2: True, 3: True, 4: True, 5: True}
 
 
@@ -97,7 +97,7 @@ def test_one_lane_serves_all():
         lambda some: np.repeat(centre, len(some), axis=3),
         shared,
         1e-8,
-        Patience(40),
+        IterationLimits(40),
         1,
         lambda members, end: ends.extend(members[end.converged]),
     )
@@ -115,7 +115,9 @@ def test_who_waits_alone_enters_while_others_are_at_work():
         asked.append((len(some), len(done)))
         return np.repeat(centre, len(some), axis=3)
 
-    stream(batch, np.arange(5), starts_of, shared, 1e-9, Patience(60), 4, lambda members, end: done.extend(members))
+    stream(
+        batch, np.arange(5), starts_of, shared, 1e-9, IterationLimits(60), 4, lambda members, end: done.extend(members)
+    )
     assert len(set(together.iterations)) > 1, "else all end at once"
     assert asked[1][0] == 1
     assert asked[1][1] < 4
@@ -134,7 +136,14 @@ def test_who_falls_behind_is_not_waited_for():
 
         start = np.repeat(centre, 11, axis=3)
         stream(
-            batch, np.arange(11), lambda some, start=start: start[..., some], shared, 1e-9, Patience(60, pace), 4, note
+            batch,
+            np.arange(11),
+            lambda some, start=start: start[..., some],
+            shared,
+            1e-9,
+            IterationLimits(60, pace),
+            4,
+            note,
         )
     behind = [member for member, (there, _, _) in ends[0.12].items() if not there]
     assert all(there for there, _, _ in ends[1.0].values())
@@ -166,7 +175,7 @@ def test_the_last_ones_wait_with_others_for_another_reference():
             lambda some, begin=begin: begin[..., some],
             shared,
             1e-9,
-            Patience(60, few=4),
+            IterationLimits(60, few=4),
             11,
             note,
         )

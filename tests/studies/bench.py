@@ -19,7 +19,7 @@ from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import parameters_at, sobol_sample
 from vegglue.case.prior import sample_prior, sobol_points
-from vegglue.flow.batch import MEMBER_LANES, solve_members
+from vegglue.flow.batch import MEMBER_SLOTS, solve_members
 from vegglue.flow.equations import faces
 from vegglue.flow.march import advance, march
 from vegglue.flow.parameter_metric import clusters, parameter_metric
@@ -42,7 +42,7 @@ PHASES = {
     "block_elimination.factor": "factorisation",
     "block_elimination.solve": "back-substitution",
     "anderson.next_state": "Anderson mixing",
-    "batch._starts": "starts from solved neighbours",
+    "batch.starts_of": "starts from solved neighbours",
 }
 PAPER_STEPS = 6000
 SAMPLE = 128
@@ -116,21 +116,21 @@ def steady(case) -> float:  # type: ignore[no-untyped-def]
 
 
 def roofline(case) -> None:  # type: ignore[no-untyped-def]
-    """A chord step of MEMBER_LANES members by flops and bytes, beside what this core and its memory give."""
-    problem = build_problem(case, build_site(case), "D3a", sample_prior(case.parameters, MEMBER_LANES, 1))
+    """A chord step of MEMBER_SLOTS members by flops and bytes, beside what this core and its memory give."""
+    problem = build_problem(case, build_site(case), "D3a", sample_prior(case.parameters, MEMBER_SLOTS, 1))
     solution, shared, band = settled(take(problem, np.array([0])), None, 1e-6)
     assert shared is not None
-    part, state = crop(problem, *band), np.repeat(solution.state, MEMBER_LANES, axis=3)
+    part, state = crop(problem, *band), np.repeat(solution.state, MEMBER_SLOTS, axis=3)
     rates = eased(part, state, shared.slope, part.boundaries.outlet)
     residual = shortest(lambda: eased(part, state, shared.slope, part.boundaries.outlet))
     solve = shortest(lambda: shared.step(rates))
     nx, _, n, _ = shared.columns.shape
-    block, right = np.ones((n, n), np.float32), np.ones((n, MEMBER_LANES), np.float32)
-    flops, moved = 2.0 * shared.columns.size * MEMBER_LANES, shared.columns.nbytes + 3 * nx * right.nbytes
+    block, right = np.ones((n, n), np.float32), np.ones((n, MEMBER_SLOTS), np.float32)
+    flops, moved = 2.0 * shared.columns.size * MEMBER_SLOTS, shared.columns.nbytes + 3 * nx * right.nbytes
     product = shortest(lambda: [block @ right for _ in range(nx)])
     copied = shortest(lambda: shared.columns.copy())
     print(
-        f"a chord step of {MEMBER_LANES} members, one core: residual {1e3 * residual:.0f} ms, "
+        f"a chord step of {MEMBER_SLOTS} members, one core: residual {1e3 * residual:.0f} ms, "
         f"{residual / rates.size * 3e9:.0f} ns a cell and member; solve {1e3 * solve:.0f} ms, "
         f"{flops / solve / 1e9:.0f} Gflop/s (products of its size in cache: {flops / 3 / product / 1e9:.0f}), "
         f"{moved / solve / 1e9:.1f} GB/s (a copy of its factors: {2 * shared.columns.nbytes / copied / 1e9:.1f})"

@@ -1,4 +1,4 @@
-"""Members solved together: cut into clusters of neighbours, each with a reference member whose factors serve all.
+"""Batch solver: members are cut into clusters of neighbours, each with a reference member whose factors serve all.
 
 Members are points s (m, d) of the unit cube (prior probabilities); how near they are, `parameter_metric` says.
 """
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.compilation import compiled
-from vegglue.flow.chord import ChordSolution, Patience, stream
+from vegglue.flow.chord import ChordSolution, IterationLimits, stream
 from vegglue.flow.march import USUAL_FALL_BACK, FallBack
 from vegglue.flow.parameter_metric import (
     ParameterMetric,
@@ -32,6 +32,21 @@ from vegglue.flow.reference_member import (
 )
 from vegglue.flow.status import FAILED, SOLVED_BY_NEWTON
 from vegglue.flow.wet_band import overflows, rows_inside, walled
+
+# Members that one factorisation serves at most: chosen, not measured; in a sketch of the solver one served 16 in 3 to 8
+# steps each. Fewer cost more factorisations, more take more steps.
+CLUSTER_SIZE = 64
+# Members solved side by side: 3 to 5 % more of them a second than with 16; with 32 no more.
+MEMBER_SLOTS = 24
+# Steps after which a member waits for a nearer reference: of an ensemble of 5,000 members 42 take more (DECISIONS).
+MOST_CHORD_STEPS = 30
+# How far tangents reach, in coordinates [-]: on the way to four chunks Newton had to help twice with 0.3, once with
+# 0.2, and not with 0.14, which takes more strides.
+STRIDE = 0.2
+# The correction [m, m/s] to which members on the way are solved: chosen, not measured. They only lead on.
+STRIDE_TOLERANCE = 1e-3
+# Solved members that a start is drawn from: chosen, not measured. Splines through more cost more than they help.
+SPLINE_MEMBERS = 48
 
 
 @compiled
@@ -80,27 +95,18 @@ def put_rows(
                     target[j] = last
 
 
-# Members that one factorisation serves at most: chosen, not measured; in a sketch of the solver one served 16 in 3 to 8
-# steps each. Fewer cost more factorisations, more take more steps.
-CLUSTER_SIZE = 64
-# Members solved side by side: 3 to 5 % more of them a second than with 16; with 32 no more.
-MEMBER_LANES = 24
-# Steps after which a member waits for a nearer reference: of an ensemble of 5,000 members 42 take more (DECISIONS).
-MOST_CHORD_STEPS = 30
-# How far tangents reach, in coordinates [-]: on the way to four chunks Newton had to help twice with 0.3, once with
-# 0.2, and not with 0.14, which takes more strides.
-STRIDE = 0.2
-# The correction [m, m/s] to which members on the way are solved: chosen, not measured. They only lead on.
-STRIDE_TOLERANCE = 1e-3
-# Solved members that a start is drawn from: chosen, not measured. Splines through more cost more than they help.
-SPLINE_MEMBERS = 48
-
-
 @dataclass(frozen=True)
 class SolvedMembers:
-    """Members in the order asked for: states (nx, 3, ny, m), each in one piece of memory, and how each was reached.
+    """Members in the order of their problem, filled in place while they are solved.
 
-    Their entries are filled in place while they are solved.
+    Parameters
+    ----------
+    state
+        (nx, 3, ny, m), each member in one piece of memory.
+    status, reason
+        How each ended (m,), see `status`, and why if it failed.
+    iterations
+        Newton and chord steps of each (m,).
     """
 
     state: Array
@@ -112,7 +118,7 @@ class SolvedMembers:
 @dataclass(frozen=True)
 class _Batch:
     """What members are solved with: their problem, that of members at any points, how near they are, the largest
-    correction [m, m/s] a solved one may still ask for, and how they are marched where Newton fails.
+    correction [m, m/s] a solved one may still need, and how they are marched if Newton fails.
     """
 
     problem: Problem
@@ -130,19 +136,56 @@ def solve_members(
     start_from: LinearisedMember | None = None,
     how: FallBack = USUAL_FALL_BACK,
 ) -> SolvedMembers:
-    """Steady states of all members of a problem; one does not depend on who else is asked for, beyond `tolerance`.
+    """Steady states of all members: R(x) = 0 for each, cluster by cluster.
 
-    points (m, d): where they are in the unit cube; problem_of: the problem of members at other points; start_from: a
-    member to come from, a rough estimate if not given; how: what to do where Newton fails.
+    A member is solved with the factors of the central member of its cluster, and where these fail with those of another
+    member; its state does not depend on the others beyond `tolerance`.
+
+    Parameters
+    ----------
+    problem
+        Of all m members.
+    points
+        Where they are in the unit cube of prior probabilities (m, d).
+    problem_of
+        The problem of members at other points (n, d).
+    tolerance
+        Largest correction [m, m/s] of a solved member, see `chord`.
+    start_from
+        A member to begin from; a rough estimate if None.
+    how
+        How members are marched if Newton fails.
+
+    Returns
+    -------
+    SolvedMembers
+        NaN for members that have no steady state.
     """
     solved = none_solved(problem)
     linearised = [] if start_from is None else [start_from]
     metric = parameter_metric(points, [one.slopes for one in linearised])
     batch = _Batch(problem, problem_of, metric, tolerance, how)
-    found = clusters(metric.coordinates, CLUSTER_SIZE)
-    central = [_central_member(metric.coordinates, cluster) for cluster in found]
-    for cluster, first, following in zip(found, central, [*central[1:], None], strict=True):
-        _solve_cluster(batch, cluster, first, following, solved, linearised)
+    coordinates = metric.coordinates
+    found = clusters(coordinates, CLUSTER_SIZE)
+    central = [int(nearest_members(coordinates, cluster, coordinates[cluster].mean(axis=0), 1)[0]) for cluster in found]
+    for cluster, first, next_central in zip(found, central, [*central[1:], None], strict=True):
+        pending, member, following = cluster, first, next_central
+        while True:
+            reference = _reference_for(batch, member, solved, linearised)
+            pending = pending[pending != member]
+            if reference.linearised is not None:
+                linearised.append(reference.linearised)
+                queue = farthest_first(coordinates, pending, coordinates[member])
+                if following is not None:  # last, when the members that its start is drawn from are solved
+                    queue = np.insert(queue, max(queue.size - MEMBER_SLOTS, 0), following)
+                _solve_queue(batch, queue, reference, solved)
+                pending, following = pending[solved.status[pending] == FAILED], None
+            if not pending.size:
+                break
+            reached, member = np.flatnonzero(solved.status != FAILED), int(pending[0])
+            if reached.size:  # the one nearest to a solved one
+                apart = coordinates[pending][:, None] - coordinates[reached][None]
+                member = int(pending[np.argmin((apart**2).sum(axis=2).min(axis=1))])
     solved.state[..., solved.status == FAILED] = np.nan
     return solved
 
@@ -154,54 +197,25 @@ def none_solved(problem: Problem) -> SolvedMembers:
     return SolvedMembers(state, np.full(m, FAILED), [""] * m, np.zeros(m, dtype=np.int64))
 
 
-def _solve_cluster(
-    batch: _Batch,
-    cluster: np.ndarray,
-    first: int,
-    following: int | None,
-    solved: SolvedMembers,
-    linearised: list[LinearisedMember],
-) -> None:
-    """Solve a cluster and the central member of the following one: with the factors of its own central member, then
-    with those of one after the other of the members still left.
-    """
-    pending, member = cluster, first
-    while True:
-        reference = _reference_for(batch, member, solved, linearised)
-        pending = pending[pending != member]
-        if reference.linearised is not None:
-            linearised.append(reference.linearised)
-            _solve_queue(batch, _queue(batch.metric, pending, member, following), reference, solved)
-            pending, following = pending[solved.status[pending] == FAILED], None
-        if not pending.size:
-            return
-        member = _next_reference(batch.metric.coordinates, pending, _reached(solved))
-
-
-def _central_member(coordinates: Array, cluster: np.ndarray) -> int:
-    return int(nearest_members(coordinates, cluster, coordinates[cluster].mean(axis=0), 1)[0])
-
-
-def _next_reference(coordinates: Array, pending: np.ndarray, reached: np.ndarray) -> int:
-    """Which of those pending is the next reference: the one nearest to a solved one, if there is any."""
-    if not reached.size:
-        return int(pending[0])
-    distance = ((coordinates[pending][:, None] - coordinates[reached][None]) ** 2).sum(axis=2).min(axis=1)
-    return int(pending[np.argmin(distance)])
-
-
 def _reference_for(
     batch: _Batch, member: int, solved: SolvedMembers, linearised: list[LinearisedMember]
 ) -> ReferenceMember:
     """A member as reference, kept in `solved`: its factors if the cluster before solved it, else reached from those
-    linearised so far.
+    linearised so far, in strides if they are far, or from the nearest solved member along the nearest tangents.
     """
-    point, problem = batch.metric.points[member], take(batch.problem, np.array([member]))
+    metric, point, problem = batch.metric, batch.metric.points[member], take(batch.problem, np.array([member]))
     if solved.status[member] == SOLVED_BY_NEWTON:
         return reference_at(batch.problem_of, problem, point, solved.state[..., member : member + 1])
     reference, spent = _reached_by_strides(batch, problem, point, linearised)
     if reference is None:
-        warm = _warm_start(batch.metric, member, solved, linearised)
+        warm = None
+        if linearised:
+            tangents, reached = _nearest_linearised(metric, point, linearised), np.flatnonzero(solved.status != FAILED)
+            if reached.size:
+                start = int(nearest_members(metric.coordinates, reached, metric.coordinates[member], 1)[0])
+                state = solved.state[..., start : start + 1]
+                tangents = replace(tangents, point=metric.points[start], state=state)
+            warm = tangents.predict(point[None])
         reference = solve_reference(batch.problem_of, problem, point, warm, batch.tolerance, batch.fall_back)
         spent += reference.iterations
     solved.iterations[member] += spent
@@ -210,25 +224,16 @@ def _reference_for(
     return reference
 
 
-def _queue(metric: ParameterMetric, pending: np.ndarray, reference: int, following: int | None) -> np.ndarray:
-    """Those pending around a reference, with the last of them the central member of the following cluster: what starts
-    lean on is then solved.
-    """
-    queue = farthest_first(metric.coordinates, pending, metric.coordinates[reference])
-    return queue if following is None else np.insert(queue, max(queue.size - MEMBER_LANES, 0), following)
-
-
-def _reached(solved: SolvedMembers) -> np.ndarray:
-    """Members solved so far, by whatever way."""
-    return np.flatnonzero(solved.status != FAILED)
-
-
 def _solve_queue(batch: _Batch, queue: np.ndarray, reference: ReferenceMember, solved: SolvedMembers) -> None:
-    """Solve a queue of members with the factors of a reference and keep those in `solved` that neither fail nor outgrow
-    its band.
+    """Solve a queue of members with the factors of a reference; those that converge within its band stand in `solved`.
+
+    A member starts from cubic splines through the solved ones nearest to the reference; from its tangents while these
+    are too few, or lie in a plane.
     """
+    linearised, band, metric = reference.linearised, reference.band, batch.metric
     assert reference.factors is not None
-    part, band, ny = crop(batch.problem, *reference.band), reference.band, solved.state.shape[2]
+    assert linearised is not None
+    part, ny, coordinates = crop(batch.problem, *band), solved.state.shape[2], metric.coordinates
 
     def keep(members: np.ndarray, ended: ChordSolution) -> None:
         solved.iterations[members] += ended.iterations
@@ -237,26 +242,17 @@ def _solve_queue(batch: _Batch, queue: np.ndarray, reference: ReferenceMember, s
         put_rows(np.moveaxis(solved.state, -1, 0), members, good, ended.state, *band)
 
     def starts_of(members: np.ndarray) -> Array:
-        return _starts(batch.metric, reference, solved, members)
+        by_newton = np.flatnonzero(solved.status == SOLVED_BY_NEWTON)
+        near = nearest_members(coordinates, by_newton, linearised.point @ metric.axes, SPLINE_MEMBERS)
+        weights = None
+        if near.size >= 3 * (coordinates.shape[1] + 1):
+            weights = spline_weights(coordinates[near], coordinates[members], "cubic", 1)
+        if weights is None:
+            return rows_inside(linearised.predict(metric.points[members]), band)
+        return walled(blend(np.moveaxis(solved.state, -1, 0), near, weights, *band))
 
-    patience = Patience(MOST_CHORD_STEPS)
-    stream(part, queue, starts_of, reference.factors, batch.tolerance, patience, MEMBER_LANES, keep)
-
-
-def _starts(metric: ParameterMetric, reference: ReferenceMember, solved: SolvedMembers, members: np.ndarray) -> Array:
-    """Cubic splines through the solved members nearest to the reference, its tangents while there are too few, or
-    these lie in a plane; in its band.
-    """
-    assert reference.linearised is not None
-    coordinates = metric.coordinates
-    by_newton = np.flatnonzero(solved.status == SOLVED_BY_NEWTON)
-    near = nearest_members(coordinates, by_newton, reference.linearised.point @ metric.axes, SPLINE_MEMBERS)
-    weights = None
-    if near.size >= 3 * (coordinates.shape[1] + 1):
-        weights = spline_weights(coordinates[near], coordinates[members], "cubic", 1)
-    if weights is None:
-        return rows_inside(reference.linearised.predict(metric.points[members]), reference.band)
-    return walled(blend(np.moveaxis(solved.state, -1, 0), near, weights, *reference.band))
+    limits = IterationLimits(MOST_CHORD_STEPS)
+    stream(part, queue, starts_of, reference.factors, batch.tolerance, limits, MEMBER_SLOTS, keep)
 
 
 def _reached_by_strides(
@@ -266,12 +262,16 @@ def _reached_by_strides(
     the last and added to `linearised`, and iterations spent; none if it is near, or could not be reached.
     """
     metric, spent = batch.metric, 0
+
+    def distance_from(other: LinearisedMember) -> float:
+        return float(np.sqrt(squared_distances(target[None] @ metric.axes, other.point @ metric.axes)[0]))
+
     origin = _nearest_linearised(metric, target, linearised) if linearised else None
-    if origin is None or _distance(metric, target, origin) <= STRIDE:
+    if origin is None or distance_from(origin) <= STRIDE:
         return None, spent
     reference = reference_at(batch.problem_of, batch.problem_of(origin.point[None]), origin.point, origin.state)
     while reference.linearised is not None:
-        here, distance = reference.linearised, _distance(metric, target, reference.linearised)
+        here, distance = reference.linearised, distance_from(reference.linearised)
         last = distance <= STRIDE
         point = target if last else here.point + (target - here.point) * (STRIDE / distance)
         tolerance = batch.tolerance if last else max(batch.tolerance, STRIDE_TOLERANCE)
@@ -285,25 +285,6 @@ def _reached_by_strides(
     return None, spent
 
 
-def _distance(metric: ParameterMetric, point: Array, other: LinearisedMember) -> float:
-    return float(np.sqrt(squared_distances(point[None] @ metric.axes, other.point @ metric.axes)[0]))
-
-
 def _nearest_linearised(metric: ParameterMetric, point: Array, linearised: list[LinearisedMember]) -> LinearisedMember:
     coordinates = np.array([one.point for one in linearised]) @ metric.axes
     return linearised[int(np.argmin(squared_distances(coordinates, point @ metric.axes)))]
-
-
-def _warm_start(
-    metric: ParameterMetric, member: int, solved: SolvedMembers, linearised: list[LinearisedMember]
-) -> Array | None:
-    """From the nearest solved member, along the nearest tangents."""
-    if not linearised:
-        return None
-    point, reached = metric.points[member], _reached(solved)
-    tangents = _nearest_linearised(metric, point, linearised)
-    if reached.size == 0:
-        return tangents.predict(point[None])
-    start = int(nearest_members(metric.coordinates, reached, metric.coordinates[member], 1)[0])
-    moved = replace(tangents, point=metric.points[start], state=solved.state[..., start : start + 1])
-    return moved.predict(point[None])

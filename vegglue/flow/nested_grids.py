@@ -23,7 +23,7 @@ from vegglue.flow.batch import (
     none_solved,
     solve_members,
 )
-from vegglue.flow.chord import SIDE_BY_SIDE, ChordSolution, Patience, stream
+from vegglue.flow.chord import SIDE_BY_SIDE, ChordSolution, IterationLimits, stream
 from vegglue.flow.march import FallBack
 from vegglue.flow.newton import CLOSE
 from vegglue.flow.parameter_metric import metric_of_flows, nearest_members, spline_weights, squared_distances
@@ -123,7 +123,7 @@ def _solve_around(level: _Level, member: int, pending: np.ndarray, tolerance: fl
         return rows_inside(_starts(level, members), reference.band)
 
     deliver = partial(_delivered, level, part, reference.band)
-    patience = Patience(MOST_NESTED_STEPS, PACE, SIDE_BY_SIDE)
+    patience = IterationLimits(MOST_NESTED_STEPS, PACE, SIDE_BY_SIDE)
     stream(part, queue, starts_of, reference.factors, tolerance, patience, NESTED_LANES, deliver)
 
 

@@ -1,22 +1,22 @@
 """Steady states of one member: Newton with pseudo-time from afar, chord steps with its own factors at the end.
 
-Newton solves (D/dt + J) delta = -R, D the storage of each unknown, dt growing until it no longer matters (Kelley and
-Keyes 1998, doi:10.1137/S0036142996304796). However a member was reached, it is accepted on its own residual only: the
-largest correction J^-1 R, in m/s and m, is below the tolerance.
+Newton solves (D/dt + J) delta = -R, D the storage of each unknown, dt growing until it no longer matters. However a
+member was reached, it is accepted on its own residual only: the largest correction J^-1 R [m, m/s] is below the
+tolerance.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vegglue.arrays import Array, Single
+from vegglue.arrays import Array
 from vegglue.flow.chord import LONGEST_CORRECTION, ChordSolution, chord
 from vegglue.flow.equations import storage
 from vegglue.flow.jacobian import Factors, eliminate, factors, jacobian, solved
 from vegglue.flow.problem import LEVEL, Problem
 from vegglue.flow.thin_water import eased, slope_of_friction
 
-# Near enough [m, m/s] for chord steps to do the rest, and for neighbours to lean on factors made there: chosen, not
+# Near enough [m, m/s] for chord steps to do the rest, and for neighbours to use factors made there: chosen, not
 # measured. Factors made 0.3 m/s away from the root led 60 of 63 members of one cluster astray (DECISIONS).
 CLOSE = 2e-2
 # By how much the pseudo-time step grows after a correction below so much [m, m/s], the nearest first, and its longest
@@ -39,8 +39,8 @@ STEPS_PER_FACTORS, MOST_FACTORS = 14, 4
 class Beginning:
     """Iterations of Newton at most, and its first pseudo-time step [s].
 
-    Chosen, not measured: a longer first step saves iterations where the root is near, and is cut again, at a
-    factorisation each, where it is not; more iterations seldom find what another way finds at their price.
+    Chosen, not measured: a longer first step saves iterations near the root, and is cut again elsewhere, at a
+    factorisation each; more iterations seldom find what another way finds at their price.
     """
 
     most: int
@@ -51,26 +51,48 @@ class Beginning:
 FROM_AFAR, FROM_NEARBY, FROM_A_MARCH = Beginning(60, 10.0), Beginning(12, 200.0), Beginning(25, 50.0)
 
 
-def _stored(problem: Problem, state: Array) -> Single:
-    """dh/dz_s of each level, 1 for velocities: (nx, n)."""
-    nx, _, ny, _ = state.shape
-    stored = np.ones((nx, 3, ny), np.float32)
-    stored[:, LEVEL] = storage(problem, state[:, LEVEL])[..., 0]
-    return stored.reshape(nx, 3 * ny)
-
-
 def newton(problem: Problem, start: Array, tolerance: float, how: Beginning = FROM_AFAR) -> ChordSolution:
-    """One member (m = 1) from a start that may be far away."""
+    """x <- x - (D/dt + J)^-1 R(x), dt growing as corrections shrink: one member from a start that may be far away.
+
+    Parameters
+    ----------
+    problem
+        Of one member.
+    start
+        State (nx, 3, ny, 1).
+    tolerance
+        Largest correction [m, m/s] of a converged member.
+    how
+        Iterations and first pseudo-time step.
+
+    Returns
+    -------
+    ChordSolution
+        Not converged after `how.most` iterations, or if no cut of the step keeps it below LONGEST_CORRECTION.
+
+    References
+    ----------
+    Kelley and Keyes (1998), doi:10.1137/S0036142996304796.
+    """
     state, size, time_step = start, np.inf, how.time_step
+    nx, _, ny, _ = start.shape
     # Not at the outlet: levels of dry land there have no storage that would hold them while velocities are still far.
-    nowhere = np.zeros(start.shape[2], dtype=bool)
+    nowhere, diagonal = np.zeros(ny, dtype=bool), np.arange(3 * ny)
     for iteration in range(1, how.most + 1):
         slope = slope_of_friction(problem, state)
-        rates, columns_far = eased(problem, state, slope, nowhere), jacobian(problem, state)
-        stored = _stored(problem, state)
-        step, time_step = _bounded_step(rates, columns_far, stored, time_step)
-        size = float(np.abs(step).max())
-        if not size < LONGEST_CORRECTION:
+        rates, (columns, far) = eased(problem, state, slope, nowhere), jacobian(problem, state)
+        stored = np.ones((nx, 3, ny), np.float32)  # D: dh/dz_s of each level, 1 for velocities
+        stored[:, LEVEL] = storage(problem, state[:, LEVEL])[..., 0]
+        for _ in range(MOST_CUTS):
+            shifted = columns.copy()
+            shifted[:, 1, diagonal, diagonal] += stored.reshape(nx, 3 * ny) / np.float32(time_step)
+            eliminate(shifted, far)
+            step = -solved(shifted, far, rates)
+            size = float(np.abs(step).max())
+            if size < LONGEST_CORRECTION:
+                break
+            time_step /= CUT
+        else:
             return _alone(state, size, iteration, False)
         state = state + step
         if size < tolerance and time_step > min(STEADY_TIME_STEP, 1.0 / tolerance):
@@ -80,10 +102,28 @@ def newton(problem: Problem, start: Array, tolerance: float, how: Beginning = FR
     return _alone(state, size, how.most, False)
 
 
-def finish(problem: Problem, near: Array, tolerance: float) -> tuple[ChordSolution, Factors | None]:
-    """One member from a start near its root: chord steps, the factors renewed while they help (Shamanskii 1967).
+def _alone(state: Array, size: float, iterations: int, converged: bool) -> ChordSolution:
+    return ChordSolution(state, np.array([size]), np.array([iterations]), np.array([converged]))
 
-    The factors handed back are those of a state that lies within CLOSE of the root, or none if there was no root.
+
+def finish(problem: Problem, near: Array, tolerance: float) -> tuple[ChordSolution, Factors | None]:
+    """x <- x - M^-1 R(x), the factors M of J renewed while they help: one member from a start near its root.
+
+    Parameters
+    ----------
+    problem, near, tolerance
+        As in `newton`.
+
+    Returns
+    -------
+    ChordSolution
+        Where it ended.
+    Factors or None
+        Of J at a state within CLOSE of the root; None if no root was found.
+
+    References
+    ----------
+    Shamanskii (1967), Ukrainian Mathematical Journal 19, 133, not checked against it.
     """
     state, spent, largest = near, 0, np.inf
     for _ in range(MOST_FACTORS):
@@ -98,24 +138,3 @@ def finish(problem: Problem, near: Array, tolerance: float) -> tuple[ChordSoluti
             break
         state, largest = end.state, float(end.correction[0])
     return end, None
-
-
-def _bounded_step(
-    rates: Array, columns_far: tuple[Single, Single], stored: Single, time_step: float
-) -> tuple[Array, float]:
-    """-(D/dt + J)^-1 R with dt cut until no entry is as long as LONGEST_CORRECTION; the last one tried if none is."""
-    columns, far = columns_far
-    diagonal = np.arange(far.shape[1])
-    for _ in range(MOST_CUTS):
-        shifted = columns.copy()
-        shifted[:, 1, diagonal, diagonal] += stored / np.float32(time_step)
-        eliminate(shifted, far)
-        step = -solved(shifted, far, rates)
-        if np.abs(step).max() < LONGEST_CORRECTION:
-            break
-        time_step /= CUT
-    return step, time_step
-
-
-def _alone(state: Array, size: float, iterations: int, converged: bool) -> ChordSolution:
-    return ChordSolution(state, np.array([size]), np.array([iterations]), np.array([converged]))

@@ -1,4 +1,4 @@
-"""The problem of the flow, all that its equations need, and the layout of a state, what they are solved for.
+"""The flow problem: all that the shallow-water equations need, and the layout of a state.
 
     dh/dt + d(hu)/dx + d(hv)/dy = 0
     du/dt + u du/dx + v du/dy + g dz_s/dx + k |U| u - [dT_xx/dx + dT_xy/dy] / h = f        (v alike)
@@ -18,10 +18,10 @@ A state of m members is one array (nx, 3, ny, m): level at cell centres, v on th
 walls and side inflows set it), u on the east face of each cell.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,18 +33,13 @@ from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.flow.kernels import Bend
 
 LEVEL, ACROSS, ALONG = 0, 1, 2
-# An array (nx, ny, m) of something that is not there.
+# An array (nx, ny, m) of something that is absent.
 EMPTY = np.zeros((0, 0, 0))
-ProblemPart = TypeVar("ProblemPart", "BedFriction", "VegetatedCells", "SideWalls", "InflowSegment", "Boundaries")
 
 
 @dataclass(frozen=True)
 class BedFriction:
-    """Friction of the bed: class of each cell (nx, ny), law of each class (an index, see `bed_laws`), and its
-    coefficient for each member (class, m) [s m^(-1/3), m or m^1/2/s].
-
-    bank_argument_minimum: the floor of the bank law, below which 12 h/k_s is not let fall [-].
-    """
+    """Friction of the bed, see `bed_laws.class_drag` for its fields."""
 
     friction_class: NDArray[np.int64]
     law: NDArray[np.int64]
@@ -54,11 +49,7 @@ class BedFriction:
 
 @dataclass(frozen=True)
 class VegetatedCells:
-    """Vegetated cells (column, row), the law of each (an index into PLANT_LAWS), the share of each that plants cover
-    [-], and their values per cell and member: phi [-], h_d [m], C_b [m^1/2/s].
-
-    proportional: phi h/h_d in place of phi where plants stand out of the water.
-    """
+    """Friction of plants in their cells, see `plant_laws.plant_drag` for its fields; share: what they cover [-]."""
 
     column: NDArray[np.int64]
     row: NDArray[np.int64]
@@ -72,9 +63,10 @@ class VegetatedCells:
 
 @dataclass(frozen=True)
 class SideWalls:
-    """Rough vertical walls along the south and the north side of the grid: length of the wall over that of the cell
-    beside it, 1 on a straight grid, 0 where none stands, (nx,) [-], and c_w / dy of each member (m,), see
-    `wall_coefficient` [1/m]; all empty without such walls.
+    """Rough vertical walls along the south and the north side of the grid; all empty without such walls.
+
+    south, north: length of the wall over that of the cell beside it, 0 without a wall (nx,) [-]; rate: c_w / dy (m,)
+    [1/m], see `wall_coefficient`.
     """
 
     south: Array
@@ -87,10 +79,22 @@ SMOOTH_WALLS = SideWalls(np.zeros(0), np.zeros(0), np.zeros(0))
 
 @dataclass(frozen=True)
 class InflowSegment:
-    """Discharge [m3/s] of each member through the cells start..stop-1 of one side ('west', 'south' or 'north').
+    """An inflow through one side of the grid.
 
-    spread: what conveyance is multiplied by in each cell, (cell, m) or (cell, 1) [-]; along: through a side, velocity
-    along x over that through the side, the cotangent of the angle it joins at [-].
+    Parameters
+    ----------
+    side
+        "west", "south" or "north".
+    start, stop
+        It enters by the cells start .. stop - 1 of that side.
+    discharge
+        Q (m,) [m3/s].
+    by_conveyance
+        Whether Q is shared over its cells by h^(5/3), not evenly.
+    spread
+        Factor on the share of each cell (cell, m) or (cell, 1) [-].
+    along
+        Through a side: velocity along x over that through the side, the cotangent of the angle of the confluence [-].
     """
 
     side: str
@@ -117,13 +121,34 @@ class Boundaries:
 
 @dataclass(frozen=True)
 class Problem:
-    """One experiment for m members on one grid of cells dx by dy [m]: bed (nx, ny) [m], its friction, plants, eddy
-    viscosity (m,) [m2/s], boundaries, and the effects at work in the flow and its readings.
+    """One experiment for m members on one grid.
 
-    film: a tenth of it stays on dry land [m]; smallest_shear_depth: whether shear acts over the smallest depth of the
-    cells around a point, not the mean; bed_rise (nx, ny, m) or empty: by how much members' beds lie higher [m];
-    geometry: what effects see of the channel, none without effects; walls: friction of the sides of the grid; bend: the
-    curvature of a grid along a centreline, none of a straight one; half_range: of rows cut out, that of the whole.
+    Parameters
+    ----------
+    dx, dy
+        Size of a cell [m].
+    bed
+        Bed level (nx, ny) [m].
+    friction, plants, walls
+        Friction of bed, plants and sides of the grid.
+    viscosity
+        Eddy viscosity (m,) [m2/s].
+    boundaries
+        What enters and leaves.
+    film
+        A tenth of it stays on dry land [m].
+    smallest_shear_depth
+        Whether shear acts over the smallest depth of the cells around a point, not the mean.
+    bed_rise
+        By how much members' beds lie higher (nx, ny, m) [m], or empty.
+    effects
+        Effects in the flow and its readings.
+    geometry
+        What effects see of the channel; None without effects.
+    bend
+        Curvature of a grid along a centreline; None if it is straight.
+    half_range
+        Of rows that were cut out, `bed_half_range` of the whole grid; else empty.
     """
 
     dx: float
@@ -184,149 +209,137 @@ def stretch_of_cells(problem: Problem) -> Array:
 
 
 def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
-    """The same problem for some of its members (an index array; an index may repeat)."""
-    boundaries = _taken(problem.boundaries, members, "outlet_level", "lateral_inflow")
+    """The problem of some of its members; members: an index array, in which an index may repeat."""
+
+    def some(values: Array) -> Array:
+        return np.ascontiguousarray(values[..., members]) if values.shape[-1] else values  # nothing of what is empty
+
+    plants, boundaries = problem.plants, problem.boundaries
+    inflows = tuple(
+        replace(
+            one,
+            discharge=some(one.discharge),
+            spread=one.spread if one.spread.shape[-1] == 1 else some(one.spread),
+        )
+        for one in boundaries.inflows
+    )
     return replace(
         problem,
-        friction=_taken(problem.friction, members, "coefficient"),
-        plants=_taken(problem.plants, members, "phi", "canopy_height", "bare_chezy"),
-        viscosity=_some(problem.viscosity, members),
-        boundaries=replace(boundaries, inflows=tuple(_inflow_of(one, members) for one in boundaries.inflows)),
-        bed_rise=_some(problem.bed_rise, members),
-        walls=_taken(problem.walls, members, "rate"),
+        friction=replace(problem.friction, coefficient=some(problem.friction.coefficient)),
+        plants=replace(
+            plants,
+            phi=some(plants.phi),
+            canopy_height=some(plants.canopy_height),
+            bare_chezy=some(plants.bare_chezy),
+        ),
+        viscosity=some(problem.viscosity),
+        boundaries=replace(
+            boundaries,
+            inflows=inflows,
+            outlet_level=some(boundaries.outlet_level),
+            lateral_inflow=some(boundaries.lateral_inflow),
+        ),
+        bed_rise=some(problem.bed_rise),
+        walls=replace(problem.walls, rate=some(problem.walls.rate)),
         effects=tuple(
-            replace(active, values={name: _some(value, members) for name, value in active.values.items()})
+            replace(active, values={name: some(value) for name, value in active.values.items()})
             for active in problem.effects
         ),
     )
 
 
 def crop(problem: Problem, south: int, north: int) -> Problem:
-    """The rows south..north-1 of a problem, with walls beside them; inflows through a side cut off must not exist."""
+    """The rows south .. north - 1, with walls beside them; no inflow may enter through a side that is cut off."""
 
     def cut(values: Any) -> Any:
         return np.ascontiguousarray(values[:, south:north])
 
+    def of_rows(inflow: InflowSegment) -> InflowSegment:
+        if inflow.side != "west":
+            return inflow
+        start, stop = max(inflow.start, south), min(inflow.stop, north)
+        spread = inflow.spread[start - inflow.start : stop - inflow.start] if len(inflow.spread) > 1 else inflow.spread
+        return replace(inflow, start=start - south, stop=stop - south, spread=spread)
+
+    plants, boundaries, walls = problem.plants, problem.boundaries, problem.walls
+    inside = (plants.row >= south) & (plants.row < north)
+    names = ("column", "row", "law", "share", "phi", "canopy_height", "bare_chezy")
+    plants = replace(plants, **{name: getattr(plants, name)[inside] for name in names})
     return replace(
         problem,
         bed=cut(problem.bed),
         half_range=cut(problem.bed_half_range),
         friction=replace(problem.friction, friction_class=cut(problem.friction.friction_class)),
-        plants=_plants_between(problem.plants, south, north),
+        plants=replace(plants, row=plants.row - south),
         boundaries=replace(
-            problem.boundaries,
-            inflows=tuple(_inflow_between(one, south, north) for one in problem.boundaries.inflows),
-            outlet=problem.boundaries.outlet[south:north],
-            lateral_inflow=cut(problem.boundaries.lateral_inflow),
+            boundaries,
+            inflows=tuple(map(of_rows, boundaries.inflows)),
+            outlet=boundaries.outlet[south:north],
+            lateral_inflow=cut(boundaries.lateral_inflow),
         ),
         bed_rise=cut(problem.bed_rise),
-        walls=_walls_between(problem.walls, south == 0, north == problem.shape[1]),
+        walls=replace(  # land beside rows cut out does not drag
+            walls,
+            south=walls.south if south == 0 else np.zeros_like(walls.south),
+            north=walls.north if north == problem.shape[1] else np.zeros_like(walls.north),
+        ),
         geometry=None if problem.geometry is None else rows_of(problem.geometry, south, north),
         bend=None if problem.bend is None else problem.bend._replace(south=problem.bend.south + south * problem.dy),
     )
 
 
-def _some(values: Array, members: NDArray[np.int64]) -> Array:
-    """Some members of an array (.., m), in one piece of memory; nothing of what is not there."""
-    return np.ascontiguousarray(values[..., members]) if values.shape[-1] else values
-
-
-def _taken(part: ProblemPart, members: NDArray[np.int64], *names: str) -> ProblemPart:
-    """A part of a problem of which some fields (.., m) keep some members only."""
-    kept: dict[str, Any] = {name: _some(getattr(part, name), members) for name in names}
-    return replace(part, **kept)
-
-
-def _inflow_of(inflow: InflowSegment, members: NDArray[np.int64]) -> InflowSegment:
-    alike = inflow.spread.shape[-1] == 1
-    return _taken(inflow, members, "discharge") if alike else _taken(inflow, members, "discharge", "spread")
-
-
-def _inflow_between(inflow: InflowSegment, south: int, north: int) -> InflowSegment:
-    if inflow.side != "west":
-        return inflow
-    start, stop = max(inflow.start, south), min(inflow.stop, north)
-    spread = inflow.spread[start - inflow.start : stop - inflow.start] if len(inflow.spread) > 1 else inflow.spread
-    return replace(inflow, start=start - south, stop=stop - south, spread=spread)
-
-
-def _walls_between(walls: SideWalls, south: bool, north: bool) -> SideWalls:
-    """The walls of the sides that are kept; land beside rows cut out does not drag."""
-    return replace(
-        walls,
-        south=walls.south if south else np.zeros_like(walls.south),
-        north=walls.north if north else np.zeros_like(walls.north),
-    )
-
-
-def _plants_between(plants: VegetatedCells, south: int, north: int) -> VegetatedCells:
-    inside = (plants.row >= south) & (plants.row < north)
-    names = ("column", "row", "law", "share", "phi", "canopy_height", "bare_chezy")
-    kept = replace(plants, **{name: getattr(plants, name)[inside] for name in names})
-    return replace(kept, row=kept.row - south)
-
-
 def joined(problems: Sequence[Problem]) -> Problem:
-    """One problem with all members: what is alike, as the grid and its classes, is taken from the first."""
-    first = problems[0]
-    plants: dict[str, Any] = {
-        name: _side_by_side([getattr(one.plants, name) for one in problems])
-        for name in ("phi", "canopy_height", "bare_chezy")
-    }
-    return replace(
-        first,
-        friction=replace(first.friction, coefficient=_side_by_side([one.friction.coefficient for one in problems])),
-        plants=replace(first.plants, **plants),
-        viscosity=_side_by_side([one.viscosity for one in problems]),
-        boundaries=_boundaries([one.boundaries for one in problems], [one.members for one in problems]),
-        bed_rise=_where_any([one.bed_rise for one in problems], [one.members for one in problems]),
-        walls=replace(first.walls, rate=_side_by_side([one.walls.rate for one in problems])),
-        effects=_effects(problems),
-        geometry=next((one.geometry for one in problems if one.geometry is not None), None),
-    )
+    """Problems of one experiment on one grid as one, the members of each after those of the one before.
 
+    What is alike, as the grid and its classes, is that of the first; effects of each are off in members of all others.
+    """
+    first, members = problems[0], [one.members for one in problems]
+    start, total = np.cumsum([0, *members]), sum(members)
 
-def _boundaries(parts: Sequence[Boundaries], members: Sequence[int]) -> Boundaries:
-    inflows = zip(*(one.inflows for one in parts), strict=True)
-    return replace(
-        parts[0],
-        inflows=tuple(_inflow(alike, members) for alike in inflows),
-        outlet_level=_side_by_side([one.outlet_level for one in parts]),
-        lateral_inflow=_where_any([one.lateral_inflow for one in parts], members),
-    )
+    def together(parts: Iterable[Array]) -> Array:
+        return np.concatenate(list(parts), axis=-1)
 
+    def as_far_as_any(parts: Sequence[Array]) -> Array:
+        """Arrays (nx, ny, m), 0 of a problem without one; empty if none has one."""
+        shape = next((one.shape[:2] for one in parts if one.size), None)
+        if shape is None:
+            return EMPTY
+        return together(
+            one if one.size else np.zeros((*shape, count)) for one, count in zip(parts, members, strict=True)
+        )
 
-def _inflow(parts: Sequence[InflowSegment], members: Sequence[int]) -> InflowSegment:
-    cells = max(len(one.spread) for one in parts)
-    spread = [np.broadcast_to(one.spread, (cells, count)) for one, count in zip(parts, members, strict=True)]
-    return replace(parts[0], discharge=_side_by_side([one.discharge for one in parts]), spread=_side_by_side(spread))
-
-
-def _effects(problems: Sequence[Problem]) -> tuple[ActiveEffect, ...]:
-    """Effects of each problem, off in the members of all others."""
-    found, start, total = list[ActiveEffect](), 0, sum(one.members for one in problems)
-    for one in problems:
-        own = slice(start, start + one.members)
+    inflows = []
+    for alike in zip(*(one.boundaries.inflows for one in problems), strict=True):
+        cells = max(len(one.spread) for one in alike)
+        spread = [np.broadcast_to(one.spread, (cells, count)) for one, count in zip(alike, members, strict=True)]
+        inflows.append(replace(alike[0], discharge=together(one.discharge for one in alike), spread=together(spread)))
+    effects = []
+    for one, begin in zip(problems, start, strict=False):
         for active in one.effects:
             amplitude = active.effect.amplitude
             values = {name: np.full(total, value[0]) for name, value in active.values.items()}
             values[amplitude.name][:] = amplitude.off
             for name, value in active.values.items():
-                values[name][own] = value
-            found.append(replace(active, values=values))
-        start += one.members
-    return tuple(found)
-
-
-def _where_any(parts: Sequence[Array], members: Sequence[int]) -> Array:
-    """Arrays (nx, ny, m), 0 of a problem without one; empty where none has one."""
-    shape = next((one.shape[:2] for one in parts if one.size), None)
-    if shape is None:
-        return EMPTY
-    return _side_by_side(
-        [one if one.size else np.zeros((*shape, count)) for one, count in zip(parts, members, strict=True)]
+                values[name][begin : begin + one.members] = value
+            effects.append(replace(active, values=values))
+    return replace(
+        first,
+        friction=replace(first.friction, coefficient=together(one.friction.coefficient for one in problems)),
+        plants=replace(
+            first.plants,
+            phi=together(one.plants.phi for one in problems),
+            canopy_height=together(one.plants.canopy_height for one in problems),
+            bare_chezy=together(one.plants.bare_chezy for one in problems),
+        ),
+        viscosity=together(one.viscosity for one in problems),
+        boundaries=replace(
+            first.boundaries,
+            inflows=tuple(inflows),
+            outlet_level=together(one.boundaries.outlet_level for one in problems),
+            lateral_inflow=as_far_as_any([one.boundaries.lateral_inflow for one in problems]),
+        ),
+        bed_rise=as_far_as_any([one.bed_rise for one in problems]),
+        walls=replace(first.walls, rate=together(one.walls.rate for one in problems)),
+        effects=tuple(effects),
+        geometry=next((one.geometry for one in problems if one.geometry is not None), None),
     )
-
-
-def _side_by_side(parts: Sequence[Array]) -> Array:
-    return np.concatenate(parts, axis=-1)

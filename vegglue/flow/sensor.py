@@ -1,4 +1,4 @@
-"""What instruments would read in a computed flow, and how these readings answer to the state.
+"""What instruments would read in a computed flow, and how these readings change with the state.
 
 `READERS` has one entry for each kind of `measurements/kinds.py`.
 """
@@ -20,6 +20,9 @@ from vegglue.flow.closures import bent_plants, closures
 from vegglue.flow.equations import Faces, faces, side_discharges
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem, above_bed, stretch_of_cells
 from vegglue.measurements.kinds import Kind, kind_of
+
+# Slower than this [m/s] a speed has no direction.
+LEAST_SPEED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -60,10 +63,16 @@ OfStations = Callable[[GriddedFlow, Array, Array], Array]
 
 @dataclass(frozen=True)
 class Reader:
-    """How stations at x, y (station,) [m] of one kind are read off a flow of m members.
+    """How stations of one kind are read off a flow of m members; each function takes the flow and x, y (station,) [m].
 
-    read: the readings (station, m) [unit of the kind]; slope_across: d reading/dy (station, m) [that per m], what a
-    station beside its place would change; weights: d reading / d state (nx, 3, ny, station) of the first member.
+    Parameters
+    ----------
+    read
+        Readings (station, m) [unit of the kind].
+    slope_across
+        d reading/dy (station, m) [that per m]: the change of a station beside its place.
+    weights
+        d reading / d state (nx, 3, ny, station) of the first member.
     """
 
     read: OfStations
@@ -81,7 +90,7 @@ def bilinear(field: Array, grid: Grid, x: Array, y: Array) -> Array:
 
 
 def between(points: Array, first: float, step: float, size: int) -> tuple[NDArray[np.int64], Array]:
-    """Of `size` centres a step apart: the one below each point, and the share of the next one in what it reads [-]."""
+    """Of `size` centres a step apart: the one below each point, and the weight of the next one [-]."""
     steps = np.clip((points - first) / step, 0.0, size - 1.0)
     lower = np.minimum(steps.astype(np.int64), size - 2)
     return lower, steps - lower
@@ -94,7 +103,7 @@ def nearest_face(grid: Grid, x: float) -> int:
 
 
 def _corners(grid: Grid, x: Array, y: Array) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Array]]:
-    """The four cell centres around each point: column, row and share of each in what it reads (points,)."""
+    """The four cell centres around each point: column, row and weight of each (points,)."""
     i, along = between(x, grid.x[0], grid.dx, grid.x.size)
     j, beside = between(y, grid.y[0], grid.dy, grid.y.size)
     for column, of_column in ((i, 1.0 - along), (i + 1, along)):
@@ -106,15 +115,15 @@ def _no_weights(flow: GriddedFlow, stations: int) -> Array:
     return np.zeros((*flow.state.shape[:3], stations))
 
 
-def _level_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def level_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     weights = _no_weights(flow, x.size)
     for column, row, share in _corners(flow.grid, x, y):
         weights[column, LEVEL, row, np.arange(x.size)] += share
     return weights
 
 
-def _u_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
-    """The face in the west, where the inflow sets u, counts as given."""
+def u_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+    """The face in the west, at which the inflow sets u, counts as given."""
     weights = _no_weights(flow, x.size)
     for column, row, share in _corners(flow.grid, x, y):
         for face, inside in ((column, column >= 0), (np.maximum(column - 1, 0), column > 0)):
@@ -122,8 +131,8 @@ def _u_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     return weights
 
 
-def _v_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
-    """The faces on the sides of the grid, where walls and inflows set v, count as given."""
+def v_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+    """The faces on the sides of the grid, at which walls and inflows set v, count as given."""
     weights, last = _no_weights(flow, x.size), flow.grid.y.size - 1
     for column, row, share in _corners(flow.grid, x, y):
         for face, inside in ((row, row > 0), (np.minimum(row + 1, last), row < last)):
@@ -140,72 +149,60 @@ def _of_field(field: Callable[[GriddedFlow], Array], weights: OfStations) -> Rea
     )
 
 
-ALONG_X = _of_field(lambda flow: flow.u, _u_weights)
-ACROSS_X = _of_field(lambda flow: flow.v, _v_weights)
-# Slower than this [m/s] a speed has no direction to answer in.
-LEAST_SPEED = 1e-12
+ALONG_X = _of_field(lambda flow: flow.u, u_weights)
+ACROSS_X = _of_field(lambda flow: flow.v, v_weights)
 
 
-def _speed(flow: GriddedFlow, x: Array, y: Array) -> Array:
-    """(u^2 + v^2)^(1/2) of u and v at the point, so that three readings of one probe agree with each other."""
-    return np.hypot(ALONG_X.read(flow, x, y), ACROSS_X.read(flow, x, y))
-
-
-def _of_both(of_u: Array, of_v: Array, u: Array, v: Array) -> Array:
+def _of_speed(of_u: Array, of_v: Array, u: Array, v: Array) -> Array:
     """d speed = (u du + v dv) / speed, 0 at rest."""
     return (u * of_u + v * of_v) / np.maximum(np.hypot(u, v), LEAST_SPEED)
 
 
-def _speed_slope(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def speed_slope(flow: GriddedFlow, x: Array, y: Array) -> Array:
     of_u, of_v = (one.slope_across(flow, x, y) for one in (ALONG_X, ACROSS_X))
-    return _of_both(of_u, of_v, ALONG_X.read(flow, x, y), ACROSS_X.read(flow, x, y))
+    return _of_speed(of_u, of_v, ALONG_X.read(flow, x, y), ACROSS_X.read(flow, x, y))
 
 
-def _speed_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def speed_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     u, v = (one.read(flow, x, y)[:, 0] for one in (ALONG_X, ACROSS_X))
-    return _of_both(_u_weights(flow, x, y), _v_weights(flow, x, y), u, v)
+    return _of_speed(u_weights(flow, x, y), v_weights(flow, x, y), u, v)
 
 
-def _through(flow: GriddedFlow, x: Array, y: Array) -> Array:
-    """Discharge through the face nearest to each x; y means nothing."""
-    return flow.discharge[[nearest_face(flow.grid, one) for one in x]]
-
-
-def _discharge_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def discharge_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     """dQ/du = h dy and dQ/dz = u dy (dh/dz) / 2 in the cells on both sides of a face, whose depth h is that of the mean
-    of level minus bed. In the west the inflow sets Q, at the outlet its level sets h: these do not answer.
+    of level minus bed. In the west the inflow sets Q, at the outlet its level sets h: these are given.
     """
-    weights, now, dy = _no_weights(flow, x.size), flow.at_faces, flow.problem.dy
+    weights, now, problem = _no_weights(flow, x.size), flow.at_faces, flow.problem
     for n, x_n in enumerate(x):
         face = nearest_face(flow.grid, x_n)
         if face > 0:
-            weights[face - 1, ALONG, :, n] = now.face_x[face, :, 0] * dy
+            weights[face - 1, ALONG, :, n] = now.face_x[face, :, 0] * problem.dy
         if 0 < face < flow.grid.x.size:
-            each = 0.5 * now.u[face, :, 0] * _wet_share(flow, face) * dy
-            weights[[face - 1, face], LEVEL, :, n] = each
+            sides = [face - 1, face]
+            above = flow.level[sides, :, 0] - problem.bed[sides]
+            if problem.bed_rise.size:
+                above = above - problem.bed_rise[sides, :, 0]
+            half_range = problem.bed_half_range[sides].mean(axis=0)
+            lifted = above.mean(axis=0) - FILM_ON_LAND * problem.film
+            wet = np.clip(0.5 * lifted / half_range + 0.5, 0.0, 1.0)  # dh/dz of `wet_depth`, exactly
+            weights[sides, LEVEL, :, n] = 0.5 * now.u[face, :, 0] * wet * problem.dy
     return weights
-
-
-def _wet_share(flow: GriddedFlow, face: int) -> Array:
-    """dh/da of a face between two columns (ny,) [-], a the mean of level minus bed: that of `wet_depth`, exactly."""
-    problem, sides = flow.problem, [face - 1, face]
-    above = flow.level[sides, :, 0] - problem.bed[sides]
-    if problem.bed_rise.size:
-        above = above - problem.bed_rise[sides, :, 0]
-    half_range = problem.bed_half_range[sides].mean(axis=0)
-    return np.clip(0.5 * (above.mean(axis=0) - FILM_ON_LAND * problem.film) / half_range + 0.5, 0.0, 1.0)
-
-
-def _no_slope(flow: GriddedFlow, x: Array, y: Array) -> Array:
-    return np.zeros((x.size, flow.state.shape[3]))
 
 
 READERS: Mapping[str, Reader] = {
     "velocity": ALONG_X,
     "velocity_across": ACROSS_X,
-    "speed": Reader(_speed, _speed_slope, _speed_weights),
-    "level": _of_field(lambda flow: flow.level, _level_weights),
-    "discharge": Reader(_through, _no_slope, _discharge_weights),
+    "speed": Reader(  # of u and v at the point, so that three readings of one probe agree with each other
+        read=lambda flow, x, y: np.hypot(ALONG_X.read(flow, x, y), ACROSS_X.read(flow, x, y)),
+        slope_across=speed_slope,
+        weights=speed_weights,
+    ),
+    "level": _of_field(lambda flow: flow.level, level_weights),
+    "discharge": Reader(  # through the face nearest to each x, whatever y is
+        read=lambda flow, x, y: flow.discharge[[nearest_face(flow.grid, one) for one in x]],
+        slope_across=lambda flow, x, y: np.zeros((x.size, flow.state.shape[3])),
+        weights=discharge_weights,
+    ),
 }
 
 
@@ -236,9 +233,24 @@ class Readings:
 
 
 def predictions_at_sensors(problem: Problem, state: Array, grid: Grid, station: pd.DataFrame) -> Array:
-    """What each station shows, (m, station) [unit of its kind], by the reader of its kind.
+    """What each station shows, effects on instruments included.
 
-    Errors: InputError for a kind of observation that nothing knows.
+    Parameters
+    ----------
+    problem, state, grid
+        Of m members; state (nx, 3, ny, m).
+    station
+        Table of stations with the columns kind, x, y [m], section and device.
+
+    Returns
+    -------
+    array
+        (m, station) [unit of its kind].
+
+    Raises
+    ------
+    InputError
+        If a kind of observation is unknown.
     """
     return _predictions(GriddedFlow(problem, state, grid), station)
 
@@ -248,7 +260,7 @@ def _predictions(flow: GriddedFlow, station: pd.DataFrame) -> Array:
     for kind, rows, x, y in _by_kind(station):
         prediction[rows] = READERS[kind.name].read(flow, x, y)
     if any(active.effect.stage == "sensor" for active in flow.problem.effects):
-        prediction = _shown(flow, prediction, station)
+        prediction = _after_effects(flow, prediction, station)
     return prediction.T
 
 
@@ -260,14 +272,33 @@ def read_sensors(
     sections: tuple[tuple[str, float], ...],
     kept: slice = slice(0, 0),
 ) -> Readings:
-    """What each station shows, by the reader of its kind; discharge through the face nearest to each section.
+    """What each station shows, and what an ensemble keeps beside it.
 
-    Errors: InputError for a kind of observation that nothing knows.
+    Parameters
+    ----------
+    problem, state, grid, station
+        As in `predictions_at_sensors`.
+    sections
+        Name and x [m] of sections; their discharge is that through the nearest face.
+    kept
+        Columns whose fields are kept.
+
+    Raises
+    ------
+    InputError
+        If a kind of observation is unknown.
     """
     flow = GriddedFlow(problem, state, grid)
     now, prediction = flow.at_faces, _predictions(flow, station)
     through = flow.discharge
-    entered = _entered(problem, now.cell)
+    entered = np.zeros((problem.shape[0] + 1, problem.members))  # upstream of each west-east face
+    entered[1:] = side_discharges(problem, now.cell).cumsum(axis=0)
+    if problem.boundaries.lateral_inflow.size:
+        entering = problem.boundaries.lateral_inflow * stretch_of_cells(problem)
+        entered[1:] += entering.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
+    for inflow in problem.boundaries.inflows:
+        if inflow.side == "west":
+            entered += inflow.discharge
     error = (np.abs(through - entered) / entered[-1]).max(axis=0)
     wet = now.cell[kept] > FILM_ON_LAND * problem.film
     fields = np.where(wet, _at_centres(now, kept), np.nan).astype(np.float32)
@@ -276,15 +307,15 @@ def read_sensors(
 
 
 def _by_kind(station: pd.DataFrame) -> Iterator[tuple[Kind, NDArray[np.intp], Array, Array]]:
-    """Of each kind its rows, x and y. Errors: InputError for an unknown kind."""
+    """Of each kind its rows, x and y. Raises InputError for an unknown kind."""
     names, x, y = station["kind"].to_numpy(), station["x"].to_numpy(float), station["y"].to_numpy(float)
     for name in dict.fromkeys(names):
         rows = np.flatnonzero(names == name)
         yield kind_of(str(name)), rows, x[rows], y[rows]
 
 
-def _shown(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
-    """What instruments make of it: the effects of the stage sensor, each where it acts."""
+def _after_effects(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
+    """Readings (station, m) after the effects of the stage sensor, each where it acts."""
     problem, now = flow.problem, flow.at_faces
     plants, among = problem.plants, np.zeros_like(now.cell)
     depth = now.cell[plants.column, plants.row]
@@ -294,37 +325,36 @@ def _shown(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
     fields["canopy_share"] = among
     x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
     there = {name: bilinear(field, flow.grid, x, y) for name, field in fields.items()}
-    there |= _measured_by_probes(flow, value, station) | {"x": x[:, None], "y": y[:, None]}
-    for active in problem.effects:
-        rows = np.ones(len(station), dtype=bool)
-        if active.sections:
-            rows &= station["section"].isin(active.sections).to_numpy()
-        if active.devices:
-            rows &= station["device"].isin(active.devices).to_numpy()
-        reading = Reading(value=value, **there)
-        value = np.where(rows[:, None], applied((active,), "sensor", reading, {"value": value})["value"], value)
-    return value
-
-
-def _measured_by_probes(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> dict[str, Array]:
-    """Which stations are probes and gauges, and the velocity that probes measure with its slope, 0 at all others."""
     velocity, level = np.zeros((2, len(station), 1))
     component, component_y = np.zeros((2, *value.shape))
-    for kind, rows, x, y in _by_kind(station):
+    for kind, rows, of_x, of_y in _by_kind(station):
         level[rows] = float(kind.instrument == "gauge")
         if kind.velocity:
             velocity[rows], component[rows] = 1.0, value[rows]
-            component_y[rows] = READERS[kind.name].slope_across(flow, x, y)
-    return {"velocity": velocity, "level": level, "component": component, "component_y": component_y}
+            component_y[rows] = READERS[kind.name].slope_across(flow, of_x, of_y)
+    there |= {"velocity": velocity, "level": level, "component": component, "component_y": component_y}
+    there |= {"x": x[:, None], "y": y[:, None]}
+    for active in problem.effects:
+        at = np.ones(len(station), dtype=bool)
+        if active.sections:
+            at &= station["section"].isin(active.sections).to_numpy()
+        if active.devices:
+            at &= station["device"].isin(active.devices).to_numpy()
+        reading = Reading(value=value, **there)
+        value = np.where(at[:, None], applied((active,), "sensor", reading, {"value": value})["value"], value)
+    return value
 
 
 def reading_weights(problem: Problem, state: Array, grid: Grid, station: pd.DataFrame) -> Array:
-    """d prediction / d state (nx, 3, ny, n) at a state (nx, 3, ny, 1), whatever instruments make of it.
+    """d prediction / d state (nx, 3, ny, n) at a state (nx, 3, ny, 1), without effects on instruments.
 
-    Errors: InputError for a kind of observation that nothing knows.
+    Raises
+    ------
+    InputError
+        If a kind of observation is unknown.
     """
     flow = GriddedFlow(problem, state, grid)
-    weights = np.zeros((*state.shape[:3], len(station)))
+    weights = _no_weights(flow, len(station))
     for kind, rows, x, y in _by_kind(station):
         weights[..., rows] = READERS[kind.name].weights(flow, x, y)
     return weights
@@ -346,16 +376,3 @@ def _at_centres(now: Faces, columns: slice) -> Array:
     u = 0.5 * (now.u[columns] + now.u[columns.start + 1 : columns.stop + 1])
     v = 0.5 * (now.v[columns, 1:] + now.v[columns, :-1])
     return np.stack([now.level[columns], u, v])
-
-
-def _entered(problem: Problem, depth: Array) -> Array:
-    """Discharge that has entered upstream of each west-east face, (nx + 1, m) [m3/s], at depths (nx, ny, m)."""
-    entered = np.zeros((problem.shape[0] + 1, problem.members))
-    entered[1:] = side_discharges(problem, depth).cumsum(axis=0)
-    if problem.boundaries.lateral_inflow.size:
-        entering = problem.boundaries.lateral_inflow * stretch_of_cells(problem)
-        entered[1:] += entering.sum(axis=1).cumsum(axis=0) * problem.dx * problem.dy
-    for inflow in problem.boundaries.inflows:
-        if inflow.side == "west":
-            entered += inflow.discharge
-    return entered
