@@ -45,7 +45,7 @@ from vegglue.flow.reference_member import settled
 from vegglue.flow.sensor import predictions_at_sensors, reading_weights
 from vegglue.flow.starts import on_grid
 from vegglue.flow.status import FAILED
-from vegglue.flow.tangent import CAUSE_LANES, adjoints, tangents
+from vegglue.flow.tangent import CAUSE_SLOTS, adjoints, tangents
 from vegglue.flow.wet_band import chord_in_band, rows_inside, widen
 from vegglue.parallel import in_threads, parallel_map
 
@@ -286,7 +286,7 @@ def responses_by_tangents(model: Model, point: Point, causes: Sequence[Cause]) -
     tasks = []
     for experiment in point.flows:
         here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
-        tasks += [(experiment, here[first : first + CAUSE_LANES]) for first in range(0, len(here), CAUSE_LANES)]
+        tasks += [(experiment, here[first : first + CAUSE_SLOTS]) for first in range(0, len(here), CAUSE_SLOTS)]
     work = partial(_responses_in, model, point)
     parts = in_threads(work, [(experiment, [causes[j] for j in some]) for experiment, some in tasks])
     for (experiment, some), part in zip(tasks, parts, strict=True):

@@ -11,7 +11,7 @@ from vegglue.arrays import Array
 from vegglue.case.channel_geometry import part_of
 from vegglue.effects import bed_laws, plant_laws
 from vegglue.effects.active_effect import applied
-from vegglue.effects.surroundings import Cells, ChannelGeometry, PlantCells, speed_of
+from vegglue.effects.surroundings import Cells, PlantCells, speed_of
 from vegglue.flow.problem import ACROSS, ALONG, EMPTY, LEVEL, Problem
 from vegglue.flow.wet_and_dry import afloat
 
@@ -32,17 +32,16 @@ class Closures:
     momentum: dict[str, Array]
 
 
-@dataclass(frozen=True)
-class _Friction:
-    """What the laws say: depth h [m], friction rate k [1/m] and the part of it that is the bed's, (nx, ny, m)."""
-
-    depth: Array
-    rate: Array
-    bed_rate: Array
-
-
 def closures(problem: Problem, state: Array, depth: Array) -> Closures:
-    """k, nu, h T and f of a state (nx, 3, ny, m) with depths (nx, ny, m) [m], effects included."""
+    """k, nu, h T and f of a state: laws of bed and plants, then the effects of resistance, exchange and force.
+
+    Parameters
+    ----------
+    problem
+        Of m members.
+    state, depth
+        (nx, 3, ny, m) and (nx, ny, m) [m].
+    """
     stages, geometry = {active.effect.stage for active in problem.effects}, problem.geometry
     plants = bent_plants(problem, state, depth)
     rate = bed_drag(problem, depth)
@@ -51,21 +50,47 @@ def closures(problem: Problem, state: Array, depth: Array) -> Closures:
         return Closures(rate, np.array(np.broadcast_to(problem.viscosity, depth.shape), order="C"), {})
     bed_rate = rate.copy()
     _add_plant_drag(problem, rate, depth, plants)
-    return _after_effects(problem, geometry, state, _Friction(depth, rate, bed_rate))
+    nx, found = state.shape[0], {"rate": np.empty_like(rate), "viscosity": np.empty_like(rate)}
+    for first in range(0, nx, CLOSURE_STRIP):
+        stop = min(first + CLOSURE_STRIP, nx)
+        wide = slice(max(first - 1, 0), min(stop + 1, nx))  # gradients look one column further
+        inner = slice(first - wide.start, stop - wide.start)
+        here, h = state[wide], depth[wide]
+        before = state[np.maximum(np.arange(wide.start, wide.stop) - 1, 0), ALONG]
+        v = 0.5 * here[:, ACROSS]
+        v[:, :-1] += 0.5 * here[:, ACROSS, 1:]
+        cells = Cells(
+            geometry=part_of(geometry, wide, slice(None)),
+            depth=h,
+            level=here[:, LEVEL],
+            u=0.5 * (here[:, ALONG] + before),
+            v=v,
+            rate=rate[wide],
+            bed_rate=bed_rate[wide],
+            viscosity=problem.viscosity,
+            shear_depth=np.minimum(h[:, 1:], h[:, :-1]) if problem.smallest_shear_depth else EMPTY,
+        )
+        values = applied(problem.effects, "resistance", cells, {"rate": cells.rate})
+        cells = replace(cells, rate=values["rate"])
+        nothing = {"viscosity": cells.viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO}
+        values |= applied(problem.effects, "exchange", cells, nothing)
+        values |= applied(problem.effects, "force", cells, {"x": ZERO, "y": ZERO})
+        for name, value in values.items():
+            if value is ZERO:
+                continue
+            if name not in found:
+                found[name] = np.zeros_like(rate)
+            found[name][first:stop] = np.broadcast_to(value, h.shape)[inner]
+    momentum = {name: value for name, value in found.items() if name not in ("rate", "viscosity")}
+    # Two places that mix less may take more than there is.
+    return Closures(found["rate"], np.maximum(found["viscosity"], 0.0), momentum)
 
 
 def bed_drag(problem: Problem, depth: Array, columns: slice = slice(None)) -> Array:
     """k [1/m] of the laws of the bed at the centres of some columns of cells, see `bed_laws`; depth (nx, ny, m) [m]."""
-    bed = problem.friction
-    return bed_laws.class_drag(
-        depth,
-        problem.bed_half_range[columns],
-        bed.friction_class[columns],
-        bed.law,
-        bed.coefficient,
-        bed.bank_argument_minimum,
-        problem.film,
-    )
+    bed, half_range = problem.friction, problem.bed_half_range[columns]
+    classes, floor = bed.friction_class[columns], bed.bank_argument_minimum
+    return bed_laws.class_drag(depth, half_range, classes, bed.law, bed.coefficient, floor, problem.film)
 
 
 def drag(problem: Problem, depth: Array) -> Array:
@@ -75,42 +100,31 @@ def drag(problem: Problem, depth: Array) -> Array:
     return rate
 
 
+def _add_plant_drag(problem: Problem, rate: Array, depth: Array, values: tuple[Array, Array]) -> None:
+    """The laws of plants in place of those of the bed on what plants cover; values: phi and canopy height (cell, m)."""
+    one = problem.plants
+    plant_laws.plant_drag(
+        rate, depth, one.column, one.row, one.law, one.share, *values, one.bare_chezy, one.proportional
+    )
+
+
 def wall_rates(problem: Problem, depth: Array) -> tuple[tuple[int, Array], ...]:
-    """Rows beside rough walls, and k_w = sum(h c_w / dy) / sum h over both cells of their east faces, (nx, m) [1/m].
+    """k_w = sum(h c_w / dy) / sum h over both cells of the east faces of rows beside rough walls: row, (nx, m) [1/m].
 
     A wall of a cell's depth h takes c_w |u| u h dx from the water h dx dy of the cell, so that du/dt = -c_w |u| u / dy:
     along the wall only, which is why it is no part of k. Faded out in the film on dry land like advection.
     """
-    walls = problem.walls
+    walls, found = problem.walls, []
     if not walls.rate.size:
         return ()
-    beside = ((0, walls.south), (-1, walls.north))
-    return tuple((row, _on_faces(stands, walls.rate, depth[:, row], problem.film)) for row, stands in beside)
-
-
-def _on_faces(stands: Array, rate: Array, depth: Array, film: float) -> Array:
-    """k_w of one row, of depths (nx, m); the last face has one cell."""
-    pulled = stands[:, None] * rate * depth * afloat(depth, 0.5 / film)
-    pulled[:-1] += pulled[1:]
-    pair = depth.copy()
-    pair[:-1] += depth[1:]
-    return pulled / pair
-
-
-def _add_plant_drag(problem: Problem, rate: Array, depth: Array, values: tuple[Array, Array]) -> None:
-    """The laws of plants in place of those of the bed on what plants cover; values: phi and canopy height (cell, m)."""
-    plants = problem.plants
-    plant_laws.plant_drag(
-        rate,
-        depth,
-        plants.column,
-        plants.row,
-        plants.law,
-        plants.share,
-        *values,
-        plants.bare_chezy,
-        plants.proportional,
-    )
+    for row, stands in ((0, walls.south), (-1, walls.north)):
+        beside = depth[:, row]
+        pulled = stands[:, None] * walls.rate * beside * afloat(beside, 0.5 / problem.film)
+        pulled[:-1] += pulled[1:]  # the last face has one cell
+        pair = beside.copy()
+        pair[:-1] += beside[1:]
+        found.append((row, pulled / pair))
+    return tuple(found)
 
 
 def bent_plants(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array]:
@@ -138,48 +152,3 @@ def bent_plants(problem: Problem, state: Array, depth: Array) -> tuple[Array, Ar
     )
     now = applied(problem.effects, "plants", seen, {"phi": phi, "canopy_height": canopy_height})
     return np.array(now["phi"]), np.array(now["canopy_height"])
-
-
-def _after_effects(problem: Problem, geometry: ChannelGeometry, state: Array, friction: _Friction) -> Closures:
-    """All that the stages resistance, exchange and force hand on."""
-    nx, effects, rate = state.shape[0], problem.effects, friction.rate
-    found: dict[str, Array] = {"rate": np.empty_like(rate), "viscosity": np.empty_like(rate)}
-    for first in range(0, nx, CLOSURE_STRIP):
-        stop = min(first + CLOSURE_STRIP, nx)
-        wide = slice(max(first - 1, 0), min(stop + 1, nx))
-        inner = slice(first - wide.start, stop - wide.start)
-        cells = _cells(problem, geometry, state, friction, wide)
-        values = applied(effects, "resistance", cells, {"rate": cells.rate})
-        cells = replace(cells, rate=values["rate"])
-        values |= applied(
-            effects, "exchange", cells, {"viscosity": cells.viscosity, "xx": ZERO, "xy": ZERO, "yy": ZERO}
-        )
-        values |= applied(effects, "force", cells, {"x": ZERO, "y": ZERO})
-        for name, value in values.items():
-            if value is ZERO:
-                continue
-            if name not in found:
-                found[name] = np.zeros_like(rate)
-            found[name][first:stop] = np.broadcast_to(value, cells.depth.shape)[inner]
-    momentum = {name: value for name, value in found.items() if name not in ("rate", "viscosity")}
-    # Two places that mix less may take more than there is.
-    return Closures(found["rate"], np.maximum(found["viscosity"], 0.0), momentum)
-
-
-def _cells(problem: Problem, geometry: ChannelGeometry, state: Array, friction: _Friction, columns: slice) -> Cells:
-    """What effects see of some columns."""
-    here, depth = state[columns], friction.depth[columns]
-    before = state[np.maximum(np.arange(columns.start, columns.stop) - 1, 0), ALONG]
-    v = 0.5 * here[:, ACROSS]
-    v[:, :-1] += 0.5 * here[:, ACROSS, 1:]
-    return Cells(
-        geometry=part_of(geometry, columns, slice(None)),
-        depth=depth,
-        level=here[:, LEVEL],
-        u=0.5 * (here[:, ALONG] + before),
-        v=v,
-        rate=friction.rate[columns],
-        bed_rate=friction.bed_rate[columns],
-        viscosity=problem.viscosity,
-        shear_depth=np.minimum(depth[:, 1:], depth[:, :-1]) if problem.smallest_shear_depth else EMPTY,
-    )

@@ -28,7 +28,20 @@ class Faces:
 
 
 def residual(problem: Problem, state: Array) -> Array:
-    """R(state), (nx, 3, ny, m): the negative rate of change of level [m/s], v and u [m/s2]; zero when steady."""
+    """R(state) = -d(state)/dt, zero when steady; the equations stand in `problem`.
+
+    Parameters
+    ----------
+    problem
+        Of m members.
+    state
+        (nx, 3, ny, m): level [m], v and u [m/s].
+
+    Returns
+    -------
+    array
+        (nx, 3, ny, m) [m/s, m/s2 and m/s2].
+    """
     depth = cell_depths(problem, state)
     return residual_of(problem, state, depth, side_fluxes(problem, depth), closures(problem, state, depth))
 
@@ -36,7 +49,7 @@ def residual(problem: Problem, state: Array) -> Array:
 def residual_of(
     problem: Problem, state: Array, depth: Array, sides: tuple[Array, Array, Array], closed: Closures
 ) -> Array:
-    """R(state) with its depths (nx, ny, m) [m], fluxes through the sides [m2/s] and closures at hand."""
+    """R(state) from its depths (nx, ny, m) [m], fluxes through the sides [m2/s] and closures."""
     boundaries = problem.boundaries
     out = kernels.rates(
         state,
@@ -51,7 +64,7 @@ def residual_of(
         problem.dy,
         problem.bend,
     )
-    _join(problem, out, state[:, ALONG], depth)
+    _add_confluences(problem, out, state[:, ALONG], depth)
     for row, rate in wall_rates(problem, depth):
         along = state[:, ALONG, row]
         out[:, ALONG, row] += rate * np.sqrt(along**2 + kernels.REST_SPEED**2) * along
@@ -150,7 +163,7 @@ def _stretch_of(problem: Problem, inflow: InflowSegment, rows: float) -> Array:
     return np.asarray(1.0 - y * problem.bend.at_cells[inflow.start : inflow.stop, None])
 
 
-def _join(problem: Problem, out: Array, u: Array, depth: Array) -> None:
+def _add_confluences(problem: Problem, out: Array, u: Array, depth: Array) -> None:
     """Add c (u - u_in) / dy to R_u (nx, 3, ny, m) beside inflows through the sides, c their speed: what joins has to be
     brought from its own u_in to that of the flow. Speeds of an east face are those of both its cells.
     """

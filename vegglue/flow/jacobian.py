@@ -14,14 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
-from vegglue.flow import block_elimination, thin_water
+from vegglue.flow import block_elimination
+from vegglue.flow.block_elimination import ACROSS_PERIOD, ALONG_PERIOD
 from vegglue.flow.equations import cell_depths, inflow_parts, residual
 from vegglue.flow.problem import LEVEL, InflowSegment, Problem, take
-from vegglue.flow.thin_water import slope_of_friction, thickness
+from vegglue.flow.thin_water import slope_of_friction, thickness, tilt
 
+# Step [m, m/s] of the coloured differences: chosen, not measured; larger ones lose the slope near a waterline, smaller
+# ones digits of the residual. Factors only lead to the root, so that no result hangs on it.
+COLOUR_STEP = 1e-6
+# Colours disturbed together [-]: 15, as many as there are colours in a quarter, take a quarter longer than 16.
+COLOUR_SLOTS = 16
 # Step of ln Q in a central difference [-]: chosen, not measured; small against 1 and large against rounding.
 DISCHARGE_STEP = 1e-5
-# Step of levels [m] in the difference of ln W: chosen, not measured, as that of the Jacobian.
+# Step of levels [m] in the difference of ln W: chosen, as that of the Jacobian.
 RAISE = 1e-6
 
 
@@ -95,19 +101,17 @@ def answer_to_discharge(problem: Problem, state: Array, inflow: InflowSegment) -
     return np.asarray((ends[..., 0] - ends[..., 1]) / (2.0 * DISCHARGE_STEP))
 
 
-# Step [m, m/s] of the coloured differences: chosen, not measured; larger ones lose the slope near a waterline, smaller
-# ones digits of the residual. Factors only lead to the root, so that no result hangs on it.
-COLOUR_STEP = 1e-6
-# Colours disturbed together [-]: 15, as many as there are colours in a quarter, take a quarter longer than 16.
-COLOUR_LANES = 16
-
-
 @dataclass(frozen=True)
 class Factors:
-    """The eliminated Jacobian of one member: J^-1 costs three products a column.
+    """The eliminated Jacobian of one member, and what chord steps need of the state it was made at.
 
-    Beside it what chord steps need of the state it was made at, see `thin_water`: slopes of friction [1/s], depths of
-    faces [m] and how velocities answer to levels there [1/s].
+    Parameters
+    ----------
+    columns, far
+        As `block_elimination.factor` leaves them: J^-1 costs three products a column.
+    slope, thick, answer
+        Slopes of friction (nx, 3, ny, 1) [1/s], depths of faces [m] and changes of velocities with levels [1/s] there
+        (nx, 3, ny), see `thin_water`.
     """
 
     columns: Single
@@ -123,15 +127,15 @@ class Factors:
     def step(self, rates: Array) -> Single:
         """-J^-1 R in the unknowns of chord steps (nx, 3, ny, m): levels, velocities times rho where water is thin."""
         nx, _, ny, m = rates.shape
-        with np.errstate(over="ignore"):  # of a member that runs away, told by its correction
+        with np.errstate(over="ignore"):  # of a member that runs away, known by its correction
             work = np.multiply(rates, -1.0, dtype=np.float32, casting="same_kind")
         block_elimination.solve(self.columns, self.far, work.reshape(nx, 3 * ny, m))
-        thin_water.tilt(work, self.answer)
+        tilt(work, self.answer)
         return work
 
 
 def eliminate(columns: Single, far: Single) -> None:
-    """Factors in place; of a Jacobian without an inverse no numbers, and no correction by them is taken for one."""
+    """Factors in place; NaN if there is no inverse, so that no correction by them is accepted."""
     try:
         block_elimination.factor(columns, far)
     except np.linalg.LinAlgError:  # compiled loops raise; one member fails by it, not all that are solved beside it
@@ -141,48 +145,48 @@ def eliminate(columns: Single, far: Single) -> None:
 def solved(columns: Single, far: Single, right: Array) -> Array:
     """J^-1 right, (nx, 3, ny, m), of factors."""
     nx, _, ny, m = right.shape
-    with np.errstate(over="ignore"):  # of a member that runs away, told by its correction
+    with np.errstate(over="ignore"):  # of a member that runs away, known by its correction
         work = right.astype(np.float32).reshape(nx, 3 * ny, m)
     block_elimination.solve(columns, far, work)
     return work.reshape(right.shape).astype(np.float64)
 
 
 def jacobian(problem: Problem, state: Array) -> tuple[Single, Single]:
-    """J = dR/dstate of one member by coloured differences: blocks (nx, 3, n, n) and far diagonal (nx, n), n = 3 ny.
+    """J = dR/dstate of one member by coloured differences.
 
-    Single precision is enough: the factors only lead to the root, the residual in double precision says where it is.
+    Single precision is enough: the factors only lead to the root; the residual in double precision decides what it is.
+
+    Parameters
+    ----------
+    problem, state
+        Of one member; state (nx, 3, ny, 1).
+
+    Returns
+    -------
+    blocks, far
+        Columns i - 1, i and i + 1 of row block i (nx, 3, n, n), n = 3 ny, and the diagonal of column i - 2 (nx, n).
     """
     nx, _, ny, _ = state.shape
     base, depth = residual(problem, state)[..., 0], cell_depths(problem, state)
     columns, far = np.zeros((nx, 3, 3 * ny, 3 * ny), np.float32), np.zeros((nx, 3 * ny), np.float32)
-    colours = np.array(list(np.ndindex(3, block_elimination.ALONG_PERIOD, block_elimination.ACROSS_PERIOD)))
-    many = take(problem, np.zeros(COLOUR_LANES, dtype=np.int64))
-    lanes = np.empty((nx, 3, ny, COLOUR_LANES))
-    for group in np.split(colours, range(COLOUR_LANES, len(colours), COLOUR_LANES)):
-        lanes[...] = state
-        for lane, (kind, column, row) in enumerate(group):
-            lanes[column :: block_elimination.ALONG_PERIOD, kind, row :: block_elimination.ACROSS_PERIOD, lane] += (
-                COLOUR_STEP
-            )
-        rates = residual(with_kept_shares(many, depth, cell_depths(many, lanes)), lanes)
+    colours = np.array(list(np.ndindex(3, ALONG_PERIOD, ACROSS_PERIOD)))
+    many = take(problem, np.zeros(COLOUR_SLOTS, dtype=np.int64))
+    slots = np.empty((nx, 3, ny, COLOUR_SLOTS))
+    for group in np.split(colours, range(COLOUR_SLOTS, len(colours), COLOUR_SLOTS)):
+        slots[...] = state
+        for slot, (kind, column, row) in enumerate(group):
+            slots[column::ALONG_PERIOD, kind, row::ACROSS_PERIOD, slot] += COLOUR_STEP
+        rates = residual(with_kept_shares(many, depth, cell_depths(many, slots)), slots)
         block_elimination.collect(columns, far, base, rates, group, COLOUR_STEP)
-    _add_sharing(columns, problem, state)
-    return columns, far
-
-
-def _add_sharing(columns: Single, problem: Problem, state: Array) -> None:
-    """- dR/d ln Q (d ln W/dx)' of inflows shared by depth, see above, in the blocks (nx, 3, n, n).
-
-    All of it is there for an inflow from the west. Through a side, what blocks cannot hold is put down to levels that
-    they can, see `column_held`.
-    """
-    ny = state.shape[2]
+    # - dR/d ln Q (d ln W/dx)' of inflows shared by depth. All of it is there for an inflow from the west; through a
+    # side, what blocks cannot hold is put down to levels that they can.
     for inflow in shared_inflows(problem):
         one = sharing_at(problem, state, inflow)
         for i in np.flatnonzero(one.answer.any(axis=(1, 2))):
             of_levels = np.zeros((3, ny))
             np.add.at(of_levels, (column_held(one.column, int(i)) - i + 1, one.row), one.slope)
             columns[i, :, :, :ny] -= one.answer[i].reshape(-1)[:, None] * of_levels[:, None]
+    return columns, far
 
 
 def column_held(column: NDArray[np.int64], block: int) -> NDArray[np.int64]:
@@ -191,7 +195,7 @@ def column_held(column: NDArray[np.int64], block: int) -> NDArray[np.int64]:
 
 
 def factors(problem: Problem, state: Array) -> Factors:
-    """Factors of J at one state."""
+    """Factors of J at a state (nx, 3, ny, 1) of one member."""
     columns, far = jacobian(problem, state)
     eliminate(columns, far)
     return Factors(columns, far, slope_of_friction(problem, state), *thickness(problem, state))

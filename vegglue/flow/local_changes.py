@@ -4,7 +4,6 @@ momentum that the flow carries.
 What a model has wrong at a place is such a change.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.active_effect import ActiveEffect
-from vegglue.effects.definition import Amplitude, Effect
+from vegglue.effects.definition import Act, Amplitude, Effect
 from vegglue.effects.exchange import dispersion
 from vegglue.effects.surroundings import Cells, ChannelGeometry
 from vegglue.flow.problem import Problem, take
@@ -24,58 +23,56 @@ TERMS: tuple[Term, ...] = ("friction", "drag", "bed", "inflow", "viscosity", "mi
 
 
 def with_changed_term(problem: Problem, geometry: ChannelGeometry, term: Term, change: Array) -> Problem:
-    """One member's problem as many: member m has a term changed by change[..., m], (nx, ny, m) [unit of the term]."""
+    """One member's problem as many, in each of which a term of the equations is changed by a field of its own.
+
+    Parameters
+    ----------
+    problem, geometry
+        Of one member, and what effects see of its channel.
+    term
+        One of TERMS.
+    change
+        (nx, ny, m) [unit of the term].
+
+    Returns
+    -------
+    Problem
+        Of m members.
+    """
     members = change.shape[2]
     many = take(problem, np.zeros(members, dtype=np.int64))
+
+    def added_to(before: Array) -> Array:
+        return np.ascontiguousarray(before + change if before.size else change)
+
     if term == "bed":
-        return replace(many, bed_rise=_sum(many.bed_rise, change))
+        return replace(many, bed_rise=added_to(many.bed_rise))
     if term == "inflow":
-        entering = _sum(many.boundaries.lateral_inflow, change)
+        entering = added_to(many.boundaries.lateral_inflow)
         return replace(many, boundaries=replace(many.boundaries, lateral_inflow=entering))
-    effect = ActiveEffect(_field_effect(term, geometry, change), {"on": np.ones(members)})
-    return replace(many, effects=(*many.effects, effect), geometry=geometry)
 
+    def here(cells: Cells, on: Array) -> Array:
+        """The field in the columns and rows that an effect sees at a time."""
+        column = np.rint((cells.geometry.x[:, 0, 0] - geometry.x[0, 0, 0]) / geometry.dx).astype(int)
+        row = np.rint((cells.geometry.y[0, :, 0] - geometry.y[0, 0, 0]) / geometry.dy).astype(int)
+        return on * change[column][:, row]
 
-def _sum(before: Array, change: Array) -> Array:
-    return np.ascontiguousarray(before + change if before.size else change)
-
-
-def _field_effect(term: Term, whole: ChannelGeometry, change: Array) -> Effect:
-    """The field as an effect, which sees some columns and rows of the grid at a time."""
-
-    def here(cells: Cells) -> Array:
-        column = np.rint((cells.geometry.x[:, 0, 0] - whole.x[0, 0, 0]) / whole.dx).astype(int)
-        row = np.rint((cells.geometry.y[0, :, 0] - whole.y[0, 0, 0]) / whole.dy).astype(int)
-        return change[column][:, row]
-
-    def friction(cells: Cells, on: Array) -> Mapping[str, Array]:
-        return {"rate": cells.rate * (1.0 + on * here(cells))}
-
-    def drag(cells: Cells, on: Array) -> Mapping[str, Array]:
-        return {"rate": cells.rate + on * here(cells)}
-
-    def viscosity(cells: Cells, on: Array) -> Mapping[str, Array]:
-        return {"viscosity": on * here(cells)}
-
-    def mixing(cells: Cells, on: Array) -> Mapping[str, Array]:
-        return {"viscosity": on * here(cells) * cells.viscosity}
-
-    def advection(cells: Cells, on: Array) -> Mapping[str, Array]:
-        return dispersion(cells, on * here(cells))
-
-    return Effect(
+    acts: dict[Term, Act] = {
+        "friction": lambda cells, on: {"rate": cells.rate * (1.0 + here(cells, on))},
+        "drag": lambda cells, on: {"rate": cells.rate + here(cells, on)},
+        "viscosity": lambda cells, on: {"viscosity": here(cells, on)},
+        "mixing": lambda cells, on: {"viscosity": here(cells, on) * cells.viscosity},
+        "advection": lambda cells, on: dispersion(cells, here(cells, on)),
+    }
+    field = Effect(
         name=f"field_of_{term}",
         stage="exchange" if term in ("viscosity", "mixing", "advection") else "resistance",
         title=f"A field of {term}",
         equation="term + field",
-        act={
-            "friction": friction,
-            "drag": drag,
-            "viscosity": viscosity,
-            "mixing": mixing,
-            "advection": advection,
-        }[term],
+        act=acts[term],
         amplitude=Amplitude("on", "-", "0 or 1", 1.0, 0.0, 1.0),
         source="definition",
         checked=True,
     )
+    effect = ActiveEffect(field, {"on": np.ones(members)})
+    return replace(many, effects=(*many.effects, effect), geometry=geometry)

@@ -13,8 +13,8 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.compilation import compiled_exactly
 from vegglue.effects.physical_constants import GRAVITY
-from vegglue.flow.closures import Closures, closures, wall_rates
-from vegglue.flow.equations import Faces, faces, residual_of, side_fluxes, storage
+from vegglue.flow.closures import closures, wall_rates
+from vegglue.flow.equations import faces, residual_of, side_fluxes, storage
 from vegglue.flow.kernels import REST_SPEED
 from vegglue.flow.newton import FROM_A_MARCH, newton
 from vegglue.flow.problem import LEVEL, Problem, stretch_of_cells
@@ -93,7 +93,7 @@ def sweep_y(change, face_y, stored, weight, time_step, theta, dy):
 
 
 # Newton tries to finish a march after each of so many equal parts [-]: chosen, not measured. More tries end sooner
-# where one succeeds, and cost up to 25 factorisations each where none does.
+# if one succeeds, and cost up to 25 factorisations each if none does.
 TRIES = 4
 
 
@@ -105,27 +105,35 @@ def march(problem: Problem, state: Array, time_step: float, steps: int, theta: f
 
 
 def advance(problem: Problem, state: Array, time_step: float, theta: float) -> Array:
-    """The change of a state over one step."""
+    """(S/dt + theta A_x) (S/dt)^-1 (S/dt + theta A_y) delta = -R: the change of a state over one step."""
     now = faces(problem, state)
     # Never below a thousandth, so that dry land keeps a water table.
     wet = np.maximum(storage(problem, state[:, LEVEL]), 1e-3)
     closed, outlet = closures(problem, state, now.cell), problem.boundaries.outlet
-    length = _shortest(problem)
-    along, across = _damping(problem, now, closed, length)
+    # The shortest cells: in a bend the sweeps must not take waves to be slower than they are.
+    length = problem.dx * float(stretch_of_cells(problem).min())
+    # Diagonals [1/s] of friction, upwinding and viscosity for u on faces 1 .. nx and v on faces 0 .. ny - 1.
+    u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
+    cell = (
+        2.0 * np.abs(closed.rate) * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / length + np.abs(v) / problem.dy
+    )
+    # Shear acts on a thin cell over the depth of its deeper corners.
+    sheared = np.maximum(np.maximum(now.corner[1:, 1:], now.corner[1:, :-1]) / now.cell, 1.0)
+    cell += 4.0 * closed.viscosity * (1.0 / length**2 + sheared / problem.dy**2)
+    along, across = cell.copy(), cell.copy()
+    along[:-1] = np.maximum(cell[:-1], cell[1:])
+    for row, rate in wall_rates(problem, now.cell):
+        along[:, row] += 2.0 * rate * np.sqrt(now.u[1:, row] ** 2 + REST_SPEED**2)
+    across[:, 1:] = np.maximum(cell[:, 1:], cell[:, :-1])
     change = -residual_of(problem, state, now.cell, side_fluxes(problem, now.cell), closed)
     sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, length)
     sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
     return change
 
 
-def _shortest(problem: Problem) -> float:
-    """Length of the shortest cells [m]: in a bend the sweeps must not take waves to be slower than they are."""
-    return problem.dx * float(stretch_of_cells(problem).min())
-
-
 @dataclass(frozen=True)
 class FallBack:
-    """How members are marched where Newton fails: steps [s], and the flow time [s] after which one has failed.
+    """How members are marched if Newton fails: steps [s], and the flow time [s] after which one has failed.
 
     Chosen, not measured: a wave runs through 171 m of water 1 m deep within a minute, so that 40 minutes let it come
     and go many times; a step of 0.5 s takes about as long as the water needs through a cell. Longer channels may
@@ -140,7 +148,7 @@ USUAL_FALL_BACK = FallBack()
 
 
 def fall_back(step: float | None, span: float | None) -> FallBack:
-    """What a case asks for; what it leaves out is as usual."""
+    """As a case gives them; as usual what it leaves out."""
     usual = USUAL_FALL_BACK
     return FallBack(usual.step if step is None else step, usual.span if span is None else span)
 
@@ -159,7 +167,7 @@ def march_to_rest(problem: Problem, start: Array, tolerance: float, how: FallBac
     """March one member until Newton can finish it; its steady state is judged as any other, by its residual."""
     state, per_try = start, max(round(how.span / TRIES / how.step), 1)
     for tried in range(1, TRIES + 1):
-        with np.errstate(over="ignore", invalid="ignore"):  # a march that runs away is told by its end
+        with np.errstate(over="ignore", invalid="ignore"):  # a march that runs away is known by its end
             state = march(problem, state, how.step, per_try)
         steps = tried * per_try
         if not np.isfinite(state).all():
@@ -169,20 +177,3 @@ def march_to_rest(problem: Problem, start: Array, tolerance: float, how: FallBac
             return Marched(polished.state, True, steps, "")
     rate = float(np.abs(advance(problem, state, how.step, 1.0)).max()) / how.step
     return Marched(state, False, steps, f"still changing by {rate:.1e} per second after {steps * how.step:g} s")
-
-
-def _damping(problem: Problem, now: Faces, closed: Closures, shortest: float) -> tuple[Array, Array]:
-    """Diagonals [1/s] of friction, upwinding and viscosity for u on faces 1 .. nx and v on faces 0 .. ny - 1."""
-    u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
-    cell = (
-        2.0 * np.abs(closed.rate) * np.sqrt(u**2 + v**2 + REST_SPEED**2) + np.abs(u) / shortest + np.abs(v) / problem.dy
-    )
-    # Shear acts on a thin cell over the depth of its deeper corners.
-    sheared = np.maximum(np.maximum(now.corner[1:, 1:], now.corner[1:, :-1]) / now.cell, 1.0)
-    cell += 4.0 * closed.viscosity * (1.0 / shortest**2 + sheared / problem.dy**2)
-    along, across = cell.copy(), cell.copy()
-    along[:-1] = np.maximum(cell[:-1], cell[1:])
-    for row, rate in wall_rates(problem, now.cell):
-        along[:, row] += 2.0 * rate * np.sqrt(now.u[1:, row] ** 2 + REST_SPEED**2)
-    across[:, 1:] = np.maximum(cell[:, 1:], cell[:, :-1])
-    return along, across

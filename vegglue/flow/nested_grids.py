@@ -9,7 +9,6 @@ from member to member and is drawn from those solved before. A nested iteration 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -36,11 +35,12 @@ from vegglue.flow.wet_band import overflows, rows_inside, widen
 # Steps after which a member waits for a nearer reference: of 15, 20, 30 and 40 the last was the fastest for 64 members
 # of a site of 9,600 cells whose priors span three decades.
 MOST_NESTED_STEPS = 40
-# By how much a correction shrinks in each step [-] where a member gets there: there, 256 members in chunks of 64,
-# 20 of the 730 that did were behind this when they did, and of 200 that did not 118, which took another 2,200 steps.
+# By how much a correction shrinks in each step [-] of a member that converges: on that site, 256 members in chunks of
+# 64, 20 of the 730 that converged were behind this when they did, and of 200 that did not 118, which took another 2,200
+# steps.
 PACE = 0.75
-# Members solved side by side: 32 and 40 are alike, and a tenth less time than 24, where few share a reference.
-NESTED_LANES = 32
+# Members solved side by side: 32 and 40 are alike, and a tenth less time than 24 if few share a reference.
+NESTED_SLOTS = 32
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class GridProblem:
 @dataclass(frozen=True)
 class _Level:
     """Members (m,) on one grid: where they are, in coordinates as far apart as their flows (m, d); their flows on
-    coarser cells (nx, 3, ny, m), and who has one; what finer cells changed (m, nx, 3, ny), the members solved, and
+    coarser cells (nx, 3, ny, m), and which have one; what finer cells changed (m, nx, 3, ny), the members solved, and
     where others stalled near their flow (nx, 3, ny).
 
     The last three are filled in place while members are solved.
@@ -73,10 +73,43 @@ class _Level:
         self.solved.state[..., members] = states
         self.changed[members] = np.moveaxis(states - self.lifted[..., members], -1, 0)
 
+    def starts(self, members: np.ndarray) -> Array:
+        """States that members begin from (nx, 3, ny, n): where they stalled with the factors of another reference, else
+        P x_c + d, d from splines through the solved members nearest to them, if any.
+        """
+        start, coordinates = np.ascontiguousarray(self.lifted[..., members]), self.coordinates
+        done = np.flatnonzero((self.solved.status == SOLVED_BY_NEWTON) & self.known)
+        if done.size:
+            near = nearest_members(coordinates, done, coordinates[members].mean(axis=0), SPLINE_MEMBERS)
+            kernel, degree = ("cubic", 1) if near.size >= 3 * (coordinates.shape[1] + 1) else ("linear", 0)
+            weights = spline_weights(coordinates[near], coordinates[members], kernel, degree)
+            start = start if weights is None else start + blend(self.changed, near, weights, 0, start.shape[2])
+        for slot, member in enumerate(members):
+            if int(member) in self.stalled:
+                start[..., slot] = self.stalled[int(member)]
+        return start
+
 
 def solve_nested(grids: Sequence[GridProblem], points: Array, tolerance: float, how: FallBack) -> SolvedMembers:
-    """Steady states of all members on the last grid, the finest, each of twice as many cells as the one before along
-    one axis or both; points (m, d): where they are in the unit cube.
+    """x = P x_c + d, grid by grid: steady states of all members on the last grid.
+
+    On each grid the central member of those left is solved by itself, then all that its factors lead to.
+
+    Parameters
+    ----------
+    grids
+        From the coarsest to the finest, each of twice as many cells as the one before along one axis or both.
+    points
+        Where the members are in the unit cube of prior probabilities (m, d).
+    tolerance
+        Of corrections [m, m/s] on the finest grid.
+    how
+        How members are marched if Newton fails.
+
+    Returns
+    -------
+    SolvedMembers
+        NaN for members that have no steady state.
     """
     loose = max(tolerance, STRIDE_TOLERANCE)
     coarsest = grids[0]
@@ -89,25 +122,19 @@ def solve_nested(grids: Sequence[GridProblem], points: Array, tolerance: float, 
         solved = none_solved(grid.problem)
         changed = np.empty((len(points), *lifted.shape[:3]))
         level = _Level(grid.problem, coordinates, lifted, known, changed, solved)
-        _solve_level(level, tolerance if grid is grids[-1] else loose, how)
+        pending = np.arange(len(points))
+        while pending.size:
+            member = int(nearest_members(coordinates, pending, coordinates[pending].mean(axis=0), 1)[0])
+            _solve_around(level, member, pending[pending != member], tolerance if grid is grids[-1] else loose, how)
+            pending = pending[(solved.status[pending] == FAILED) & (pending != member)]
+        solved.state[..., solved.status == FAILED] = np.nan
     return solved
-
-
-def _solve_level(level: _Level, tolerance: float, how: FallBack) -> None:
-    """One reference after the other, the central one of those left, each for all that its factors lead to."""
-    pending = np.arange(len(level.coordinates))
-    while pending.size:
-        centre = level.coordinates[pending].mean(axis=0)
-        member = int(nearest_members(level.coordinates, pending, centre, 1)[0])
-        _solve_around(level, member, pending[pending != member], tolerance, how)
-        pending = pending[(level.solved.status[pending] == FAILED) & (pending != member)]
-    level.solved.state[..., level.solved.status == FAILED] = np.nan
 
 
 def _solve_around(level: _Level, member: int, pending: np.ndarray, tolerance: float, how: FallBack) -> None:
     """A member by itself, and those pending that its factors lead to, the nearest first."""
-    solved, alone = level.solved, np.array([member])
-    warm = _starts(level, alone) if level.known[member] else None
+    solved, alone, rows = level.solved, np.array([member]), level.problem.shape[1]
+    warm = level.starts(alone) if level.known[member] else None
     reference = solve_alone(take(level.problem, alone), warm, tolerance, how)
     solved.iterations[member] += reference.iterations
     if reference.factors is None:
@@ -115,46 +142,21 @@ def _solve_around(level: _Level, member: int, pending: np.ndarray, tolerance: fl
         solved.state[..., member] = reference.state[..., 0]
         return
     level.keep(alone, reference.state)
-    near = squared_distances(level.coordinates[pending], level.coordinates[member])
+    near, band = squared_distances(level.coordinates[pending], level.coordinates[member]), reference.band
     queue = pending[np.argsort(near, kind="stable")]
-    queue, part = queue[level.known[queue]], crop(level.problem, *reference.band)
+    queue, part = queue[level.known[queue]], crop(level.problem, *band)
+
+    def keep(members: np.ndarray, ended: ChordSolution) -> None:
+        """Members that converged within the band."""
+        solved.iterations[members] += ended.iterations
+        good = ended.converged & ~overflows(take(part, members), ended.state, band, rows)
+        if good.any():
+            level.keep(members[good], widen(ended.state[..., good], rows, band))
+        for slot in np.flatnonzero(~good & (ended.correction < CLOSE)):
+            level.stalled[int(members[slot])] = widen(ended.state[..., slot : slot + 1], rows, band)[..., 0]
 
     def starts_of(members: np.ndarray) -> Array:
-        return rows_inside(_starts(level, members), reference.band)
+        return rows_inside(level.starts(members), band)
 
-    deliver = partial(_delivered, level, part, reference.band)
-    patience = IterationLimits(MOST_NESTED_STEPS, PACE, SIDE_BY_SIDE)
-    stream(part, queue, starts_of, reference.factors, tolerance, patience, NESTED_LANES, deliver)
-
-
-def _delivered(level: _Level, part: Problem, band: tuple[int, int], members: np.ndarray, ended: ChordSolution) -> None:
-    """Members kept that converged within the band."""
-    level.solved.iterations[members] += ended.iterations
-    rows = level.problem.shape[1]
-    good = ended.converged & ~overflows(take(part, members), ended.state, band, rows)
-    if good.any():
-        level.keep(members[good], widen(ended.state[..., good], rows, band))
-    for lane in np.flatnonzero(~good & (ended.correction < CLOSE)):
-        level.stalled[int(members[lane])] = widen(ended.state[..., lane : lane + 1], rows, band)[..., 0]
-
-
-def _estimates(level: _Level, members: np.ndarray) -> Array:
-    """P x_c + d of some members (nx, 3, ny, n), d from splines through the solved members nearest to them, if any."""
-    start = np.ascontiguousarray(level.lifted[..., members])
-    done = np.flatnonzero((level.solved.status == SOLVED_BY_NEWTON) & level.known)
-    if not done.size:
-        return start
-    coordinates = level.coordinates
-    near = nearest_members(coordinates, done, coordinates[members].mean(axis=0), SPLINE_MEMBERS)
-    kernel, degree = ("cubic", 1) if near.size >= 3 * (coordinates.shape[1] + 1) else ("linear", 0)
-    weights = spline_weights(coordinates[near], coordinates[members], kernel, degree)
-    return start if weights is None else start + blend(level.changed, near, weights, 0, start.shape[2])
-
-
-def _starts(level: _Level, members: np.ndarray) -> Array:
-    """Where members begin, (nx, 3, ny, n): where they stalled with the factors of another reference, else estimates."""
-    start = _estimates(level, members)
-    for lane, member in enumerate(members):
-        if int(member) in level.stalled:
-            start[..., lane] = level.stalled[int(member)]
-    return start
+    limits = IterationLimits(MOST_NESTED_STEPS, PACE, SIDE_BY_SIDE)
+    stream(part, queue, starts_of, reference.factors, tolerance, limits, NESTED_SLOTS, keep)

@@ -46,8 +46,8 @@ class LinearisedMember:
 
 @dataclass(frozen=True)
 class ReferenceMember:
-    """A member that others lean on: its state (nx, 3, ny, 1) and, unless it had to be marched, the factors in its band
-    of rows and, where they were asked for, its tangents.
+    """A member whose factors serve its neighbours: its state (nx, 3, ny, 1) and, unless it had to be marched, the
+    factors in its band of rows and, if they were asked for, its tangents.
     """
 
     state: Array
@@ -76,8 +76,8 @@ def solve_reference(
 
 
 def solve_alone(problem: Problem, warm: Array | None, tolerance: float, how: FallBack) -> ReferenceMember:
-    """From a warm start by one factorisation, then by Newton; then by Newton from cold; then by marching. Without
-    tangents.
+    """R(x) = 0 of one member without its neighbours: from a warm start if there is one, then from a cold one, then by
+    marching; without tangents.
     """
     spent = 0
     for start in [warm, None] if warm is not None else [None]:
@@ -86,7 +86,13 @@ def solve_alone(problem: Problem, warm: Array | None, tolerance: float, how: Fal
         if shared is not None:
             state = widen(solution.state, problem.shape[1], band)
             return ReferenceMember(state, SOLVED_BY_NEWTON, "", spent, None, shared, band)
-    return _marched(problem, spent, tolerance, how)
+    cold, rows = backwater(problem), (0, problem.shape[1])
+    marched = march_to_rest(problem, cold, tolerance, how)
+    spent += marched.steps
+    if marched.steady:
+        return ReferenceMember(marched.state, SOLVED_BY_MARCHING, "", spent, None, None, rows)
+    reason = f"no steady state: {marched.sentence}"
+    return ReferenceMember(np.full_like(cold, np.nan), FAILED, reason, spent, None, None, rows)
 
 
 def reference_at(problem_of: ProblemOf, problem: Problem, point: Array, state: Array) -> ReferenceMember:
@@ -100,7 +106,7 @@ def reference_at(problem_of: ProblemOf, problem: Problem, point: Array, state: A
 def reference_beside(
     problem_of: ProblemOf, problem: Problem, point: Array, other: ReferenceMember, tolerance: float, how: FallBack
 ) -> ReferenceMember:
-    """A reference near another: with the factors of that one, if they reach, else on its own."""
+    """A reference near another: with the factors of that one if they converge, else on its own."""
     assert other.linearised is not None
     assert other.factors is not None
     start = other.linearised.predict(point[None])
@@ -114,45 +120,46 @@ def reference_beside(
 
 
 def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
-    """One member: its state in the band of rows that may be wet, the factors there, and that band.
+    """R(x) = 0 of one member by one factorisation, then by Newton.
 
-    warm (nx, 3, ny, 1): a state nearby to begin from, else a rough estimate is. Without factors, it has not converged.
+    Parameters
+    ----------
+    problem
+        Of the member.
+    warm
+        A state nearby to begin from (nx, 3, ny, 1); a rough estimate if None, and then by Newton only.
+    tolerance
+        Of corrections [m, m/s].
+
+    Returns
+    -------
+    solution, factors, band
+        Its state in the band of rows that may be wet, the factors there, None if it has not converged, and that band.
     """
-    attempts: list[Callable[[], Attempt]] = [lambda: _from_cold(problem, tolerance)]
-    if warm is not None:
-        attempts = [lambda: _quick(problem, warm, tolerance), lambda: _by_newton(problem, warm, tolerance, FROM_NEARBY)]
-    spent = 0
-    for attempt in attempts:
-        solution, shared, band = attempt()
-        spent += int(solution.iterations[0])
-        solution = replace(solution, iterations=np.array([spent]))
-        if solution.converged[0] and shared is not None:
-            return solution, shared, band
-    return solution, None, band
-
-
-def _quick(problem: Problem, warm: Array, tolerance: float) -> Attempt:
+    if warm is None:
+        return _by_newton(problem, backwater(problem), tolerance, FROM_AFAR)
     band = wet_band(problem, warm)
     solution, shared = finish(crop(problem, *band), rows_inside(warm, band), tolerance)
-    return _checked(problem, solution, shared, band, tolerance)
+    solution, shared, band = _in_wider_band(problem, solution, shared, band, tolerance)
+    if solution.converged[0] and shared is not None:
+        return solution, shared, band
+    again, shared, band = _by_newton(problem, warm, tolerance, FROM_NEARBY)
+    return replace(again, iterations=solution.iterations + again.iterations), shared, band
 
 
-def _by_newton(problem: Problem, warm: Array, tolerance: float, how: Beginning) -> Attempt:
-    band = wet_band(problem, warm)
+def _by_newton(problem: Problem, start: Array, tolerance: float, how: Beginning) -> Attempt:
+    band = wet_band(problem, start)
     part = crop(problem, *band)
-    near = newton(part, rows_inside(warm, band), CLOSE, how)
+    near = newton(part, rows_inside(start, band), CLOSE, how)
     if not near.converged[0]:
         return near, None, band
     solution, shared = finish(part, near.state, tolerance)
     solution = replace(solution, iterations=solution.iterations + near.iterations)
-    return _checked(problem, solution, shared, band, tolerance)
+    solution, shared, band = _in_wider_band(problem, solution, shared, band, tolerance)
+    return solution, shared if solution.converged[0] else None, band
 
 
-def _from_cold(problem: Problem, tolerance: float) -> Attempt:
-    return _by_newton(problem, backwater(problem), tolerance, FROM_AFAR)
-
-
-def _checked(
+def _in_wider_band(
     problem: Problem, solution: ChordSolution, shared: Factors | None, band: tuple[int, int], tolerance: float
 ) -> Attempt:
     """Solved again in a wider band if water came to stand at the edge of this one."""
@@ -166,31 +173,13 @@ def _checked(
 
 
 def _with_tangents(problem_of: ProblemOf, problem: Problem, point: Array, solved: ReferenceMember) -> ReferenceMember:
-    """A reference with factors, and its tangents at the point."""
+    """A reference with its tangents -J^-1 dR/ds_p, dR by one-sided differences: good enough to start from."""
     assert solved.factors is not None
-    part, near = crop(problem, *solved.band), rows_inside(solved.state, solved.band)
-    slopes = _tangents(problem_of, point, part, solved.band, near, solved.factors)
-    wide = tuple(widen(slope, problem.shape[1], solved.band) for slope in slopes)
-    return replace(solved, linearised=LinearisedMember(point, solved.state, wide))
-
-
-def _tangents(
-    problem_of: ProblemOf, point: Array, part: Problem, band: tuple[int, int], state: Array, shared: Factors
-) -> list[Array]:
-    """-J^-1 dR/ds_p by one-sided differences of the residual in s, good enough to start from."""
-    base = residual(part, state)
+    band, state = solved.band, rows_inside(solved.state, solved.band)
+    base = residual(crop(problem, *band), state)
     steps = np.where(point < 0.5, TANGENT_STEP, -TANGENT_STEP)
-    moved = crop(problem_of(point + np.diag(steps)), *band)
-    rates = residual(moved, np.repeat(state, point.size, axis=3))
-    tangents = -shared.solve((rates - base) / steps)
-    return [np.ascontiguousarray(tangents[..., p : p + 1]) for p in range(point.size)]
-
-
-def _marched(problem: Problem, spent: int, tolerance: float, how: FallBack) -> ReferenceMember:
-    """The fall-back: march from a cold start; a member that does not come to rest has failed, and says so."""
-    start = backwater(problem)
-    marched = march_to_rest(problem, start, tolerance, how)
-    status = SOLVED_BY_MARCHING if marched.steady else FAILED
-    reason = "" if marched.steady else f"no steady state: {marched.sentence}"
-    state = marched.state if marched.steady else np.full_like(start, np.nan)
-    return ReferenceMember(state, status, reason, spent + marched.steps, None, None, (0, problem.shape[1]))
+    rates = residual(crop(problem_of(point + np.diag(steps)), *band), np.repeat(state, point.size, axis=3))
+    tangents = -solved.factors.solve((rates - base) / steps)
+    slopes = [np.ascontiguousarray(tangents[..., p : p + 1]) for p in range(point.size)]
+    wide = tuple(widen(slope, problem.shape[1], band) for slope in slopes)
+    return replace(solved, linearised=LinearisedMember(point, solved.state, wide))
