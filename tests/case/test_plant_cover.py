@@ -12,7 +12,7 @@ from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.plant_cover import share_in_patch
 from vegglue.case.polygons import area_of, corners_of
 from vegglue.case.schema import Case
-from vegglue.diagnosis.channel_and_plants import remarks_on_patches
+from vegglue.diagnosis.channel_check import PatchHidden, remarks_on_patches
 from vegglue.flow.closures import drag
 from vegglue.flow.problem_setup import build_problem
 
@@ -94,7 +94,7 @@ def test_patches_side_by_side_share_a_cell(tmp_path: Path) -> None:
 def test_patches_that_meet_within_cells_lose_none_to_each_other(tmp_path: Path) -> None:
     """Half of a row each: no cell is hidden by the later one."""
     case, site = case_with(tmp_path, "x: [10, 14], y: [0, 0.75]", "x: [10, 14], y: [0.75, 1.5]")
-    assert not [one for one in remarks_on_patches(case, site) if "loses" in one]
+    assert not [one for one in remarks_on_patches(case, site) if isinstance(one, PatchHidden)]
 
 
 def test_a_later_patch_wins_where_it_lies_over_another(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.workflow import discover as verb
 from vegglue.workflow.case_run import CaseRun
-from vegglue.workflow.check import check_effects, doubts_of
+from vegglue.workflow.check import check_effects, critical_warnings
 from vegglue.workflow.discover import DiscoveredCase, discover
 
 CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
@@ -142,7 +142,7 @@ def test_a_law_beyond_its_range_is_doubted(
     """In the experiments whose measured cells lie outside, by the numbers that its file holds."""
     child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=seen)).child
     assert child is not None
-    said = doubts_of(CaseRun(child))
+    said = critical_warnings(CaseRun(child))
     assert [name for name in child.experiments if any(f"`{name}`" in one for one in said)] == doubted
     assert all("`bank_speed_step`" in one and f"{seen[0]:g} to {seen[1]:g} m/s" in one for one in said)
 
@@ -151,7 +151,7 @@ def test_a_law_is_doubted_where_nothing_is_measured_too(monkeypatch: pytest.Monk
     child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=(0.5, 0.9))).child
     assert child is not None
     dry = Experiment(discharge={"upstream": 0.3}, level=0.4)
-    said = doubts_of(CaseRun(child.model_copy(update={"experiments": {**child.experiments, "dry summer": dry}})))
+    said = critical_warnings(CaseRun(child.model_copy(update={"experiments": {**child.experiments, "dry summer": dry}})))
     assert any("`dry summer`" in one for one in said)
 
 
@@ -160,7 +160,7 @@ def test_a_law_is_not_doubted_where_it_does_not_act(monkeypatch: pytest.MonkeyPa
     child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=(0.5, 0.9))).child
     assert child is not None
     in_mid = {name: entry.model_copy(update={"experiments": ("mid",)}) for name, entry in child.effects.items()}
-    (said,) = doubts_of(CaseRun(child.model_copy(update={"effects": in_mid})))
+    (said,) = critical_warnings(CaseRun(child.model_copy(update={"effects": in_mid})))
     assert "in experiment `mid`" in said
 
 

@@ -7,8 +7,7 @@ import pytest
 
 from vegglue.calibration.candidates import candidates_of
 from vegglue.case.config import load_case
-from vegglue.diagnosis.effect_contract import breaches
-from vegglue.diagnosis.trial_channel import moving_water, trial
+from vegglue.diagnosis.effect_contract import breaches, moving_water, trial
 from vegglue.effects.definition import Effect
 from vegglue.effects.grammar import EFFECTS, LAWS, PRODUCTS, SAME_AS, Law
 from vegglue.effects.library import SHIPPED, library

@@ -10,7 +10,7 @@ from channels import make_problem, planted, sloping, solved
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import Stand
-from vegglue.diagnosis.trial_channel import CHANNEL
+from vegglue.diagnosis.effect_contract import CHANNEL
 from vegglue.effects.plant_laws import PLANT_LAWS
 from vegglue.flow.closures import drag
 from vegglue.flow.equations import faces

@@ -13,6 +13,7 @@ from vegglue.case.frame import Frame
 from vegglue.case.grid import Grid
 from vegglue.case.gridded_site import build_site
 from vegglue.case.polygons import area_of, in_polygon
+from vegglue.diagnosis.channel_check import BedHighestInMiddle
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.measured_rows import Placement
@@ -291,7 +292,7 @@ def test_depths_are_no_levels_of_a_bed(tmp_path: Path) -> None:
     (tmp_path / "bed.csv").rename(folder / "bed.csv")
     case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
     remarks = vegglue.check(case, runs=tmp_path / "runs").remarks
-    assert [one for one in remarks if one.startswith("The bed is higher along its middle than at both sides, by ")]
+    assert [one for one in remarks if isinstance(one, BedHighestInMiddle)]
 
 
 def test_what_a_bed_has_no_use_for_is_told_as_not_read(tmp_path: Path) -> None:

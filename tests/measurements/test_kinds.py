@@ -10,7 +10,15 @@ from reach import said_to, write_reach
 from vegglue.case.config import load_case
 from vegglue.errors import InputError
 from vegglue.flow.sensor import READERS
-from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, kind_of, unstated_errors, velocity_rows
+from vegglue.measurements.kinds import (
+    KINDS,
+    STREAMWISE,
+    WATER_LEVEL,
+    UnstatedErrors,
+    kind_of,
+    unstated_errors,
+    velocity_rows,
+)
 from vegglue.measurements.observations import Observations, read_observations
 
 GIVEN = "- {kind: velocity, file: velocities.csv, experiment: June}"
@@ -97,14 +105,16 @@ def test_a_misspelt_kind_is_refused_with_the_config_and_the_file(
 
 
 @pytest.mark.parametrize(
-    ("errors", "advice"),
+    ("errors", "counts", "y", "fill", "add"),
     [
-        ((0.01, 0.0, 0.01), "x = 8, y = 2 m: give `u_se` there, too, or say it in the site file, as in `files: {NAME"),
-        ((0.0, 0.0, 0.01), "x = 8, y = 1 m: add a column `u_se`, or say it in the site file"),
-        ((0.01, 0.0, 0.0), "give `u_se` there, too, and add a column `level_se`, or say it"),
+        ((0.01, 0.0, 0.01), (("velocity", 1),), 2.0, ("u_se",), ()),
+        ((0.0, 0.0, 0.01), (("velocity", 2),), 1.0, (), ("u_se",)),
+        ((0.01, 0.0, 0.0), (("velocity", 1), ("level", 1)), 2.0, ("u_se",), ("level_se",)),
+        ((0.01, 0.01, 0.01), None, 0.0, (), ()),
     ],
 )
-def test_an_error_that_one_reading_lacks_needs_no_new_column(errors: tuple[float, ...], advice: str) -> None:
-    """`add a column u_se` was said of one empty cell of that column."""
+def test_an_error_that_one_reading_lacks_needs_no_new_column(errors, counts, y, fill, add) -> None:
+    """`add a column u_se` was the advice for one empty cell of that column."""
     table = pd.DataFrame({"kind": ["velocity", "velocity", "level"], "standard_error": errors, "used": True})
-    assert advice in str(unstated_errors(table.assign(x=8.0, y=[1.0, 2.0, 3.0])))
+    found = unstated_errors(table.assign(x=8.0, y=[1.0, 2.0, 3.0]))
+    assert found == (None if counts is None else UnstatedErrors(counts, (8.0, y), fill, add, (0.015, "m/s")))

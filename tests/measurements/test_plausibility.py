@@ -65,11 +65,11 @@ def replaced(row: int, value: float, column: str = "value") -> Change:
     return lambda table: table.assign(**{column: table[column].where(table.index != row, value)})
 
 
-def is_of(found: Found, problem: Symptom, **expected: Any) -> bool:
+def is_of(found: Found, symptom: Symptom, **expected: Any) -> bool:
     """Whether one thing alone was found, with these values; numbers to two digits."""
     (one,) = found
     assert isinstance(one, ImplausibleValues)
-    for name, value in {"problem": problem, "unit": "", **expected}.items():
+    for name, value in {"symptom": symptom, "unit": "", **expected}.items():
         near = name in ("size", "first")
         assert getattr(one, name) == (pytest.approx(value, rel=0.05) if near else value), name
     return True
@@ -106,7 +106,7 @@ GAUGING = {"quantity": "discharge", "si_unit": "m3/s", "count": 1, "total": 1}
 
 
 @pytest.mark.parametrize(
-    ("change", "problem", "expected"),
+    ("change", "symptom", "expected"),
     [
         (replaced(3, -999.0), Symptom.MISSING_MARK, FOURTH | {"first": (-999.0, 8.0, 1.25), "si_unit": "m/s"}),
         (replaced(3, 99.9), Symptom.MISSING_MARK, FOURTH | {"first": (99.9, 8.0, 1.25)}),
@@ -139,15 +139,15 @@ GAUGING = {"quantity": "discharge", "si_unit": "m3/s", "count": 1, "total": 1}
     ],
 )
 def test_what_no_flow_can_show_is_found_once(
-    tmp_path: Path, change: Change, problem: Symptom, expected: Mapping[str, Any]
+    tmp_path: Path, change: Change, symptom: Symptom, expected: Mapping[str, Any]
 ) -> None:
-    assert is_of(found_in(tmp_path, change), problem, **expected)
+    assert is_of(found_in(tmp_path, change), symptom, **expected)
 
 
 def test_a_unit_is_a_value_of_its_own_and_no_part_of_the_problem(tmp_path: Path) -> None:
     """Two sections of one experiment in two units are one problem with two units."""
     both = found_in(tmp_path, lambda table: scaled(1000, section="below")(scaled(100, section="above")(table)))
-    assert [(one.problem, one.unit, one.places) for one in both] == [
+    assert [(one.symptom, one.unit, one.places) for one in both] == [
         (Symptom.FAST, "cm/s", (("June", "above"),)),
         (Symptom.FAST, "mm/s", (("June", "below"),)),
     ]
@@ -180,7 +180,7 @@ def test_errors_are_not_held_against_a_discharge_that_is_in_doubt(tmp_path: Path
         return pd.concat([table, along.assign(kind="velocity_across", value=0.01)] if across else [table])
 
     litres = found_in(tmp_path, lambda table: change(table).reset_index(), ("discharge: 2.0", "discharge: 2000"))
-    assert [(one.quantity, one.count, one.problem) for one in litres] == [
+    assert [(one.quantity, one.count, one.symptom) for one in litres] == [
         ("velocity", 15, Symptom.SLOW),
         ("discharge", 1, Symptom.SMALL_DISCHARGE),
     ]
@@ -232,7 +232,7 @@ LOW, HIGH = (("low", "D0"),), (("high", None),)
 
 
 @pytest.mark.parametrize(
-    ("change", "problem", "expected"),
+    ("change", "symptom", "expected"),
     [
         (scaled(100, section="D0", experiment="low"), Symptom.FAST, {"count": 17, "unit": "cm/s", "places": LOW}),
         (
@@ -245,7 +245,7 @@ LOW, HIGH = (("low", "D0"),), (("high", None),)
     ],
 )  # fmt: skip
 def test_a_campaign_with_one_wrong_unit_shows_its_place(
-    tmp_path: Path, change: Change, problem: Symptom, expected: Mapping[str, Any]
+    tmp_path: Path, change: Change, symptom: Symptom, expected: Mapping[str, Any]
 ) -> None:
     case = imported("open-a", tmp_path)
-    assert is_of(implausible_values(case, build_site(case), change(read_observations(case).table)), problem, **expected)
+    assert is_of(implausible_values(case, build_site(case), change(read_observations(case).table)), symptom, **expected)

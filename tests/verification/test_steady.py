@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from vegglue.case.grid import Grid
-from vegglue.diagnosis.trial_channel import mirrored
+from vegglue.diagnosis.effect_contract import mirrored
 from vegglue.effects import bed_laws
 from vegglue.flow.batch import solve_members
 from vegglue.flow.chord import chord

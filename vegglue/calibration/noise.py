@@ -25,6 +25,7 @@ from vegglue.errors import InputError
 from vegglue.measurements.kinds import kind_of, unstated_errors
 from vegglue.measurements.sections import section_places
 from vegglue.parallel import in_threads
+from vegglue.wording.sentences import sentence
 
 # What an instrument that is off adds, over the largest standard error of its readings [-]: so large that it is free,
 # and the covariance can still be factored.
@@ -113,7 +114,7 @@ def noise_of(station: pd.DataFrame, fallback: dict[str, float] | None = None) ->
     for kind, value in (fallback or {}).items():
         error[(used["kind"] == kind).to_numpy() & ~(error > 0)] = value
     if not (error > 0).all():
-        raise InputError(f"observations: {unstated_errors(used.assign(standard_error=error))}")
+        raise InputError(f"observations: {sentence(unstated_errors(used.assign(standard_error=error)))}")
     noise = Noise(
         rows=np.flatnonzero(station["used"].to_numpy()),
         value=used["value"].to_numpy(float),

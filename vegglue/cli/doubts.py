@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import vegglue
+from vegglue.wording.sentences import sentence
 
 if TYPE_CHECKING:
     from vegglue.workflow.case_run import CaseRun
@@ -25,10 +26,10 @@ def opened_runs(configs: Sequence[Path], trust: bool) -> "list[CaseRun]":
     """The same of several configs, each warning once."""
     cases = [vegglue.load_case(config, trust) for config in configs]
     from vegglue.workflow.case_run import CaseRun
-    from vegglue.workflow.check import doubts_of
+    from vegglue.workflow.check import critical_warnings
 
     first, *others = [CaseRun(case) for case in cases]
     several = [first, *(replace(one, beside=first) for one in others)]
-    for sentence in dict.fromkeys(sentence for run in several for sentence in doubts_of(run)):
-        print(f"Doubtful: {sentence}", file=sys.stderr, flush=True)
+    for text in dict.fromkeys(sentence(one) for run in several for one in critical_warnings(run)):
+        print(f"Doubtful: {text}", file=sys.stderr, flush=True)
     return several

@@ -10,6 +10,7 @@ from vegglue.cli.hearing import heard
 from vegglue.cli.options import FLAG, RUNS, Config, Force, Json, Quiet, Runs, Trust
 from vegglue.cli.output import command_line, print_object
 from vegglue.errors import InputError, shown_path
+from vegglue.wording.sentences import sentences
 
 if TYPE_CHECKING:
     from vegglue.case.schema import Case
@@ -138,15 +139,15 @@ def _draw(case: "Case", effect: "Effect", runs: Path, quiet: bool) -> None:
 def _check(file: Path, as_object: bool, trust: bool) -> None:
     from vegglue.workflow.check import check_effects
 
-    found = check_effects(file, trust=trust)
+    found = {name: sentences(broken) for name, broken in check_effects(file, trust=trust).items()}
     if as_object:
         print_object(found)
     else:
-        for name, sentences in found.items():
-            print(f"{name}: {'keeps the contract' if not sentences else 'breaks it'}")
-            for sentence in sentences:
-                print(f"  - {sentence}")
-    broken = [name for name, sentences in found.items() if sentences]
+        for name, breaches in found.items():
+            print(f"{name}: {'breaks the contract' if breaches else 'keeps the contract'}")
+            for breach in breaches:
+                print(f"  - {breach}")
+    broken = [name for name, breaches in found.items() if breaches]
     if broken:
         raise InputError(f"{file}: {len(broken)} of {len(found)} effects break the contract: {', '.join(broken)}.")
 

@@ -16,6 +16,7 @@ from vegglue.results.diagnosis import Diagnosis, diagnosis_json
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.results.posterior import Posterior
+from vegglue.wording.sentences import sentences, tagged
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.discover import DiscoveredCase
@@ -86,8 +87,9 @@ def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Told:
 def _checked(case: Case, found: CheckedCase) -> Told:
     return {
         "case": case.name, "experiments": list(case.experiments), "cells": found.cells, "stations": found.stations,
-        "used_stations": found.used_stations, "remarks": found.remarks, "picture": found.picture,
+        "used_stations": found.used_stations, "remarks": sentences(found.remarks), "picture": found.picture,
         "sections": [_carried(one) for one in found.carried],
+        "findings": [tagged(one) for one in found.remarks],
     }  # fmt: skip
 
 

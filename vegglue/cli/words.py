@@ -13,6 +13,7 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.wording.numbers import so_many
+from vegglue.wording.sentences import sentences
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.discover import DiscoveredCase
@@ -63,7 +64,7 @@ def _show_discovery(result: DiscoveredCase) -> None:
 
 def _show_check(case: Case, found: CheckedCase) -> None:
     show_carried(found.carried)
-    for sentence in found.remarks:
+    for sentence in sentences(found.remarks):
         print(f"- {sentence}")
     print(
         f"{case.name}: {so_many(len(case.experiments), 'experiment')}, {found.cells:,} cells, {found.used_stations} of "

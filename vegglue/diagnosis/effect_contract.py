@@ -1,27 +1,21 @@
 """What every effect must keep, tried in a small channel: floor, banks, plants under water and plants that stand out.
 
-Both shipped effects and a user's own are judged here; `breaches` says in sentences what is wrong.
+Shipped effects and a user's own are judged alike. `breaches` returns what an effect breaks as values, whose words stand
+in `wording/templates/checks.j2`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
 from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.diagnosis.trial_channel import (
-    PAIRS,
-    Trial,
-    answer,
-    at_rest,
-    dry,
-    mirrored,
-    moving_water,
-    running_back,
-    sizes,
-    trial,
-)
+from vegglue.case.gridded_site import Site, build_site
+from vegglue.case.schema import Case
 from vegglue.effects.active_effect import applied
 from vegglue.effects.definition import Effect
 from vegglue.effects.surroundings import PlantCells
@@ -29,129 +23,274 @@ from vegglue.errors import InputError
 from vegglue.flow.closures import closures
 from vegglue.flow.equations import faces, residual
 from vegglue.flow.newton import newton
-from vegglue.flow.problem import ALONG, Problem, crop, take
+from vegglue.flow.problem import ACROSS, ALONG, LEVEL, Problem, crop, take
+from vegglue.flow.problem_setup import build_problem
+from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.flow.starts import backwater
 
 # Column of cells from which on water is made faster, and how many upstream of it may feel that.
 CHANGED, FELT_AFAR = 20, 4
+# What a faulty function of an effect may raise.
+OF_ITS_FUNCTION = (ValueError, TypeError, KeyError, IndexError, AttributeError, NameError)
+AMPLITUDE = "amplitude"
+CHANNEL = {
+    "name": "contract",
+    "grid": {"x": (0.0, 20.0), "y": (-4.0, 4.0), "cell": (0.5, 0.5)},
+    "bed": [
+        {"trapezoid": {"axis": 0.0, "bottom_width": 4.0, "bank_slope": 0.6, "bed_slope": 0.001, "level": 0.02}},
+    ],
+    "friction": {
+        "classes": {"floor": {"law": "manning", "n": 0.04}, "bank": {"law": "keulegan", "k_s": 0.5}},
+        "default": "floor",
+        "zones": [{"class": "bank", "beyond_slope_break": 0.2}],
+    },
+    "plants": {
+        "stands": {"low": {"phi": 3.75, "canopy_height": 0.4}, "high": {"phi": 1.6, "canopy_height": 1.2}},
+        "patches": [
+            {"name": "low", "stand": "low", "x": (6.0, 9.0), "y": (-1.0, 1.0), "stems": 0.8},
+            {"name": "high", "stand": "high", "x": (13.0, 15.0), "y": (-1.0, 1.0), "stems": 1.25},
+        ],
+    },
+    "inflows": {"main": {"side": "west"}},
+    "experiments": {"flow": {"discharge": {"main": 1.2}, "level": 0.7}},
+    "parameters": {AMPLITUDE: {"distribution": "uniform", "low": 0.0, "high": 1.0, "unit": "-"}},
+}
+# Stations stand in pairs that change places in the mirror.
+TRIAL_STATIONS = pd.DataFrame(
+    [
+        {"experiment": "flow", "kind": kind, "section": section, "x": x, "y": y, "device": device}
+        for kind, section, device in (("velocity", "A", "probe"), ("level", "gauges", "gauge"))
+        for x in (4.1, 8.0, 11.3)
+        for y in (-1.9, -0.4, 0.4, 1.9)
+    ]
+)
+PAIRS = np.arange(len(TRIAL_STATIONS)).reshape(-1, 4)[:, ::-1].ravel()
 
 
-def breaches(effect: Effect, own: Path | None = None) -> list[str]:
-    """What an effect breaks, in sentences; none for a good one."""
+class ContractRule(Enum):
+    """What every effect must keep. The comment gives what a Breach holds besides."""
+
+    WORD_MISSING = "every word of the declaration is stated"  # name of the word
+    PARAMETER_UNDECLARED = "every parameter has a unit and a meaning"  # name
+    PARAMETER_TWICE = "no two parameters share a name"  # name
+    AMPLITUDE_FINITE = "low, high, off and scale are finite"
+    OFF_WITHIN_SUPPORT = "off lies within low and high"  # values: off, low, high
+    SCALE_WITHIN_SUPPORT = "scale lies within the support, power is at least 1"
+    SHAPE_WITHIN_SUPPORT = "default and grid of a shape lie within low and high"  # name; values: low, high
+    FUNCTION_RUNS = "its function runs"  # name: the error
+    REPEATS = "the same flow gives the same answer"
+    FINITE = "all it changes stays finite"  # water
+    OFF_IS_OFF = "nothing changes while it is off"  # name of the amplitude; water
+    ACTS = "something changes in moving water"  # name of the amplitude
+    POWER = "a small amplitude acts with its power"  # name of the amplitude; values: power
+    TURNS = "below off it acts the other way round"  # name of the amplitude
+    DRAG_POSITIVE = "the friction rate stays at or above 0"  # water
+    VISCOSITY_POSITIVE = "the viscosity stays at or above 0"  # water
+    PLANTS_POSITIVE = "phi and canopy height stay above 0"  # name
+    INFLOW_POSITIVE = "discharge and spread of an inflow stay above 0"
+    MIRRORED = "a mirrored flow feels the mirrored effect"
+    MEMBERS_ALONE = "members do not act on each other"
+    ROWS_ALONE = "it depends on the next cells across only"
+    DOWNSTREAM_ALONE = "it depends on the next cells along only"
+    SETTLES = "a steady flow exists with a plausible amplitude"  # name of the amplitude; values: amplitude
+
+
+@dataclass(frozen=True)
+class Breach:
+    """A rule that an effect breaks; name, values and water (still, moving, backward, no) as the rule needs them."""
+
+    rule: ContractRule
+    name: str = ""
+    values: tuple[float, ...] = ()
+    water: str = ""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An effect in the channel: the problem of any amplitudes (m,), and without it."""
+
+    effect: Effect
+    case: Case
+    site: Site
+
+    def problem(self, *amplitude: float) -> Problem:
+        return build_problem(self.case, self.site, "flow", {AMPLITUDE: np.array(amplitude)})
+
+    def without(self, members: int) -> Problem:
+        bare = self.case.model_copy(update={"effects": {}})
+        return build_problem(bare, self.site, "flow", {AMPLITUDE: np.zeros(members)})
+
+
+def trial(effect: Effect, own: Path | None = None) -> Trial:
+    """The channel with an effect in it; own: the file of the effect, if it is a user's."""
+    works = {effect.name: {"values": {effect.amplitude.name: AMPLITUDE}}}
+    case = Case.model_validate(CHANNEL | {"source": Path("contract"), "effect_file": own, "effects": works})
+    return Trial(effect, case, build_site(case))
+
+
+def at_rest(problem: Problem) -> Array:
+    """Still water at the level of the outlet, for every member."""
+    state = np.zeros((problem.shape[0], 3, problem.shape[1], problem.members))
+    state[:, LEVEL] = problem.boundaries.outlet_level
+    return state
+
+
+def dry(problem: Problem) -> Array:
+    """No water at all."""
+    state = at_rest(problem)
+    state[:, LEVEL] = problem.bed.min() - 1.0
+    return state
+
+
+def moving_water(problem: Problem) -> Array:
+    """Water in motion, not steady, not symmetric: every derivative differs from 0, and the banks are partly dry."""
+    nx, ny = problem.shape
+    x, y = np.linspace(0.0, 1.0, nx)[:, None, None], np.linspace(-1.0, 1.0, ny)[None, :, None]
+    state = at_rest(problem)
+    depth = np.clip(0.7 - problem.bed, 0.0, None)[..., None]
+    state[:, LEVEL] += 0.02 * (1.0 - x) + 0.002 * np.sin(7.0 * x + 2.0 * y)
+    state[:, ALONG] = depth * (0.8 + 0.2 * np.sin(9.0 * x) + 0.15 * y - 0.3 * y**2)
+    state[:, ACROSS] = depth * 0.1 * np.cos(8.0 * x + y)
+    state[:, ACROSS, 0] = 0.0
+    return state
+
+
+def running_back(problem: Problem) -> Array:
+    """Water in motion the other way, as in an eddy."""
+    state = moving_water(problem)
+    state[:, ALONG] *= -1.0
+    return state
+
+
+def mirrored(state: Array) -> Array:
+    """The state seen in a mirror along the axis."""
+    other = np.zeros_like(state)
+    other[:, LEVEL], other[:, ALONG] = state[:, LEVEL, ::-1], state[:, ALONG, ::-1]
+    other[:, ACROSS, 1:] = -state[:, ACROSS, :0:-1]
+    return other
+
+
+def answer(tried: Trial, problem: Problem, state: Array) -> tuple[Array, Array]:
+    """All that an effect can change: the residual (nx, 3, ny, m), and the readings (station, m)."""
+    return residual(problem, state), predictions_at_sensors(problem, state, tried.site.grid, TRIAL_STATIONS).T
+
+
+def sizes(effect: Effect) -> tuple[float, ...]:
+    """Amplitudes worth trying: off, a plausible one to each side as far as there is room, and both ends."""
+    a = effect.amplitude
+    return tuple(np.clip([a.off, a.off + a.scale, a.off - a.scale, a.low, a.high], a.low, a.high).tolist())
+
+
+WATERS = {"still": at_rest, "moving": moving_water, "backward": running_back, "no": dry}
+
+
+def breaches(effect: Effect, own: Path | None = None) -> list[Breach]:
+    """What an effect breaks of the contract; empty for a good one. own: the file of the effect, if it is a user's."""
     declared = list(undeclared(effect))
     if declared:
         return declared
     tried = trial(effect, own)
     try:
         with np.errstate(divide="raise", over="raise", invalid="raise", under="ignore"):
-            return list(_repeats(tried)) or [sentence for check in CHECKS for sentence in check(tried)]
+            return list(_repeats(tried)) or [breach for check in CHECKS for breach in check(tried)]
     except InputError as error:
-        return [str(error)]
+        return [Breach(ContractRule.FUNCTION_RUNS, str(error))]
     except (ArithmeticError, *OF_ITS_FUNCTION) as error:
-        return [f"its function fails: {type(error).__name__}: {error}"]
+        return [Breach(ContractRule.FUNCTION_RUNS, f"{type(error).__name__}: {error}")]
 
 
-OF_ITS_FUNCTION = (ValueError, TypeError, KeyError, IndexError, AttributeError, NameError)
-
-
-def undeclared(effect: Effect) -> Iterator[str]:
+def undeclared(effect: Effect) -> Iterator[Breach]:
     """Words and numbers of a declaration that are missing or contradict each other."""
     for word in ("name", "title", "equation", "source"):
         if not getattr(effect, word).strip():
-            yield f"`{word}` is empty: say it"
+            yield Breach(ContractRule.WORD_MISSING, word)
     for parameter in effect.parameters:
         if not (parameter.unit and parameter.meaning):
-            yield f"the parameter {parameter.name} has no unit or no meaning: say both (- for a pure number)"
+            yield Breach(ContractRule.PARAMETER_UNDECLARED, parameter.name)
     names = [parameter.name for parameter in effect.parameters]
-    yield from (f"two parameters are called {name}" for name in sorted({one for one in names if names.count(one) > 1}))
+    for name in sorted({one for one in names if names.count(one) > 1}):
+        yield Breach(ContractRule.PARAMETER_TWICE, name)
     amplitude = effect.amplitude
     if not np.isfinite([amplitude.low, amplitude.high, amplitude.off, amplitude.scale]).all():
-        yield "`low`, `high`, `off` and `scale` of the amplitude have to be finite: say what it may be at all"
+        yield Breach(ContractRule.AMPLITUDE_FINITE)
         return
     if not (amplitude.low <= amplitude.off <= amplitude.high and amplitude.low < amplitude.high):
-        yield f"off = {amplitude.off:g} lies outside {amplitude.low:g} to {amplitude.high:g}"
+        yield Breach(
+            ContractRule.OFF_WITHIN_SUPPORT, amplitude.name, (amplitude.off, amplitude.low, amplitude.high)
+        )
     if not (0.0 < amplitude.scale <= amplitude.high - amplitude.low) or amplitude.power < 1:
-        yield "the amplitude needs a `scale` above 0 within its support, and a `power` of at least 1"
+        yield Breach(ContractRule.SCALE_WITHIN_SUPPORT)
     for shape in effect.shapes:
         if not all(shape.low <= value <= shape.high for value in (shape.default, *shape.grid)):
-            yield f"default or grid of {shape.name} lie outside {shape.low:g} to {shape.high:g}"
+            yield Breach(ContractRule.SHAPE_WITHIN_SUPPORT, shape.name, (shape.low, shape.high))
 
 
-def _repeats(tried: Trial) -> Iterator[str]:
-    """The same flow feels the same, whenever it is asked."""
+def _repeats(tried: Trial) -> Iterator[Breach]:
+    """The same flow feels the same, however often it is tried."""
     problem = tried.problem(*sizes(tried.effect))
     state = moving_water(problem)
     first, again = answer(tried, problem, state), answer(tried, problem, state)
     if not all(np.array_equal(a, b, equal_nan=True) for a, b in zip(first, again, strict=True)):
-        yield "the same flow is answered otherwise when asked again: keep nothing between calls, use no random numbers"
+        yield Breach(ContractRule.REPEATS)
 
 
-def _off_is_off(tried: Trial) -> Iterator[str]:
+def _finite(tried: Trial) -> Iterator[Breach]:
+    problem = tried.problem(*sizes(tried.effect))
+    for water, state_of in WATERS.items():
+        if not all(np.isfinite(values).all() for values in answer(tried, problem, state_of(problem))):
+            yield Breach(ContractRule.FINITE, water=water)
+
+
+def _off_is_off(tried: Trial) -> Iterator[Breach]:
     """Bit by bit, alone and beside a member where it is on."""
     off, on = tried.effect.amplitude.off, sizes(tried.effect)[1]
-    for state_of, amplitudes in product((at_rest, moving_water, dry), ((off,), (on, off))):
+    for water, amplitudes in product(("still", "moving", "no"), ((off,), (on, off))):
         problem, without = tried.problem(*amplitudes), tried.without(len(amplitudes))
-        found, wanted = (answer(tried, one, state_of(one)) for one in (problem, without))
+        found, wanted = (answer(tried, one, WATERS[water](one)) for one in (problem, without))
         if not all(np.array_equal(a[..., -1], b[..., -1]) for a, b in zip(found, wanted, strict=True)):
-            yield f"something changes although {tried.effect.amplitude.name} is off, in {_name(state_of)} water"
+            yield Breach(ContractRule.OFF_IS_OFF, tried.effect.amplitude.name, water=water)
             return
 
 
-def _acts(tried: Trial) -> Iterator[str]:
-    """It does something, and answers to (amplitude - off)^power where it is small."""
+def _acts(tried: Trial) -> Iterator[Breach]:
+    """It acts as (amplitude - off)^power where that is small. An amplitude of both signs turns the answer round with
+    its own, but water that enters at a place brings no momentum, and that which leaves takes its own: what is searched
+    may turn otherwise.
+    """
+
+    def change_with(*amplitudes: float) -> list[Array]:
+        problem = tried.problem(a.off, *amplitudes)
+        found = answer(tried, problem, moving_water(problem))
+        return [
+            np.concatenate([(one[..., k] - one[..., 0]).ravel() for one in found])
+            for k in range(1, len(amplitudes) + 1)
+        ]
+
     a = tried.effect.amplitude
-    problem = tried.problem(a.off, a.off + 0.5 * a.small, a.off + a.small)
-    told = answer(tried, problem, moving_water(problem))
-    half, whole = (np.concatenate([(t[..., k] - t[..., 0]).ravel() for t in told]) for k in (1, 2))
+    half, whole = change_with(a.off + 0.5 * a.small, a.off + a.small)
     largest = np.abs(whole).max()
     if largest == 0.0:
-        yield f"nothing changes with {a.name} in moving water: neither the flow nor a reading"
+        yield Breach(ContractRule.ACTS, a.name)
     elif np.abs(half * 2.0**a.power - whole).max() > 0.1 * largest + 1e-11:
-        yield f"the answer to a small {a.name} is not of the power {a.power}: correct `power`, or avoid a jump at off"
+        yield Breach(ContractRule.POWER, a.name, (a.power,))
     elif a.only_sign == 0 and "search" not in tried.effect.tags:
-        yield from _turns(tried, whole)
+        (below,) = change_with(a.off - a.small)
+        if np.abs(whole + below).max() > 0.1 * largest + 1e-11:
+            yield Breach(ContractRule.TURNS, a.name)
 
 
-def _turns(tried: Trial, above: Array) -> Iterator[str]:
-    """An amplitude of both signs turns the answer round with its own; above: that to a small one above off. Water that
-    enters at a place brings no momentum, and that which leaves takes its own: what is searched may turn otherwise.
-    """
-    a = tried.effect.amplitude
-    problem = tried.problem(a.off, a.off - a.small)
-    told = answer(tried, problem, moving_water(problem))
-    below = np.concatenate([(t[..., 1] - t[..., 0]).ravel() for t in told])
-    if np.abs(above + below).max() > 0.1 * np.abs(above).max() + 1e-11:
-        yield f"{a.name} below off does not turn the answer round: give it one sign by `low` or `high`, or avoid a kink"
-
-
-def _finite(tried: Trial) -> Iterator[str]:
-    problem = tried.problem(*sizes(tried.effect))
-    for state_of in (at_rest, moving_water, running_back, dry):
-        if not all(np.isfinite(values).all() for values in answer(tried, problem, state_of(problem))):
-            yield f"something is not finite in {_name(state_of)} water"
-
-
-def _never_pushes(tried: Trial) -> Iterator[str]:
+def _never_pushes(tried: Trial) -> Iterator[Breach]:
     """Friction rate, viscosity, phi and canopy height stay at or above 0; discharge and spread stay above. What stands
-    for anything at a place may push: its friction rate may fall below 0.
+    for anything at a place may push: its friction rate may fall below 0. Plants in 0.3 m of water from slow to fast.
     """
     problem, may_push = tried.problem(*sizes(tried.effect)), "search" in tried.effect.tags
-    for state_of in (at_rest, moving_water, dry):
-        state = state_of(problem)
+    for water in ("still", "moving", "no"):
+        state = WATERS[water](problem)
         closed = closures(problem, state, faces(problem, state).cell)
         if (closed.rate < 0.0).any() and not may_push:
-            yield f"the friction rate falls below 0 in {_name(state_of)} water: drag would push"
+            yield Breach(ContractRule.DRAG_POSITIVE, water=water)
         if (closed.viscosity < 0.0).any():
-            yield f"the viscosity falls below 0 in {_name(state_of)} water"
-    for name, values in _standing(problem).items():
-        if (values <= 0.0).any():
-            yield f"{name} does not stay above 0"
-    if any((inflow.discharge <= 0.0).any() or (inflow.spread <= 0.0).any() for inflow in problem.boundaries.inflows):
-        yield "an inflow does not stay above 0 everywhere"
-
-
-def _standing(problem: Problem) -> dict[str, Array]:
-    """phi and canopy height of plants in 0.3 m of water from slow to fast."""
+            yield Breach(ContractRule.VISCOSITY_POSITIVE, water=water)
     speed = np.geomspace(0.001, 3.0, 40)[:, None] * np.ones(problem.members)
     one = np.ones_like(speed)
     plants = PlantCells(
@@ -165,10 +304,15 @@ def _standing(problem: Problem) -> dict[str, Array]:
         y=0.0 * one[:, :1],
         patch=0.0 * one[:, :1],
     )
-    return applied(problem.effects, "plants", plants, {"phi": plants.phi, "canopy_height": plants.canopy_height})
+    at_first = {"phi": plants.phi, "canopy_height": plants.canopy_height}
+    for name, values in applied(problem.effects, "plants", plants, at_first).items():
+        if (values <= 0.0).any():
+            yield Breach(ContractRule.PLANTS_POSITIVE, name)
+    if any((inflow.discharge <= 0.0).any() or (inflow.spread <= 0.0).any() for inflow in problem.boundaries.inflows):
+        yield Breach(ContractRule.INFLOW_POSITIVE)
 
 
-def _mirrors(tried: Trial) -> Iterator[str]:
+def _mirrors(tried: Trial) -> Iterator[Breach]:
     """A mirrored flow feels the mirrored effect."""
     if not tried.effect.mirrored:
         return
@@ -177,41 +321,37 @@ def _mirrors(tried: Trial) -> Iterator[str]:
     rates, readings = answer(tried, problem, state)
     rates_there, readings_there = answer(tried, problem, mirrored(state))
     if not (_alike(mirrored(rates), rates_there) and _alike(readings[PAIRS], readings_there)):
-        yield "a mirrored flow does not feel the mirrored effect: set mirrored=False and name in `equation` what turns"
+        yield Breach(ContractRule.MIRRORED)
 
 
-def _parts(tried: Trial) -> Iterator[str]:
+def _parts(tried: Trial) -> Iterator[Breach]:
     """Some members, or some rows, of a problem answer as they do within it."""
     problem = tried.problem(*sizes(tried.effect))
     state, pick = moving_water(problem), np.array([3, 0, 1])
     whole = residual(problem, state)
     if not np.array_equal(residual(take(problem, pick), np.ascontiguousarray(state[..., pick])), whole[..., pick]):
-        yield "members answer otherwise when others are left out: work on each member alone"
+        yield Breach(ContractRule.MEMBERS_ALONE)
     rows = slice(2, problem.shape[1] - 2)
     cut = residual(crop(problem, rows.start, rows.stop), np.ascontiguousarray(state[:, :, rows]))
     if not _alike(cut[3:, :, 3:-3], whole[3:, :, 5:-5]):
-        yield "rows answer otherwise when those beyond them are left out: look no further than the next cell"
+        yield Breach(ContractRule.ROWS_ALONE)
     faster = state.copy()
     faster[CHANGED:, ALONG:] *= 1.1
     upstream = slice(CHANGED - FELT_AFAR)
     if not _alike(residual(problem, faster)[upstream], whole[upstream]):
-        yield "water answers otherwise when that far downstream is faster: look no further than the next cell"
+        yield Breach(ContractRule.DOWNSTREAM_ALONE)
 
 
-def _settles(tried: Trial) -> Iterator[str]:
+def _settles(tried: Trial) -> Iterator[Breach]:
     """A steady flow exists with a plausible size of it."""
-    problem = tried.problem(sizes(tried.effect)[1])
+    size = sizes(tried.effect)[1]
+    problem = tried.problem(size)
     if not newton(problem, backwater(problem), 1e-8).converged[0]:
-        yield f"no steady flow is found with {tried.effect.amplitude.name} = {sizes(tried.effect)[1]:g}"
+        yield Breach(ContractRule.SETTLES, tried.effect.amplitude.name, (size,))
 
 
-Check = Callable[[Trial], Iterator[str]]
-CHECKS: tuple[Check, ...] = (_finite, _off_is_off, _acts, _never_pushes, _mirrors, _parts, _settles)
+CHECKS = (_finite, _off_is_off, _acts, _never_pushes, _mirrors, _parts, _settles)
 
 
 def _alike(found: Array, wanted: Array) -> bool:
     return bool(np.abs(found - wanted).max() <= 1e-9 * (1e-3 + np.abs(wanted).max()))
-
-
-def _name(state_of: Callable[[Problem], Array]) -> str:
-    return {"at_rest": "still", "moving_water": "moving", "running_back": "backward", "dry": "no"}[state_of.__name__]

@@ -22,6 +22,7 @@ from vegglue.measurements.kinds import kind_of, unstated_errors
 from vegglue.measurements.observations import Observations
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import InferenceSettings, Posterior, WeightedSample
+from vegglue.wording.sentences import sentence
 
 # Readings of a kind from which the size of its errors is taken from the residual [-]: from ten it is known to a fourth,
 # 1 / (2 (n - 1))^(1/2). A model passes through one or two exactly, and the likelihood of a size has no bound then.
@@ -78,7 +79,7 @@ def fit_members(prediction: Array, station: pd.DataFrame, rule: str) -> MemberFi
         noise = station["standard_error"].to_numpy(float)
         if not (noise[used] > 0).all():
             raise InputError(
-                f"observations: `infer.sigma: known` needs standard errors, but {unstated_errors(station)} "
+                f"observations: `infer.sigma: known` needs standard errors, but {sentence(unstated_errors(station))} "
                 "`sigma: best-member` estimates them from the residual of the best member."
             )
         best = int(np.nanargmin(np.sum((residual / noise)[:, used] ** 2, axis=1)))

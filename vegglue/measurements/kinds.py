@@ -4,7 +4,7 @@ A new kind is one entry here, its reader in `flow/readers.py`, and roles of its 
 for files that are imported; `adv` in a case is a way of reading that yields velocities, no kind of its own.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.errors import InputError
-from vegglue.wording.numbers import listed, so_many
+from vegglue.wording.numbers import so_many
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,21 @@ class Kind:
     def velocity(self) -> bool:
         """Whether it is a velocity, in whatever direction."""
         return self.instrument == "probe"
+
+
+@dataclass(frozen=True)
+class UnstatedErrors:
+    """Used stations without a standard error: how many of each kind in words, and x, y of the first [m].
+
+    fill: columns of errors that exist and have gaps; add: columns that do not exist; usual: error of the first kind and
+    its unit.
+    """
+
+    counts: tuple[tuple[str, int], ...]
+    first: tuple[float, float]
+    fill: tuple[str, ...]
+    add: tuple[str, ...]
+    usual: tuple[float, str]
 
 
 # Names of the kinds that are asked for by name: velocities along x and along y, and levels.
@@ -104,28 +119,19 @@ def stations_in_short(station: pd.DataFrame) -> str:
     return f"{so_many(len(station), 'station')}, in use {', '.join(counts) or 'none'}"
 
 
-def unstated_errors(station: pd.DataFrame) -> str | None:
-    """Which of the used stations state no standard error, and what to write where; None where all do."""
+def unstated_errors(station: pd.DataFrame) -> UnstatedErrors | None:
+    """Which of the used stations state no standard error; None if all do."""
     used = station[station["used"]]
-    bare = used[~(used["standard_error"].to_numpy(float) > 0)]
+    stated = used["standard_error"] > 0
+    bare = used[~stated]
     if bare.empty:
         return None
-    kinds = [(kind_of(str(name)), int(count)) for name, count in bare.groupby("kind", sort=False).size().items()]
-    known = set(used.loc[used["standard_error"].to_numpy(float) > 0, "kind"])
-    one = kinds[0][0]
-    first = f"x = {bare['x'].iloc[0]:g}, y = {bare['y'].iloc[0]:g} m"
-    return (
-        f"no standard error is stated for {listed([f'{count} of {kind.words}' for kind, count in kinds])}, "
-        f"the first at {first}: "
-        f"{_where_to_state([kind for kind, _ in kinds], known)}, or say it in the site file, as in "
-        f"`files: {{NAME.csv: {{standard_error: {one.usual_error:g} {one.unit}}}}}`; in a config, as "
-        "`standard_error` of the observation."
+    kinds = [kind_of(str(name)) for name in bare["kind"].unique()]
+    known = set(used.loc[stated, "kind"])
+    return UnstatedErrors(
+        counts=tuple((kind.words, int((bare["kind"] == kind.name).sum())) for kind in kinds),
+        first=(float(bare["x"].iloc[0]), float(bare["y"].iloc[0])),
+        fill=tuple(kind.error_column for kind in kinds if kind.name in known),
+        add=tuple(kind.error_column for kind in kinds if kind.name not in known),
+        usual=(kinds[0].usual_error, kinds[0].unit),
     )
-
-
-def _where_to_state(kinds: Sequence[Kind], known: Collection[str]) -> str:
-    """`give `u_se` there, too, and add a column `v_se``; known: kinds of which others state their errors."""
-    empty = [f"`{kind.error_column}`" for kind in kinds if kind.name in known]
-    lacking = [f"a column `{kind.error_column}`" for kind in kinds if kind.name not in known]
-    filled = [f"give {listed(empty)} there, too"] if empty else []
-    return ", and ".join([*filled, *([f"add {listed(lacking)}"] if lacking else [])])

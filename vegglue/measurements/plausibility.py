@@ -95,7 +95,7 @@ class Symptom(Enum):
 class ImplausibleValues:
     """Used values of one kind of observation with one problem.
 
-    quantity: the kind in words; instrument: as in Kind; si_unit: unit of its values; problem; unit: the unit in which
+    quantity: the kind in words; instrument: as in Kind; si_unit: unit of its values; symptom; unit: the unit in which
     they would be plausible, '' if none; size: median over the values, see Symptom; count, of total used values of the
     kind; first: value, x and y of the first [SI], y None if the kind has none; places: (experiment, section), section
     '' for a gauge without a name and None for all values of the experiment.
@@ -104,7 +104,7 @@ class ImplausibleValues:
     quantity: str
     instrument: str
     si_unit: str
-    problem: Symptom
+    symptom: Symptom
     unit: str
     size: float
     count: int
@@ -190,7 +190,7 @@ def implausible_values(case: Case, site: Site, station: pd.DataFrame) -> list[Im
                 quantity=kind.words,
                 instrument=kind.instrument,
                 si_unit=kind.unit,
-                problem=problem,
+                symptom=problem,
                 unit=str(unit),
                 size=abs(float(rows["size"].median())),
                 count=len(rows),

@@ -5,8 +5,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
+from pathlib import PurePath
 from typing import Any
 
+from vegglue.errors import shown_path
 from vegglue.wording.numbers import (
     chance_in_words,
     duration_in_short,
@@ -68,6 +70,8 @@ def tagged(value: Any) -> Any:
         return {"kind": tag_of(value), **own} if "kind" not in own else {"tag": tag_of(value), **own}
     if isinstance(value, Enum):
         return value.value
+    if isinstance(value, PurePath):
+        return str(value)
     if isinstance(value, Mapping):
         return {str(key): tagged(one) for key, one in value.items()}
     if isinstance(value, tuple | list):
@@ -100,7 +104,9 @@ def macros() -> dict[str, Callable[..., str]]:
         "odds": odds_in_digits,
         "experiments": experiments_in_words,
         "range": range_in_digits,
+        "path": shown_path,
         "percent": lambda share: f"{share:.0%}",
+        "quoted": lambda names: [f"`{name}`" for name in names],
     }
     environment.globals |= {
         "sentence": sentence,

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vegglue.calibration.laws_in_case import laws_beyond_their_range
 from vegglue.case.case_effects import effect_of
 from vegglue.case.schema import Case
-from vegglue.diagnosis.case_check import check_case, doubts_about
+from vegglue.diagnosis.case_check import check_case, critical_remarks
 from vegglue.effects.library import effects_of
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import coarser
@@ -19,12 +20,27 @@ from vegglue.wording.sentences import sentence
 from vegglue.workflow.case_run import CaseRun, case_run
 from vegglue.workflow.command_model import command_tried
 
+if TYPE_CHECKING:
+    from vegglue.diagnosis.effect_contract import Breach
+
 
 @dataclass(frozen=True)
 class CheckedCase:
-    """What a check has found: remarks, what each section carries, sizes, and where the channel is drawn."""
+    """What a check has found.
 
-    remarks: tuple[str, ...]
+    Attributes
+    ----------
+    remarks : tuple
+        What is odd about the case: frozen values of `vegglue.diagnosis`, or text of the case's own command.
+        `vegglue.wording.sentences.sentence` renders each, `tagged` makes it JSON.
+    carried : tuple of CarriedDischarge
+        What the velocities of each section carry.
+    cells, stations, used_stations : int
+    picture : Path
+        Drawing of the channel.
+    """
+
+    remarks: tuple[object, ...]
     carried: tuple[CarriedDischarge, ...]
     cells: int
     stations: int
@@ -44,7 +60,7 @@ def check(case: Case | CaseRun, *, runs: Path | str = "runs") -> CheckedCase:
     run = case_run(case, runs)
     case, observations, site = run.case, run.observations, run.site
     picture = run.folder / "channel.png"
-    remarks = [*check_case(case, site, observations), *beyond_seen(run)]
+    remarks: list[object] = [*check_case(case, site, observations), *beyond_seen(run)]
     save_channel_figure(case, site, observations, picture)
     if case.engine is not None:
         remarks.append(command_tried(run.model, run.folder))
@@ -54,12 +70,12 @@ def check(case: Case | CaseRun, *, runs: Path | str = "runs") -> CheckedCase:
 
 
 @one_thread()
-def doubts_of(run: CaseRun) -> list[str]:
-    """What would mislead all that is computed with the measurements of a case, one sentence each; none for sound ones.
+def critical_warnings(run: CaseRun) -> list[object]:
+    """Remarks on what would mislead all that is computed with the measurements of a case.
 
     Errors: InputError for a file that cannot be read.
     """
-    return [*doubts_about(run.case, run.site, run.observations), *beyond_seen(run)]
+    return [*critical_remarks(run.case, run.site, run.observations), *beyond_seen(run)]
 
 
 def beyond_seen(run: CaseRun) -> list[str]:
@@ -79,8 +95,8 @@ def beyond_seen(run: CaseRun) -> list[str]:
 
 
 @one_thread()
-def check_effects(file: Path, *, trust: bool = False) -> dict[str, list[str]]:
-    """What each effect of a Python file breaks of the contract, in sentences, by its name; none for a good one.
+def check_effects(file: Path, *, trust: bool = False) -> "dict[str, list[Breach]]":
+    """What each effect of a Python file breaks of the contract, by its name; none for a good one.
 
     trust: whether the file may be run. Errors: InputError when it may not, or is not there.
     """

@@ -15,8 +15,7 @@ from vegglue.case.made_files import refuse_not_made, write_made
 from vegglue.case.resolved_config import Tree, as_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
-from vegglue.diagnosis.channel_and_plants import remarks_on_unnamed_banks
-from vegglue.diagnosis.ensemble_and_priors import refused_for_errors
+from vegglue.diagnosis.channel_check import refused_for_errors, remarks_on_unnamed_banks
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.confluence import (
     NOT_STATED,
@@ -29,6 +28,7 @@ from vegglue.importers.confluence import (
 from vegglue.importers.field_folder import case_from_folder
 from vegglue.importers.site_file import assumptions_of_site, site_file
 from vegglue.measurements.observations import read_observations
+from vegglue.wording.sentences import sentence
 
 ANOTHER_FILE = "give another file by --to"
 NO_ROOM = "free some room in the folder for temporary files"
@@ -72,13 +72,13 @@ def assumptions_of(folder: Path | str) -> list[str]:
 
 def without_errors(case: Case) -> list[str]:
     """Which measurements state no standard error, and who refuses them; nothing where all do."""
-    return list(refused_for_errors(case, read_observations(case).table))
+    return list(map(sentence, refused_for_errors(case, read_observations(case).table)))
 
 
 def unnamed_banks(case: Case) -> list[str]:
     """That a bed is steep in many cells, and no class of friction is for them; nothing where it is not so."""
     try:
-        return list(remarks_on_unnamed_banks(case, build_site(case)))
+        return list(map(sentence, remarks_on_unnamed_banks(case, build_site(case))))
     except InputError:  # of a bed or a grid that `check` refuses with the same words; the config is written
         return []
 

@@ -1,0 +1,414 @@
+"""Checks of the flow: boundaries, outlet level, Froude number, and the directions and the discharge of measurements.
+
+Each check yields remarks, frozen values whose words stand in `wording/templates/checks.j2`. One cause is one remark
+of all experiments that show it, and what follows from it is left out. Lengths in m.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from vegglue.arrays import Array
+from vegglue.case.channel_geometry import expected_depth, half_width
+from vegglue.case.grid import curvature_of
+from vegglue.case.gridded_site import Site, in_experiment
+from vegglue.case.parameter_space import middle_value, prior_range
+from vegglue.case.schema import Case, Experiment
+from vegglue.case.zones import centres_within, inflow_cells
+from vegglue.effects.physical_constants import GRAVITY
+from vegglue.measurements.kinds import STREAMWISE, TRANSVERSE, WATER_LEVEL, kind_of
+from vegglue.measurements.observations import Observations
+from vegglue.measurements.section_discharge import DischargeMismatch, discharge_mismatches, mismatched_discharges
+
+# Width of the grid over the radius of its centreline [-] from which its ends should be straight: chosen, not measured.
+LEAST_TURN = 0.02
+# Froude number [-] of an outlet above which its level may not hold: chosen, not measured. At 1 no wave carries the
+# level upstream; 0.7 leaves room for the fastest part of a section, some 1.4 times as fast as its mean.
+LARGEST_FROUDE = 0.7
+# Halvings and more of the error of the depth, whatever it began at: each multiplies it by less than 2/3.
+ROUNDS = 60
+# Fewest stations that stand for a whole section: two may stand in an eddy.
+FEWEST_OF_A_SECTION = 3
+# Rise of the water downstream [m], and over its standard error [-], from which levels run uphill: velocity heads,
+# which a widening gives back, are 5 mm at 0.3 m/s.
+RISE, SURE = 0.01, 4.0
+# Rise [m] that gauges and the level of an outlet may show by chance, beside so many standard errors [-]. Chosen:
+# a bed that is uneven by millimetres, and a surface that waves.
+RISE_BY_CHANCE, SURE_OF_A_RISE = 0.003, 3.0
+# Velocity head of a section over that of its mean velocity [-]: 1.15 to 1.5 in streams (Chow 1959, table 2-1).
+UNEVENNESS = 1.5
+# Angle [degrees] of turned velocities, and over its standard error over the sections [-]. Chosen: declinations in
+# Europe reach some degrees; a section beside the end of a patch in a flume was off by 1.6.
+LEAST_ANGLE, SURE_OF_AN_ANGLE = 3.0, 3.0
+# Fewest sections that show a turn: two may both stand where a patch drives water aside. Share of them on one side [-].
+FEWEST_CROSSED, MOST_ON_ONE_SIDE = 3, 0.9
+# Fewest places of a section whose mean is that of the section.
+FEWEST_OF_A_MEAN = 3
+
+
+@dataclass(frozen=True)
+class GridEndInBend:
+    """A grid that begins (upstream) or ends where its centreline turns with a radius [m]: u is even there, and the
+    level at the outlet too.
+    """
+
+    upstream: bool
+    radius: float
+
+
+@dataclass(frozen=True)
+class OutletWithoutCells:
+    """An outlet without a cell centre."""
+
+
+@dataclass(frozen=True)
+class OutletDry:
+    """An experiment whose outlet level lies below all of the bed there; bed: its lowest level [m]."""
+
+    experiment: str
+    level: float
+    bed: float
+    measured: bool
+
+
+@dataclass(frozen=True)
+class OutletFast:
+    """An experiment that leaves near the critical Froude number [-]."""
+
+    experiment: str
+    froude: float
+
+
+@dataclass(frozen=True)
+class WaterOnSideEdges:
+    """An experiment with water on the side edges of the grid, which act as smooth walls."""
+
+    experiment: str
+
+
+@dataclass(frozen=True)
+class InflowWithoutCells:
+    """An inflow without a cell centre."""
+
+    inflow: str
+
+
+@dataclass(frozen=True)
+class InflowAboveWater:
+    """An inflow above the water of an experiment."""
+
+    inflow: str
+    experiment: str
+
+
+@dataclass(frozen=True)
+class Supercritical:
+    """An experiment whose even flow without plants on the slope of the floor [-] has this Froude number [-]."""
+
+    experiment: str
+    slope: float
+    froude: float
+
+
+@dataclass(frozen=True)
+class OutletAboveGauge:
+    """Outlets above the last gauge at x, `distance` upstream of them, by more than the velocity lifts the water.
+
+    gauges: (experiment, level of the gauge, rise from it to the outlet) [m].
+    """
+
+    x: float
+    distance: float
+    gauges: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True)
+class ComponentsExchanged:
+    """Experiments with more water across than along; median |u| and |v| of the first [m/s]."""
+
+    experiments: tuple[str, ...]
+    along: float
+    across: float
+
+
+@dataclass(frozen=True)
+class FlowUpstream:
+    """Experiments whose velocities run upstream; median of the first [m/s]; whether the grid follows a centreline."""
+
+    experiments: tuple[str, ...]
+    median: float
+    on_centreline: bool
+
+
+@dataclass(frozen=True)
+class SectionsUpstream:
+    """Sections of an experiment whose velocities all run upstream, at a mean [m/s]."""
+
+    experiment: str
+    sections: tuple[str, ...]
+    mean: float
+
+
+@dataclass(frozen=True)
+class LevelsRiseDownstream:
+    """Experiments whose water rises from the gauge at x = first to that at last, by so much each [m]."""
+
+    experiments: tuple[str, ...]
+    rises: tuple[float, ...]
+    first: float
+    last: float
+
+
+@dataclass(frozen=True)
+class VelocitiesTurned:
+    """Experiments whose velocities are turned to one side at nearly all sections, as no water between two banks is.
+
+    angles: mean of each experiment to that side [degrees]; sections: how many; others: (experiment, angle) of those
+    that share sections and are not turned.
+    """
+
+    side: str
+    experiments: tuple[str, ...]
+    angles: tuple[float, ...]
+    sections: int
+    others: tuple[tuple[str, float], ...]
+
+
+def remarks_on_boundaries(case: Case, site: Site) -> Iterator[object]:
+    """Inflows and outlets without cells or without water, water on edges that act as walls, ends in a bend."""
+    curvature = curvature_of(site.grid)
+    for turning, upstream in ((curvature[0], True), (curvature[-1], False)):
+        if abs(turning) * site.grid.y.size * site.grid.dy > LEAST_TURN:
+            yield GridEndInBend(upstream, 1.0 / abs(float(turning)))
+    dry, open_ = dry_outlets(case, site), centres_within(case.outlet.range, site.grid.y)
+    for name, experiment in case.experiments.items():
+        depth = expected_depth(case, in_experiment(site, name), experiment)
+        if not open_.any():
+            yield OutletWithoutCells()
+        elif name in dry:
+            continue
+        else:  # Fr = Q / (A sqrt(g A / B))
+            wet = np.maximum(depth[-1, open_], 0.0)
+            area, top = float(wet.sum()) * site.grid.dy, float((wet > 0).sum()) * site.grid.dy
+            froude = _discharge(case, experiment) / (area * float(np.sqrt(GRAVITY * area / top)))
+            if froude > LARGEST_FROUDE:
+                yield OutletFast(name, froude)
+        if case.friction.walls is None and (depth[:, [0, -1]] > 0).any():
+            yield WaterOnSideEdges(name)
+        for inflow, side in case.inflows.items():
+            edge = {"west": depth[0], "south": depth[:, 0], "north": depth[:, -1]}[side.side]
+            cells = inflow_cells(side, site.grid)
+            if not cells.size:
+                yield InflowWithoutCells(inflow)
+            elif not (edge[cells] > 0).any():
+                yield InflowAboveWater(inflow, name)
+
+
+def _discharge(case: Case, experiment: Experiment) -> float:
+    """Of all inflows, in the middle of the prior [m3/s]."""
+    return sum(middle_value(case, value) for value in experiment.discharge.values())
+
+
+def dry_outlets(case: Case, site: Site) -> dict[str, float]:
+    """Experiments whose outlet level lies below all of the bed there, and the lowest of that [m]."""
+    open_ = centres_within(case.outlet.range, site.grid.y)
+    if not open_.any():
+        return {}
+    lowest = {name: float(in_experiment(site, name).bed[-1, open_].min()) for name in case.experiments}
+    return {name: bed for name, bed in lowest.items() if middle_value(case, case.experiments[name].level) <= bed}
+
+
+def remarks_on_dry_outlets(case: Case, site: Site, observations: Observations) -> Iterator[OutletDry]:
+    """Outlets below the bed, for which no command finds a flow, whether or not anything was measured."""
+    for name, bed in dry_outlets(case, site).items():
+        measured = bool((observations.table["experiment"] == name).any())
+        yield OutletDry(name, middle_value(case, case.experiments[name].level), bed, measured)
+
+
+def remarks_on_discharges(case: Case, site: Site, observations: Observations) -> Iterator[DischargeMismatch]:
+    """Sections whose velocities clearly carry another discharge than stated; none of an experiment whose velocities or
+    levels run the wrong way, as that is why.
+    """
+    off, excused = mismatched_discharges(case, site, observations.table), misdirected(case, observations)
+    yield from discharge_mismatches([one for one in off if one.experiment not in excused])
+
+
+def remarks_on_steep_flow(case: Case, site: Site) -> Iterator[Supercritical]:
+    """Experiments whose even flow on the slope of the floor would be supercritical."""
+    slope = floor_slope(site)
+    for name, experiment in case.experiments.items():
+        froude = even_froude(case, site, experiment, slope)
+        if froude > 1.0:
+            yield Supercritical(name, slope, froude)
+
+
+def floor_slope(site: Site) -> float:
+    """S = -dz/dx of the lowest bed of each cross-section, by least squares [-]."""
+    return float(-np.polyfit(site.grid.x, site.bed.min(axis=1), 1)[0])
+
+
+def even_froude(case: Case, site: Site, experiment: Experiment, slope: float) -> float:
+    """Fr = C (S/g)^(1/2) of even flow on the floor, C at its depth h = (q / (C S^(1/2)))^(2/3) [-]; 0 without a fall.
+
+    q: discharge over the width of the floor, all of it, as if there were neither banks nor plants. C of the friction
+    class of the floor [m^1/2/s]: h^(1/6)/n, 18 log10(12 h/k_s), or given.
+    """
+    if slope <= 0.0:
+        return 0.0
+    per_width = _discharge(case, experiment) / (2.0 * half_width(site))
+    lowest = site.friction_class[np.arange(site.bed.shape[0]), site.bed.argmin(axis=1)]
+    law = case.friction.classes[site.class_names[int(np.bincount(lowest).argmax())]]
+    coefficient, depth, chezy = middle_value(case, law.coefficient), 1.0, 1.0
+    for _ in range(ROUNDS):
+        if law.law == "manning":
+            chezy = float(depth ** (1.0 / 6.0) / coefficient)
+        elif law.law == "keulegan":
+            chezy = float(18.0 * math.log10(max(12.0 * depth / coefficient, case.numerics.bank_argument_minimum)))
+        else:
+            chezy = float(coefficient)
+        depth = (per_width / (chezy * math.sqrt(slope))) ** (2.0 / 3.0)
+    return chezy * math.sqrt(slope / GRAVITY)
+
+
+def remarks_on_outlet_levels(case: Case, site: Site, observations: Observations) -> Iterator[OutletAboveGauge]:
+    """Outlets above the last gauge by more than its velocity head, RISE_BY_CHANCE and its errors explain; of no
+    experiment whose gauges rise among themselves, which is a remark of its own.
+    """
+    rising, table = rising_levels(case, observations), observations.table
+    found: dict[float, list[tuple[str, float, float]]] = {}
+    for name, stated in case.experiments.items():
+        gauges = table[table["used"] & (table["experiment"] == name) & (table["kind"] == WATER_LEVEL)]
+        if name in rising or gauges.empty:
+            continue
+        last = gauges[gauges["x"] == gauges["x"].max()]
+        x, level = float(last["x"].iloc[0]), float(last["value"].mean())
+        error = float(last["standard_error"].fillna(kind_of(WATER_LEVEL).usual_error).mean())
+        depth = np.maximum(level - in_experiment(site, name).bed[np.abs(site.grid.x - x).argmin()], 0.0)
+        area = float(depth.sum()) * site.grid.dy
+        if area <= 0.0:  # a station on land, or a level without sense: a remark of its own
+            continue
+        lifted = UNEVENNESS * (_discharge(case, stated) / area) ** 2 / (2.0 * GRAVITY)
+        rise = prior_range(case, stated.level)[0] - level
+        if rise > lifted + RISE_BY_CHANCE + SURE_OF_A_RISE * error:
+            found.setdefault(x, []).append((name, level, rise))
+    for x, lower in found.items():
+        yield OutletAboveGauge(x, case.grid.x[1] - x, tuple(lower))
+
+
+def remarks_on_directions(case: Case, observations: Observations) -> Iterator[object]:
+    """Velocities that run across or upstream, and levels that rise downstream."""
+    exchanged = _exchanged(case, observations)
+    if exchanged:
+        yield ComponentsExchanged(tuple(exchanged), *next(iter(exchanged.values())))
+    of = {name: rows for name, rows in _by_experiment(case, observations).items() if name not in exchanged}
+    whole = {name: median for name, rows in of.items() if (median := _median(rows)) < 0.0}
+    if whole:
+        yield FlowUpstream(tuple(whole), next(iter(whole.values())), case.grid.centreline is not None)
+    for name, rows in of.items():
+        mean = rows[rows["kind"] == STREAMWISE].groupby("section")["value"].agg(["mean", "size", "max"])
+        against = mean[(mean["max"] < 0.0) & (mean["size"] >= FEWEST_OF_A_SECTION)]
+        if name not in whole and len(against):
+            yield SectionsUpstream(name, tuple(map(str, against.index)), float(against["mean"].mean()))
+    rising = _rising(case, observations)
+    for first, last in dict.fromkeys((first, last) for first, last, _ in rising.values()):
+        by = {name: rise for name, (*ends, rise) in rising.items() if ends == [first, last]}
+        yield LevelsRiseDownstream(tuple(by), tuple(by.values()), first, last)
+
+
+def exchanged_components(case: Case, observations: Observations) -> tuple[str, ...]:
+    """Experiments with more water across than along: components exchanged, or of the map."""
+    return tuple(_exchanged(case, observations))
+
+
+def rising_levels(case: Case, observations: Observations) -> tuple[str, ...]:
+    """Experiments whose levels rise downstream."""
+    return tuple(_rising(case, observations))
+
+
+def misdirected(case: Case, observations: Observations) -> tuple[str, ...]:
+    """Experiments with an odd direction, whose sections do not show what they carry."""
+    upstream = [name for name, rows in _by_experiment(case, observations).items() if _median(rows) < 0.0]
+    return (*_exchanged(case, observations), *_rising(case, observations), *upstream)
+
+
+def _by_experiment(case: Case, observations: Observations) -> dict[str, pd.DataFrame]:
+    used = observations.table[observations.table["used"]]
+    return {name: used[used["experiment"] == name] for name in case.experiments}
+
+
+def _median(rows: pd.DataFrame) -> float:
+    """Of u [m/s], NaN without any: one mark of a missing value does not turn it."""
+    return float(rows.loc[rows["kind"] == STREAMWISE, "value"].median())
+
+
+def _exchanged(case: Case, observations: Observations) -> dict[str, tuple[float, float]]:
+    """Of each such experiment the median |u| and |v| [m/s]."""
+    middle = {
+        name: tuple(float(rows.loc[rows["kind"] == kind, "value"].abs().median()) for kind in (STREAMWISE, TRANSVERSE))
+        for name, rows in _by_experiment(case, observations).items()
+    }
+    return {name: (along, across) for name, (along, across) in middle.items() if across > along}
+
+
+def _rising(case: Case, observations: Observations) -> dict[str, tuple[float, float, float]]:
+    """By experiment the x of two gauges and the largest rise from one to the next, or from the first to the last [m],
+    beyond its error, and beyond the head u2/2g of the fastest velocity, which a widening may give back.
+    """
+    found = {}
+    for name, rows in _by_experiment(case, observations).items():
+        level = rows[rows["kind"] == WATER_LEVEL].assign(standard_error=rows["standard_error"].fillna(0.0))
+        gauges = level.groupby("x")[["value", "standard_error"]].mean()
+        if len(gauges) < 2:
+            continue
+        x, z, error = (part.to_numpy(float) for part in (gauges.index, gauges["value"], gauges["standard_error"]))
+        pairs = [(i, i + 1) for i in range(len(x) - 1)] + [(0, len(x) - 1)]
+        i, j = max(pairs, key=lambda pair: z[pair[1]] - z[pair[0]])
+        speed = rows.loc[rows["kind"] == STREAMWISE, "value"].max()
+        head = 0.0 if np.isnan(speed) or j - i == len(x) - 1 else float(speed) ** 2 / (2.0 * GRAVITY)
+        rise = float(z[j] - z[i])
+        if rise > max(RISE, head, SURE * float(np.hypot(error[i], error[j]))):
+            found[name] = (float(x[i]), float(x[j]), rise)
+    return found
+
+
+def remarks_on_turned_velocities(case: Case, observations: Observations) -> Iterator[VelocitiesTurned]:
+    """Experiments whose velocities are turned to one side at nearly all sections; none with odd directions besides."""
+    odd = misdirected(case, observations)
+    by = {name: rows for name, rows in _by_experiment(case, observations).items() if name not in odd}
+    angles = {name: _section_angles(rows) for name, rows in by.items()}
+    turned = {name: one for name, one in angles.items() if _to_one_side(one.to_numpy())}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        ones = {name: one for name, one in turned.items() if sign * one.mean() > 0.0}
+        sections = {section for one in ones.values() for section in one.index}
+        others = tuple(
+            (name, abs(float(one.mean())))
+            for name, one in angles.items()
+            if name not in turned and len(one) >= FEWEST_CROSSED and sections & set(one.index)
+        )
+        if ones:
+            means = tuple(abs(float(one.mean())) for one in ones.values())
+            yield VelocitiesTurned(side, tuple(ones), means, len(sections), others)
+
+
+def _section_angles(rows: pd.DataFrame) -> "pd.Series[float]":
+    """atan(sum v / sum u) to the left of the channel [degrees], by each section with enough places of both."""
+    along, across = (
+        rows.loc[rows["kind"] == kind, ["section", "x", "y", "value"]] for kind in (STREAMWISE, TRANSVERSE)
+    )
+    both = along.merge(across, on=["section", "x", "y"], suffixes=("_along", "_across"))
+    sums = both.groupby("section")[["value_along", "value_across"]].agg(["sum", "size"])
+    wide = sums[sums[("value_along", "size")] >= FEWEST_OF_A_MEAN]
+    angles = np.arctan2(wide[("value_across", "sum")].to_numpy(float), wide[("value_along", "sum")].to_numpy(float))
+    return pd.Series(np.degrees(angles), index=wide.index)
+
+
+def _to_one_side(angles: Array) -> bool:
+    """Whether angles (section,) [degrees] have one sign nearly all, and a mean that chance does not make."""
+    if len(angles) < FEWEST_CROSSED:
+        return False
+    mean, error = float(angles.mean()), float(angles.std(ddof=1)) / float(np.sqrt(len(angles)))
+    alike = int((np.sign(angles) == np.sign(mean)).sum())
+    return abs(mean) > max(LEAST_ANGLE, SURE_OF_AN_ANGLE * error) and alike >= MOST_ON_ONE_SIDE * len(angles)
