@@ -151,7 +151,8 @@ def test_a_law_is_doubted_where_nothing_is_measured_too(monkeypatch: pytest.Monk
     child = discovered(monkeypatch, CONFIG, tmp_path / "child.yaml", replace(LAW, seen=(0.5, 0.9))).child
     assert child is not None
     dry = Experiment(discharge={"upstream": 0.3}, level=0.4)
-    said = critical_warnings(CaseRun(child.model_copy(update={"experiments": {**child.experiments, "dry summer": dry}})))
+    case = child.model_copy(update={"experiments": {**child.experiments, "dry summer": dry}})
+    said = critical_warnings(CaseRun(case))
     assert any("`dry summer`" in one for one in said)
 
 

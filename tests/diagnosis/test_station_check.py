@@ -7,9 +7,9 @@ from vegglue.diagnosis.station_check import (
     AxesExchanged,
     PlacesInKilometres,
     PlacesInOtherUnit,
-    PlacesOnMap,
     SharedPlaces,
     StationsOnLand,
+    StationsOnMap,
     StationsOnPatchEdge,
     StationsOutsideGrid,
 )
@@ -43,8 +43,8 @@ def test_a_section_of_its_own_shares_no_place(tmp_path):
 
 def test_places_of_a_map_are_the_first_remark(tmp_path):
     on_map = "".join(f"low,A,{683_120 + x},{247_480 + y},0.3,0.01\n" for x in (12, 20) for y in (-1, 0.7))
-    assert odd(tmp_path, rows=HEAD + on_map)[0] == PlacesOnMap((683132.0, 247479.0))
-    assert not found_in(odd(tmp_path, rows=HEAD + on_map + FIRST[0]), PlacesOnMap)
+    assert odd(tmp_path, rows=HEAD + on_map)[0] == StationsOnMap((683132.0, 247479.0))
+    assert not found_in(odd(tmp_path, rows=HEAD + on_map + FIRST[0]), StationsOnMap)
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ class AxesExchanged:
 
 
 @dataclass(frozen=True)
-class PlacesOnMap:
+class StationsOnMap:
     """Velocities all farther from the grid than its length, in a case without a frame."""
 
     first: Place
@@ -158,7 +158,7 @@ def remarks_on_frames(case: Case, observations: Observations) -> Iterator[object
         yield AxesExchanged(len(lost), _first(lost))
     beyond = np.maximum(west - table["x"], table["x"] - east) > east - west
     if case.frame is None and unit is None and len(lost) == len(table) and beyond.all():
-        yield PlacesOnMap(_first(table))
+        yield StationsOnMap(_first(table))
     if case.frame is not None or case.grid.centreline is not None:
         return
     if most and unit is not None:
