@@ -1,6 +1,7 @@
 """Which column of a table holds what, in which unit and as which numbers: by the site file, else by its heading."""
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from vegglue.importers.column_names import (
     words_of,
 )
 from vegglue.importers.file_options import FileOptions
-from vegglue.importers.table_parser import ParsedTable, is_number
+from vegglue.importers.table_parser import MOST_ROWS_NAMED, ParsedTable, is_number
 from vegglue.measurements.plausibility import (
     LARGEST_COORDINATE,
     MARKS_OF_ANY_COLUMN,
@@ -34,7 +35,7 @@ from vegglue.wording.numbers import listed, so_many
 
 # Words of a heading that mean across; V alone means none, and may be the velocity.
 WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
-NAMES_OF_BED = {"bed level", "z bed", "zb", "bed elevation"}
+NAMES_OF_BED = {*ROLES["z_bed"].names}
 # Words of a heading of u that mean along; one without them is that of a speed if a direction stands beside it.
 WORDS_FOR_ALONG = {"u", "ux", "vx", "umean", "x", "streamwise"}
 # Names that stand for a role only if no other column has it: beside z of a point there may be the bed, beside Vx the
@@ -42,7 +43,6 @@ WORDS_FOR_ALONG = {"u", "ux", "vx", "umean", "x", "streamwise"}
 SECTIONS_PROPER = {*ROLES["section"].names} - {*NAMES_OF_GAUGES}
 VAGUE_NAMES = {
     "section": {*NAMES_OF_GAUGES},
-    "z": NAMES_OF_BED,
     "depth": {"depth", "tiefe", "profondeur", "profundidad", "diepte", "profondita", "profundidade"},
     "u": {"velocity", "vel", "mean velocity", "mean vel", "meanv", "vitesse", "geschwindigkeit"}
     | {"fliessgeschwindigkeit", "average velocity", "avg velocity", "velocity mean", "velocity avg", "velocidad"}
@@ -61,13 +61,28 @@ VALUES_OF = {
 MEASURED_ROLES = {"x", "y", "u", "v", "east_velocity", "north_velocity", "speed", "direction", "level", "discharge"}
 NO_DEGREES = "degrees; convert longitudes and latitudes to metres on a map, such as UTM or the national grid."
 NAMES_OF_EAST = {"e", "east", "easting", "rechtswert", "utm x", "utm e"}
+# Headings of a flag, and what in it marks a row as no measurement; by numbers, those of IOC and QARTOD: 3 suspect, 4
+# failed, 9 missing. Of 0 and 1 the heading decides which is good.
+OF_FLAGS = re.compile(
+    r"(data )?(quality|qc|qa|qaqc|flag|valid|ok|use|used|status|check|good|bad|reject|rejected|outlier|spike|error)"
+    r"( (flag|code|check|control|qc))*"
+)
+BAD = re.compile(
+    r"(bad|reject|fail|invalid|discard|outlier|exclude|suspect|questionable|doubtful|spike|unusable"
+    r"|not? (ok|good|use|valid)|do not use|schlecht|ungültig|verworfen|mauvais|rejet|malo|mala|slecht|ongeldig|x$)",
+    re.IGNORECASE,
+)
+NO = {"no", "n", "false", "0", "nein", "non", "nee", "f"}
+BAD_CODES, GOOD_CODES = {3.0, 4.0, 9.0}, {1.0, 2.0}
+MEANS_GOOD = {"valid", "ok", "use", "used", "good"}
+MEANS_BAD = {"bad", "reject", "rejected", "outlier", "spike", "error"}
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 # What no reading of a quantity or a role exceeds [SI]: no stream among plants runs at 7 m/s, a direction is less than
 # two turns, plants grow in no 50 m of water, and no river lies 7 km above the sea. 7777 mm is a level in a flume, 7777
 # ft one in the mountains. Places along and across, times and discharges have no such bound.
 LARGEST_OF = {
     "velocity": 7.0, "angle": 720.0, "depth": 50.0, "height": 50.0, "below": 50.0, "level_se": 50.0, "level": 7e3,
-    "z": 7e3,
+    "z": 7e3, "z_bed": 7e3,
 }  # fmt: skip
 
 
@@ -144,6 +159,38 @@ def _is_of_something_else(heading: str, role: str, headings: tuple[str, ...], na
         return "level" not in roles or any(ROLES[one].quantity == "velocity" for one in roles if one != "u_se")
     vague = VAGUE_NAMES.get(role, set())
     return own in vague and any(name not in vague for name in others)
+
+
+def without_flagged(path: Path, table: ParsedTable, columns: Mapping[str, int]) -> ParsedTable:
+    """The table without rows that a column of flags marks as no measurement.
+
+    InputError for a column of 0 and 1 of which the heading does not say which is good.
+    """
+    for place, heading in enumerate(table.headings):
+        words = words_of(heading)
+        if place in columns.values() or not OF_FLAGS.fullmatch(words):
+            continue
+        texts = [text.strip() for text in table.texts(place)]
+        known = {text for text in texts if text}
+        codes = {float(text) for text in known if is_number(text) and "," not in text}
+        if len(codes) == len(known) and len(known) > 1 and set(words.split()) & (MEANS_GOOD | MEANS_BAD):
+            good = bool(set(words.split()) & MEANS_GOOD)
+            flagged = {i for i, text in enumerate(texts) if text and (float(text) != 0.0) != good}
+        elif len(codes) == len(known) and codes <= BAD_CODES | GOOD_CODES:
+            flagged = {i for i, text in enumerate(texts) if text and float(text) in BAD_CODES}
+        elif len(codes) == len(known) and codes == {0.0, 1.0}:
+            raise InputError(
+                f"{shown_path(path)}: expected flags that say which rows are good, got 0 and 1 in column {heading!r}; "
+                "head it `valid` or `bad`, or take out the bad rows and the column."
+            )
+        else:
+            no = NO if set(words.split()) & MEANS_GOOD else set()
+            yes = {"yes", "y", "true", "1", "ja", "oui", "si"} if set(words.split()) & MEANS_BAD else set()
+            flagged = {i for i, text in enumerate(texts) if BAD.match(text) or text.lower() in no | yes}
+        if flagged and len(flagged) < len(texts):
+            rows = listed([str(table.row_numbers[i]) for i in sorted(flagged)[:MOST_ROWS_NAMED]])
+            return table.without(flagged, f"{so_many(len(flagged), 'row')} flagged in {heading} left out (row {rows})")
+    return table
 
 
 def unit_of_column(path: Path, table: ParsedTable, columns: Mapping[str, int], role: str, options: FileOptions) -> str:

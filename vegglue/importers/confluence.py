@@ -51,7 +51,7 @@ BLOCKS, LEVEL_ERROR = 3, 0.001
 UPSTREAM, SIDE, OUTLET = 0.05, 0.5, 0.002
 MAPS_OF_THE_SET, OF_THE_SET = "topo_water_level_maps.mat", "a file of the set"
 # Folders within folders that are looked through: its archive unpacks to two. Not all: it may be a whole disk.
-DEEPEST = 2
+DEEPEST_FOLDER = 2
 # Of the map of the bed every fourth value along x [-]: it is stored each centimetre, and was measured each 5 cm.
 THINNED = 4
 ANOTHER_PLACE = "give another place by --to"
@@ -71,7 +71,7 @@ def holds_confluence(folder: Path) -> bool:
 
 def mat_folder(folder: Path) -> Path | None:
     """The folder of the MATLAB files, the one given or one inside it; None if there is none."""
-    for depth in range(1 + DEEPEST):
+    for depth in range(1 + DEEPEST_FOLDER):
         found = sorted(folder.glob("*/" * depth + MAPS_OF_THE_SET)) if folder.is_dir() else []
         if found:
             return found[0].parent

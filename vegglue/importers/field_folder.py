@@ -12,6 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from vegglue.arrays import Array
 from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name, told_apart
@@ -19,7 +22,6 @@ from vegglue.case.zones import BANK_SLOPE
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
-    MANNING_BED,
     MODEL_ERROR_OF_FLUME,
     VISCOSITY,
     bed_prior,
@@ -42,7 +44,15 @@ from vegglue.importers.site_file import (
     read_site,
     site_file,
 )
-from vegglue.importers.terrain import BANK_CLASS, Ground, slope_of_banks, surveyed_ground, with_banks
+from vegglue.importers.terrain import (
+    BANK,
+    BANK_CLASS,
+    Ground,
+    mapped_classes,
+    slope_of_banks,
+    surveyed_ground,
+    with_banks,
+)
 from vegglue.importers.vector_files import drawn_centreline, planted_polygons, summary_of_plants
 from vegglue.measurements.plausibility import DEEPEST_CHANNEL, STANDING_WATER
 
@@ -102,16 +112,23 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     # Files that the site file names and that hold no measurements.
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
     used += [given.file] if isinstance(given, FileOfSite) else []
-    measured = measured_files(folder, target, site, place, used)
-    held_out = held_out_measurements(folder, target, site, place)
-    stated, factor = site.eddy_viscosity_m2_s, site.viscosity_factor
-    unknown = {VISCOSITY: viscosity_prior(stated, factor)} if factor > 1 else {}
     if site.bed is not None or site.channel is None:
         ground = surveyed_ground(folder, target, site, place)
     else:
-        ground = _straight_ground(site, site.channel, place)
+        ground = _straight_ground(folder, site, site.channel, place)
+    measured = measured_files(folder, target, site, place, used, ground.level)
+    held_out = held_out_measurements(folder, target, site, place, ground.level)
+    stated, factor = site.eddy_viscosity_m2_s, site.viscosity_factor
+    unknown = {VISCOSITY: viscosity_prior(stated, factor)} if factor > 1 else {}
+    classes = ground.tree["friction"]["classes"]
+    of_bed = BED_OF_FLUME if site.walls is not None else PARAMETERS["n_b"]
+    rough = {
+        one["n"]: of_bed | {"symbol": one["n"], "meaning": f"Manning coefficient of {name}"}
+        for name, one in classes.items()
+        if one.get("n", "n_b") != "n_b"
+    }
     banks = {"k_s": loguniform_prior(0.01, 5.0, "m", "k_s", "Nikuradse roughness height of the banks")}
-    has_banks = BANK_CLASS in ground.tree["friction"]["classes"].values()
+    has_banks = BANK_CLASS in classes.values()
     measured.imported.extend([*ground.imported, *drawn_patches])
     tree: Tree = {
         "name": case_name(folder.resolve().name),
@@ -121,7 +138,7 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         "outlet": {},
         "eddy_viscosity": VISCOSITY if unknown else stated,
         "experiments": {name: _experiment(flow) for name, flow in site.experiments.items()},
-        "parameters": PARAMETERS | (banks if has_banks else {}) | unknown,
+        "parameters": PARAMETERS | rough | (banks if has_banks else {}) | unknown,
         "observations": measured.observations,
         **FIRST_LOOK,
     }
@@ -194,7 +211,7 @@ def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -
     return found, imported
 
 
-def _straight_ground(site: FieldSite, channel: Channel, place: Placement) -> Ground:
+def _straight_ground(folder: Path, site: FieldSite, channel: Channel, place: Placement) -> Ground:
     """Grid, bed and friction of a channel by its numbers, with z = 0 on the floor at x = 0.
 
     The grid is that of the site file, else of cells that fit the floor, as wide as the water can get, or as the walls
@@ -223,11 +240,17 @@ def _straight_ground(site: FieldSite, channel: Channel, place: Placement) -> Gro
         "bed_slope": channel.bed_slope,
         "level": 0.0 - channel.bed_slope * x[0],
     }
-    friction: Tree = {"classes": {"bed": MANNING_BED}, "default": "bed"}
-    if (steeper := slope_of_banks(site)) is not None:
+    friction, imported = mapped_classes(folder, site, place)
+    if (steeper := slope_of_banks(site)) is not None and BANK not in friction["classes"]:
         friction = with_banks(friction, min(BANK_SLOPE, steeper))
     grid = {"x": x, "y": y, "cell": list(given.cell or (length / columns, dy))}
-    return Ground({"grid": grid, "bed": [{"trapezoid": trapezoid}], "friction": friction}, [], {})
+
+    def level(along: Array, across: Array) -> Array:
+        """z = -S x + m max(|y| - b / 2, 0)."""
+        bank_rise = np.maximum(np.abs(across) - 0.5 * channel.bottom_width_m, 0.0) * trapezoid["bank_slope"]
+        return -channel.bed_slope * along + bank_rise
+
+    return Ground({"grid": grid, "bed": [{"trapezoid": trapezoid}], "friction": friction}, imported, {}, level)
 
 
 def _experiment(given: MeasuredFlow) -> Tree:

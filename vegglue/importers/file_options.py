@@ -12,6 +12,8 @@ from vegglue.importers.column_names import ROLES, UNITS, in_si, si_factor
 # Keys of one length or angle each.
 LENGTHS_AND_ANGLES = {"x": "length", "floor": "length", "surface": "length", "draft": "length", "declination": "angle"}
 
+LARGEST_FACTOR = 2.0  # mean velocity of a vertical over that of any of its points [-]
+
 
 @dataclass(frozen=True)
 class FileOptions:
@@ -22,7 +24,7 @@ class FileOptions:
     columns, units
         Heading of the column, and unit, of each role.
     missing
-        Numbers that mark no value.
+        Numbers that mark no value; given as none, `[]`, a velocity of 0 counts as measured.
     experiment, section
         Of all rows.
     standard_error
@@ -50,11 +52,13 @@ class FileOptions:
         Depth of a raw ADCP in the water, None for that in the file [m].
     declination
         Of its compass: how far magnetic north lies east of true north [degrees].
+    factor
+        Mean velocity of the vertical over the one measured, such as 0.85 for velocities of the surface [-].
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
-    missing: tuple[float, ...] = ()
+    missing: tuple[float, ...] | None = None
     experiment: str | None = None
     section: str | None = None
     standard_error: Mapping[str, float] = field(default_factory=dict)
@@ -71,6 +75,7 @@ class FileOptions:
     surface: float | None = None
     draft: float | None = None
     declination: float = 0.0
+    factor: float | None = None
 
 
 def read_file_options(given: Any, where: str) -> FileOptions:
@@ -89,6 +94,11 @@ def read_file_options(given: Any, where: str) -> FileOptions:
     for key, quantity in LENGTHS_AND_ANGLES.items():
         if key in given:
             found[key] = in_si(given[key], quantity, f"{where}.{key}")
+    if "factor" in given:
+        factor = given["factor"]
+        if isinstance(factor, bool) or not isinstance(factor, int | float) or not 0.0 < factor <= LARGEST_FACTOR:
+            raise InputError(f"{where}.factor expected a number above 0, up to {LARGEST_FACTOR:g}, got {factor!r}.")
+        found["factor"] = float(factor)
     if "standard_error" in given:
         found["standard_error"] = _errors_by_unit(given["standard_error"], f"{where}.standard_error")
     for key, count in (("zero", 2), ("start", 2), ("position", 3)):
@@ -107,11 +117,11 @@ def read_file_options(given: Any, where: str) -> FileOptions:
         found[key] = _one_of(given[key], ("map", "channel"), f"{where}.{key}")
     if "zero" in given and found.setdefault("coordinates", "channel") != "channel":
         raise InputError(f"{where} expected either `zero`, a place in the channel, or `coordinates: map`, got both.")
-    marks = given.get("missing", ())
-    marks = marks if isinstance(marks, list | tuple) else [marks]
-    if not all(isinstance(mark, int | float) and not isinstance(mark, bool) for mark in marks):
+    marks = given.get("missing", None)
+    marks = marks if isinstance(marks, list | tuple) or marks is None else [marks]
+    if not all(isinstance(mark, int | float) and not isinstance(mark, bool) for mark in marks or ()):
         raise InputError(f"{where}.missing expected a number or a list of numbers, got {marks!r}.")
-    found["missing"] = tuple(float(mark) for mark in marks)
+    found["missing"] = tuple(float(mark) for mark in marks) if marks is not None else None
     flip = given.get("flip", ())
     flip = flip if isinstance(flip, list | tuple) else [flip]
     found["flip"] = tuple(_one_of(axis, ("x", "y"), f"{where}.flip") for axis in flip)

@@ -1,37 +1,50 @@
-"""Gaugings along a tape: SonTek's FlowTracker2 (.ft), FlowTracker and RiverSurveyor Stationary Live (.dis).
+"""Gaugings along a tape: FlowTracker2 (.ft), FlowTracker and RiverSurveyor Stationary Live (.dis), AquaCalc (.csv).
 
 Formats: FlowTracker2 User's Manual (SonTek, January 2019), section 12.1: a ZIP whose DataFile.json holds `Stations`
-with Location, Depth and Calculations, in metres and seconds whatever the handheld showed. FlowTracker (file format 2.x)
-and RiverSurveyor Stationary Live (2.x) as their programs export them: text with settings, then a table of verticals.
+with Location, Depth and Calculations, in metres and seconds, or with units in the keys (`Depth (ft)`). FlowTracker
+(file format 2.x) and RiverSurveyor Stationary Live (2.x) as their programs export them: text with settings, then a
+table of verticals. AquaCalc Pro (JBS Instruments, file version 1.5): settings, then a table that begins with VERT, in
+feet, or in metres if its standard is metric. Edges, and verticals without a method, samples or time, are no
+measurements: all programs write 0 for them.
 """
 
+import csv
 import json
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
 
+from vegglue.arrays import Mask
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import si_factor
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.library_files import read_by_library, readable_text, reading_structures, refuse_larger
 from vegglue.importers.measured_rows import MeasuredRows, on_the_tape, rows_of_table
 from vegglue.importers.table_parser import Line, ParsedTable, is_number
+from vegglue.wording.numbers import so_many
 
 ZIP_BEGINS = b"PK\x03\x04"
 DATA_FILE = "datafile.json"
 # How a file of each program begins.
 FLOWTRACKER = re.compile(r"^Sensor_Type\s+FlowTracker|FlowTracker_Handheld_ADV", re.MULTILINE)
 RIVERSURVEYOR = re.compile(r"^System Type;\s*RS-|RiverSurveyor Stationary", re.MULTILINE)
+AQUACALC = re.compile(r"\A.{0,100}^\W*AquaCalc", re.MULTILINE | re.DOTALL)
 # Columns of place, depth and mean velocity of the vertical, and its error.
 COLUMNS_OF_GAUGINGS = {
-    "tape": ("Loc", "Location"),
-    "depth": ("Depth",),
-    "u": ("MeanV", "Mean Velocity"),
+    "tape": ("Loc", "Location", "DIST"),
+    "depth": ("Depth", "TDPTH"),
+    "u": ("MeanV", "Mean Velocity", "VVEL"),
     "u_se": ("Verr",),
 }
+# Columns that are 0 or empty for a vertical that was not measured: samples, share of the depth measured, time.
+PROOFS = ("Npts", "% Measured", "TIME")
+NOT_MEASURED = ("none", "novelocity", "unknown")  # methods of a FlowTracker2 by which nothing is measured
 # Share by which a mean of one or two points is off that of its vertical [-], and the least error of a mean over the
 # usual 40 s [m/s]. Chosen, not measured.
 OF_THE_RULE, LEAST_ERROR = 0.05, 0.005
@@ -45,33 +58,71 @@ def read_flowtracker2(path: Path, options: FileOptions) -> MeasuredRows:
     ):
         (entry,) = [one for one in packed.infolist() if one.filename.lower() == DATA_FILE]
         refuse_larger(path, entry.file_size)
-        stations = json.loads(packed.read(entry).decode("utf-8-sig"))["Stations"]
+        tree = json.loads(packed.read(entry).decode("utf-8-sig"))
+        stations = next(value for key, value in tree.items() if key.partition(" (")[0] == "Stations")
     if not isinstance(stations, list) or not stations:
         raise InputError(f"{shown_path(path)}: expected a list of Stations in DataFile.json, got none; check the file.")
-    rows = []
     advice = "export it as CSV from the maker's program"
     with reading_structures(path, "stations with Location, Depth and Calculations", advice):
-        for station in stations:
-            means = station.get("Calculations") or {}
-            values = [station["Location"], station.get("Depth")]
-            values += [(means.get(name) or {}).get("X") for name in ("MeanVelocityInVertical", "VelocityStandardError")]
-            rows.append([math.nan if value is None else float(value) for value in values])
-    tape, depth, u, own = np.array(rows, dtype=np.float64).reshape(-1, 4).T
+        rows = [_station(path, station) for station in stations]
+    tape, depth, u, own, measured = np.array(rows, dtype=np.float64).reshape(-1, 5).T
     columns = {"tape": "Location", "depth": "Depth", "u": "MeanVelocityInVertical.X", "u_se": "VelocityStandardError.X"}
     units = {"tape": "m", "depth": "m", "u": "m/s", "u_se": "m/s"}
     taken = MeasuredRows({"tape": tape, "depth": depth, "u": u, "u_se": own}, {}, columns, units, ("FlowTracker2",))
-    return on_the_tape(path, _wet_verticals(taken.only(np.isfinite(tape))), options)
+    return on_the_tape(path, _wet_verticals(taken, np.isfinite(tape) & (measured > 0.0)), options)
+
+
+def _station(path: Path, station: Mapping[str, Any]) -> list[float]:
+    """Location, depth [m], mean velocity and its error [m/s], and 1 if the vertical was measured, else 0.
+
+    A correction factor belongs to the velocity: -1 for flow that runs against the probe. Discharge over area, which
+    the file may hold, shows whether the velocity has it already.
+    """
+
+    def number(of: Mapping[str, Any], name: str, quantity: str = "") -> float:
+        """A value under its name, with or without its unit in the key; of components the X. NaN for none."""
+        key = next((key for key in of if key.partition(" (")[0] == name), None)
+        value = of[key] if key is not None else None
+        if key is None or value is None:
+            return math.nan
+        unit = key.partition(" (")[2].removesuffix(")")
+        factor = si_factor(unit, quantity, shown_path(path)) if unit and quantity else 1.0
+        return factor * (number(value, "X", quantity) if isinstance(value, dict) else float(value))
+
+    names = {key.partition(" (")[0]: value for key, value in station.items()}
+    if "Location" not in names:
+        raise KeyError("Location")
+    means = names.get("Calculations") or {}
+    u, factor = number(means, "MeanVelocityInVertical", "velocity"), number(station, "CorrectionFactor")
+    area = number(means, "Area")
+    panel = number(means, "Discharge") / area if area > 0.0 else math.nan
+    has_factor = math.isfinite(panel) and abs(panel - u) <= abs(panel - factor * u)
+    if math.isfinite(factor) and factor != 0.0 and not has_factor:
+        u *= factor
+    method, kind = (str(names.get(key) or "").lower() for key in ("VelocityMethod", "StationType"))
+    samples = number(means, "Samples")
+    unmeasured = method in NOT_MEASURED or "bank" in kind or "edge" in kind or samples == 0.0
+    return [
+        number(station, "Location", "length"),
+        number(station, "Depth", "length"),
+        u,
+        number(means, "VelocityStandardError", "velocity"),
+        float(not unmeasured),
+    ]
 
 
 def is_gauging(text: str) -> bool:
-    """Whether a text is an export of one of the two programs."""
-    return bool(FLOWTRACKER.search(text) or RIVERSURVEYOR.search(text))
+    """Whether a text is an export of one of the three programs."""
+    return any(program.search(text) for program in (FLOWTRACKER, RIVERSURVEYOR, AQUACALC))
 
 
 def read_gauging(path: Path, options: FileOptions) -> MeasuredRows:
     """Verticals at their place on the tape, which `line` lays on the map. InputError."""
     text = readable_text(path)
-    table = _flowtracker_table(path, text) if FLOWTRACKER.search(text) else _riversurveyor_table(path, text)
+    if AQUACALC.search(text):
+        table = _aquacalc_table(path, text)
+    else:
+        table = _flowtracker_table(path, text) if FLOWTRACKER.search(text) else _riversurveyor_table(path, text)
     columns = {role: name for role, names in COLUMNS_OF_GAUGINGS.items() for name in names if name in table.headings}
     taken = rows_of_table(path, table, replace(options, columns=columns))
     if not {"tape", "depth", "u"} <= taken.numbers.keys() or not taken.size:
@@ -79,7 +130,11 @@ def read_gauging(path: Path, options: FileOptions) -> MeasuredRows:
             f"{shown_path(path)}: expected rows with place, depth and mean velocity, got {len(table.rows)} rows of "
             f"{', '.join(table.headings)}; export it anew."
         )
-    return on_the_tape(path, _wet_verticals(replace(taken, others={})), options)
+    measured = np.ones(taken.size, dtype=bool)
+    for proof in (name for name in PROOFS if name in taken.others):
+        texts = [text.strip().rstrip("%") for text in taken.others[proof]]
+        measured &= np.array([not is_number(text) or float(text) > 0.0 for text in texts]) & (np.array(texts) != "")
+    return on_the_tape(path, _wet_verticals(replace(taken, others={}), measured), options)
 
 
 def _flowtracker_table(path: Path, text: str) -> ParsedTable:
@@ -113,6 +168,20 @@ def _riversurveyor_table(path: Path, text: str) -> ParsedTable:
     return _table(headings, units, list(enumerate(cut, head + 2)), "RiverSurveyor Stationary")
 
 
+def _aquacalc_table(path: Path, text: str) -> ParsedTable:
+    """The table that begins with VERT; its units are those of the standard, SAE in feet or metric."""
+    lines = list(csv.reader(text.splitlines(), skipinitialspace=True))
+    head = next((i for i, fields in enumerate(lines) if fields and fields[0].strip() == "VERT"), len(lines))
+    if head >= len(lines):
+        raise InputError(f"{shown_path(path)}: expected the table VERT of an AquaCalc, got none; export it anew.")
+    metric = re.search(r"^\s*Meas\w* standard:\s*,\s*(metric|SI)\b", text, re.MULTILINE | re.IGNORECASE)
+    length, velocity = ("m", "m/s") if metric else ("ft", "ft/s")
+    headings = tuple(field.strip() for field in lines[head])
+    units = tuple({"DIST": length, "TDPTH": length, "VVEL": velocity}.get(one, "") for one in headings)
+    rows = [(number, [field.strip() for field in fields]) for number, fields in enumerate(lines[head + 1 :], head + 2)]
+    return _table(headings, units, rows, "AquaCalc")
+
+
 def _table(headings: tuple[str, ...], units: tuple[str, ...], rows: list[Line], form: str) -> ParsedTable:
     """The rows that are as wide as the heading, and begin with a number."""
     kept = [(number, fields) for number, fields in rows if len(fields) == len(headings) and is_number(fields[0])]
@@ -120,16 +189,22 @@ def _table(headings: tuple[str, ...], units: tuple[str, ...], rows: list[Line], 
     return ParsedTable(headings, units, texts, numbers, decimal_comma=False, form=form)
 
 
-def _wet_verticals(taken: MeasuredRows) -> MeasuredRows:
+def _wet_verticals(taken: MeasuredRows, measured: Mask) -> MeasuredRows:
     """Of points of one vertical in the water the last row, which has its mean; with an error.
 
-    se^2 = (share of the rule u)^2 + own^2; own: the instrument's, if it is below half of the velocity [m/s].
+    se^2 = (share of the rule u)^2 + own^2; own: the instrument's, if it is below half of the velocity [m/s]. measured
+    (rows,): which rows are measurements; edges and the like are left out.
     """
-    taken = taken.only(np.isfinite(taken.numbers["u"]) & (taken.numbers["depth"] > 0.0))
+    wet = np.isfinite(taken.numbers["u"]) & (taken.numbers["depth"] > 0.0)
+    unmeasured = int((wet & ~measured).sum())
+    taken = taken.only(wet & measured)
     place = taken.numbers["tape"]
     last = np.array([not np.any(place[i + 1 :] == place[i]) for i in range(taken.size)], dtype=bool)
     kept = taken.only(last)
     u = np.abs(kept.numbers["u"])
     own = kept.numbers.get("u_se", np.full(kept.size, np.nan))
     sound = np.where(own < 0.5 * u, own, LEAST_ERROR)
-    return kept.having({"u_se": np.hypot(OF_THE_RULE * u, np.fmax(sound, LEAST_ERROR))})
+    errors = {"u_se": np.hypot(OF_THE_RULE * u, np.fmax(sound, LEAST_ERROR))}
+    return kept.having(
+        errors, *([f"{so_many(unmeasured, 'row')} without a measurement left out"] if unmeasured else [])
+    )

@@ -163,13 +163,14 @@ def numbers_of_variable(values: Any) -> Array:
     return np.atleast_1d(np.asarray(values, dtype=np.float64))
 
 
-def open_raw(path: Path, instead: str, most: int | None = None) -> Any:
+def open_raw(path: Path, instead: str, most: int | None = None, named: Path | None = None) -> Any:
     """The dataset that mhkit, which carries on dolfyn, makes of a raw file.
 
-    instead: what else may be exported; most: samples that the file can hold, where the reader's own guess is too small.
-    InputError without mhkit, and for what it cannot read.
+    instead: what else may be exported; most: samples that the file can hold, where the reader's own guess is too small;
+    named: the file that it is a copy of. InputError without mhkit, and for what it cannot read.
     """
-    with importing("mhkit", path, "raw files of instruments", "instruments", f"export {instead}"):
+    named = named or path
+    with importing("mhkit", named, "raw files of instruments", "instruments", f"export {instead}"):
         from mhkit import dolfyn
-    with redirect_stdout(io.StringIO()), read_by_library(path, "a raw file of an instrument", "", f"export {instead}"):
+    with redirect_stdout(io.StringIO()), read_by_library(named, "a raw file of an instrument", "", f"export {instead}"):
         return dolfyn.read(str(path), userdata=False, nens=most)

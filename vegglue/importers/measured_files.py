@@ -8,12 +8,15 @@ import hashlib
 import io
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
-from vegglue.case.text_files import unused
+from vegglue.case.text_files import unused as unused_name
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import ROLES
 from vegglue.importers.config_parts import observed
@@ -34,6 +37,14 @@ ENDINGS = (*TEXT_ENDINGS, *WORKBOOKS, *BINARY_ENDINGS)
 OTHERS = ("answer.json", "readme.txt")
 # How names of files begin that programs leave beside a table: locks of workbooks, and what a Mac keeps of every file.
 OF_PROGRAMS = (".", "~$")
+# Kinds of which 0 may mark no value.
+DOUBTED_KINDS = (STREAMWISE, "speed")
+# A number as Fortran writes it, 3.7D-01.
+OF_FORTRAN = re.compile(r"\d[dD][-+]?\d")
+# Values of another file at places so near are the same measurements, if there are so many of them [m], [-].
+SAME_PLACE, FEWEST_COPIED = 0.5, 4
+# Level of the bed [m] at places along and across the channel (n,) [m].
+BedLevel = Callable[[Array, Array], Array]
 # Headings that a message lists of each kind of measurement: the commonest stand first.
 HEADINGS_SHOWN = 4
 # What the columns of a table hold by the name of its file; what is held out is only for judging a finished model.
@@ -51,27 +62,32 @@ class MeasuredFiles:
     tables: list[StationTable]
 
 
-def measured_files(folder: Path, target: Path, site: FieldSite, place: Placement, used: Sequence[str]) -> MeasuredFiles:
-    """All measurements of a folder. used: files that the site file names elsewhere, such as that of the bed.
+def measured_files(
+    folder: Path, target: Path, site: FieldSite, place: Placement, used: Sequence[str], bed: BedLevel
+) -> MeasuredFiles:
+    """All measurements of a folder.
 
+    used: files that the site file names elsewhere, such as that of the bed; bed: its level, for measured depths.
     InputError if there are none, or one cannot be read.
     """
     options = _options(folder, site)
     known = KnownExperiments(tuple(site.experiments), site_file(folder).name, EXPERIMENTS, tuple(site.holdout))
-    found = _read(_candidates(folder, options, used), options, target, place, known)
+    found = _read(_candidates(folder, options, used), options, target, place, known, bed)
     if not found.observations:
         raise InputError(f"{shown_path(folder)}: {_nothing_measured(found)}")
     return found
 
 
-def held_out_measurements(folder: Path, target: Path, site: FieldSite, place: Placement) -> MeasuredFiles:
+def held_out_measurements(
+    folder: Path, target: Path, site: FieldSite, place: Placement, bed: BedLevel
+) -> MeasuredFiles:
     """What is held out, read as all measurements are; nothing if no experiment is held out.
 
     InputError if the file cannot be read, or nothing in it is a measurement.
     """
     paths = held_out_files(folder)[:1] if site.holdout else []
     known = KnownExperiments(tuple(site.holdout), site_file(folder).name, HELD_OUT, tuple(site.experiments))
-    found = _read(paths, _options(folder, site), target, place, known)
+    found = _read(paths, _options(folder, site), target, place, known, bed)
     if paths and not found.observations:
         raise InputError(f"{shown_path(folder)}: of what is held out, {_nothing_measured(found)}")
     return found
@@ -163,25 +179,32 @@ def _read(
     target: Path,
     place: Placement,
     known: KnownExperiments,
+    bed: BedLevel,
 ) -> MeasuredFiles:
     """Tables that a case can name stay where they are; others are brought into that form beside the config."""
     found = MeasuredFiles([], [], [])
+    stations: list[tuple[Path, str, list[list[str]]]] = []  # file, kind and rows, to find what stands there twice
     # Each file for itself, but records of one point together if they belong to one section.
     groups: dict[object, list[tuple[Path, FileOptions]]] = {}
     for path in paths:
-        if path not in options and not place.turned and _is_plain(path, known):
+        plain = _plain_rows(path, known) if path not in options and not place.turned else None
+        if plain is not None:
             named = Path(os.path.relpath(path, target.resolve().parent)).as_posix()
             found.observations.append(observed(KIND_OF_FILE[path.name].name, named))
+            _refuse_same_stations(path, KIND_OF_FILE[path.name].name, plain, stations)
             continue
         own = options.get(path, FileOptions())
         key = path if own.position is None else (own.experiment, own.section, own.floor, own.surface)
         groups.setdefault(key, []).append((path, own))
     for group in groups.values():
-        tables, records = _converted(group, place, known)
+        tables, records = _converted(group, place, known, bed)
         for table in tables:
+            kind = str(table.observations[0]["kind"])
+            if kind in KINDS:
+                _refuse_same_stations(group[0][0], kind, [[row[0], *row[2:5]] for row in table.rows], stations)
             # If gauge.csv and gauge.txt are both there, `gauge-level.csv` and `gauge-level-2.csv`; also of Gauge.txt.
             names = [one.file.removesuffix(".csv") for one in found.tables]
-            name = f"{unused(table.file.removesuffix('.csv'), names)}.csv"
+            name = f"{unused_name(table.file.removesuffix('.csv'), names)}.csv"
             found.tables.append(replace(table, file=name))
             found.observations.extend(
                 one | {"file": f"{data_folder(target).name}/{name}"} for one in table.observations
@@ -190,27 +213,82 @@ def _read(
     return found
 
 
-def _is_plain(path: Path, known: KnownExperiments) -> bool:
-    """Whether a table is in the form that a case names as it is: commas, all columns by their own names, one kind.
+def _refuse_same_stations(
+    path: Path, kind: str, rows: list[list[str]], before: list[tuple[Path, str, list[list[str]]]]
+) -> None:
+    """InputError if a file holds the values of another one again, at the same places to SAME_PLACE: a copy, which may
+    be rounded, is no second measurement. rows: experiment, x, y and value; these join those before.
+    """
+
+    def decimals(values: Sequence[str]) -> int:
+        return max((len(text.partition(".")[2]) for text in values), default=0)
+
+    for other, of_kind, others in before:
+        if of_kind != kind or other == path or min(len(rows), len(others)) < FEWEST_COPIED:
+            continue
+        few, many = sorted((rows, others), key=len)
+        off = 0.5 * 10.0 ** -min(decimals([row[3] for row in few]), decimals([row[3] for row in many])) + 1e-9
+        numbers = np.array([[float(text) for text in row[1:]] for row in many])
+        names = np.array([row[0] for row in many])
+        again = [
+            bool(
+                (
+                    (names == name)
+                    & (np.abs(numbers[:, :2] - [float(x), float(y)]).max(axis=1) <= SAME_PLACE)
+                    & (np.abs(numbers[:, 2] - float(value)) <= off)
+                ).any()
+            )
+            for name, x, y, value in few
+        ]
+        if len({row[3] for row in few}) > 1 and all(again):
+            raise InputError(
+                f"{shown_path(path)}: expected measurements of its own, got the {len(few)} values of {other.name} "
+                "again; move one of both out of the folder."
+            )
+    before.append((path, kind, rows))
+
+
+def _plain_rows(path: Path, known: KnownExperiments) -> list[list[str]] | None:
+    """Experiment, x, y and value of a table that a case names as it is: commas, all columns by their own names, one
+    kind, numbers without a D for their exponent; None for another table.
 
     InputError if such a table lacks a value, or is of another experiment.
     """
     if (kind := KIND_OF_FILE.get(path.name)) is None:
-        return False
-    lines = readable_text(path).splitlines()
+        return None
+    text = readable_text(path)
+    lines = text.splitlines()
     heading = {name.strip() for name in lines[0].split(",")} if lines else set()
     names = ("experiment", *(["section"] if kind.velocity else []))
     place = ("x", *(["y"] if kind.at_point else []))
     of_others = {other.column for other in KINDS.values()} - {kind.column}
-    if not {kind.column, *names, *place} <= heading or of_others & heading:
-        return False
+    if not {kind.column, *names, *place} <= heading or of_others & heading or OF_FORTRAN.search(text):
+        return None
     rows = read_table(path, names, (*place, kind.column), (kind.error_column,))
     known.refuse_unknown(shown_path(path), rows.index.tolist(), rows["experiment"].tolist())
-    return True
+    y = rows["y"] if "y" in rows.columns else np.zeros(len(rows))
+    if kind.name in DOUBTED_KINDS and (rows[kind.column] == 0.0).any():  # which may be none: read on
+        return None
+    columns = (rows["experiment"], rows["x"], y, rows[kind.column])
+    return [[str(one) for one in row] for row in zip(*columns, strict=True)]
+
+
+def _levels_of_depths(taken: MeasuredRows, bed: BedLevel) -> MeasuredRows:
+    """Levels z = z_b + h of a table of depths h alone, z_b of its own column or of the bed of the case."""
+    numbers = taken.numbers
+    if not {"x", "depth"} <= numbers.keys() or {kind.column for kind in KINDS.values()} & numbers.keys():
+        return taken
+    floor, of = numbers.get("z_bed"), "of the bed in the table"
+    if floor is None:
+        floor, of = bed(numbers["x"], numbers.get("y", np.zeros(taken.size))), "of the bed of the case"
+    found = {"level": floor + numbers["depth"]}
+    if "below" in numbers:
+        return taken
+    return taken.having(found, f"levels from depths, above that {of}")
 
 
 def _converted(
-    group: Sequence[tuple[Path, FileOptions]], place: Placement, known: KnownExperiments
+    group: Sequence[tuple[Path, FileOptions]], place: Placement, known: KnownExperiments, bed: BedLevel
 ) -> tuple[list[StationTable], list[Tree]]:
     """The tables of the files of a group, and what the config keeps of each file."""
     for path, options in group:
@@ -221,6 +299,7 @@ def _converted(
             )
     read = [with_experiments(reader_of(path)(path, options), known.names) for path, options in group]
     placed = [in_the_channel(one, place, options) for one, (_, options) in zip(read, group, strict=True)]
+    placed = [_levels_of_depths(one, bed) for one in placed]
     path, options = group[0]
     if len(group) > 1:  # each file keeps standard errors of its own, NaN if neither it nor the site file has one
         options = replace(options, standard_error={})
@@ -232,7 +311,9 @@ def _converted(
     records = []
     for number, ((file, _), one) in enumerate(zip(group, placed, strict=True)):
         # A depth of the water of which no height was made is not used: levels and the bed of the case are the depth.
-        uses_depth = "height" in one.numbers and "height" not in one.columns
-        used = one if uses_depth else one.not_reading("depth")
+        of_height = "height" in one.numbers and "height" not in one.columns
+        of_level = "level" in one.numbers and "level" not in one.columns
+        unused = ("z_bed",) if of_height or of_level else ("z_bed", "depth")
+        used = one.not_reading(*unused)
         records.append(record(file, used, f"{'with the above' if number else made.taken}: {used.summary}"))
     return made.tables, records

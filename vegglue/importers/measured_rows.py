@@ -18,6 +18,7 @@ from vegglue.importers.column_roles import (
     numbers_of_column,
     taken_as_si,
     unit_of_column,
+    without_flagged,
 )
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.table_parser import ParsedTable, parse_table, without_copies
@@ -147,6 +148,16 @@ class MeasuredRows:
         others = {**self.others, **unread}
         return replace(self.without(*roles), texts=texts, columns=columns, units=units, others=others)
 
+    def renamed(self, role: str, new: str) -> "MeasuredRows":
+        """The rows with one role called otherwise."""
+        names = {name: new if name == role else name for name in self.numbers}
+        return replace(
+            self,
+            numbers={names[name]: values for name, values in self.numbers.items()},
+            columns={names.get(name, name): heading for name, heading in self.columns.items()},
+            units={names.get(name, name): unit for name, unit in self.units.items()},
+        )
+
     @property
     def summary(self) -> str:
         """`x from Easting [m], u from Ve [cm/s]; semicolons, decimal comma; 12 rows; not read: Pt, Remarks`."""
@@ -181,6 +192,7 @@ def read_rows(path: Path, options: FileOptions) -> MeasuredRows:
 def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> MeasuredRows:
     """What a table holds, in SI: columns by `options`, else by their usual names; units likewise."""
     columns = columns_of_table(path, table, options)
+    table = without_flagged(path, table, columns)
     numbers: dict[str, Array] = {}
     units: dict[str, str] = {}
     assumed = taken_as_si(table, columns, options)
@@ -188,7 +200,7 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
     for role, place in columns.items():
         if ROLES[role].quantity:
             units[role] = unit_of_column(path, table, columns, role, options)
-            numbers[role], more = numbers_of_column(path, table, place, role, units[role], options.missing)
+            numbers[role], more = numbers_of_column(path, table, place, role, units[role], options.missing or ())
             notes += more
     if not numbers:
         raise InputError(
@@ -269,6 +281,10 @@ def vertical_role(taken: MeasuredRows) -> str | None:
 
 def in_the_channel(taken: MeasuredRows, place: Placement, options: FileOptions) -> MeasuredRows:
     """The rows along and across the channel: turned, flipped and shifted; a speed with its direction as components."""
+    if options.factor is not None:
+        roles = [role for role in taken.numbers if ROLES[role].quantity == "velocity"]
+        scaled = {role: options.factor * taken.numbers[role] for role in roles}
+        taken = taken.having(scaled, f"velocities times {options.factor:g}")
     taken = _without_speed_again(_components_of_speed(taken))
     if place.turned and options.coordinates != "channel" and {"x", "y"} <= taken.numbers.keys():
         x, y = place.to_channel(taken.numbers["x"], taken.numbers["y"])

@@ -16,7 +16,7 @@ from vegglue.importers.column_names import si_factor
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.library_files import reading_structures
 from vegglue.importers.measured_rows import MeasuredRows
-from vegglue.importers.transects import BoatProfile, stations_of_transect
+from vegglue.importers.transects import BoatProfile, refuse_leaps, stations_of_transect
 
 RIVERSURVEYOR_VARIABLES = ("Setup", "Summary", "System", "WaterTrack")  # of such a file
 # Numbers of the manual: velocities as east, north and up; a boat placed by the bottom or by satellites; the step of a
@@ -28,6 +28,7 @@ def stations_of_riversurveyor(path: Path, parts: dict[str, Any], options: FileOp
     """Stations of a transect. InputError."""
     with reading_structures(path, "the structures of a MATLAB export of RiverSurveyor Live", "export it anew"):
         profiles = _profiles(path, parts)
+    refuse_leaps(path, profiles)
     return stations_of_transect(path, options, profiles, "RiverSurveyor MATLAB export")
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,8 @@ HEIGHT_WORDS = {
     "diepte", "profondita", "profundidade", "altura", "hoogte", "altezza", "hoehe", "messhohe", "bed", "bottom",
     "sohle", "grund", "fond", "lecho", "fondo", "bodem",
 }  # fmt: skip
+# A velocity of 0 is doubted between neighbours of so much of the median [-]: chosen.
+OF_THE_USUAL = 0.5
 # Heights at one place differ by such a factor [-]; depths of the water that were read again do not.
 APART = 1.5
 
@@ -137,8 +140,10 @@ def station_tables(
     if _in_verticals(taken):
         refuse_confounded_replicates(named, _heights(named), file)
         beside = tuple(f"{kind.words} beside points left out" for kind in kinds if not kind.velocity)
+        _refuse_zeros(taken, options, file, vertical_role(taken))
         lacking_points = _lacking(taken, ["u", str(vertical_role(taken))], np.all)
         return StationTables([_points(taken, stem, options)], (*on_axis, *without_place, *lacking_points, *beside))
+    _refuse_zeros(taken, options, file, None)
     _refuse_lost_heights(taken, _places(taken), file)
     refuse_confounded_replicates(named, _places(named), file)
     found = [_stations(taken, stem, options, kind, place) for kind in kinds]
@@ -299,6 +304,39 @@ def _refuse_lost_heights(taken: MeasuredRows, places: Sequence[Hashable], file: 
                     f"that differ in {heading!r}; name it in `columns` of this file in `files` of the site file, as "
                     "`z` (a level), `height` (above the bed) or `below` (the surface, beside `depth` of the water), "
                     "or take it out where they are repeats."
+                )
+
+
+def _refuse_zeros(taken: MeasuredRows, options: FileOptions, file: str, upward: str | None) -> None:
+    """InputError if a velocity is exactly 0 between neighbours of half the usual one or more: it was not measured.
+
+    Neighbours stand across in one section, or above one another if there is a role `upward`. Both components have to be
+    0. `missing`, which may be empty, decides: it holds 0 or not.
+    """
+    column = next((role for role in ("u", "speed") if role in taken.numbers), None)
+    if options.missing is not None or column is None:
+        return
+    u, order = taken.numbers[column], taken.numbers[upward or "y"]
+    zero = (u == 0.0) & (np.nan_to_num(taken.numbers.get("v", np.zeros(taken.size))) == 0.0)
+    moving = np.abs(u[np.isfinite(u) & ~zero])
+    if not zero.any() or not moving.size:
+        return
+    usual = OF_THE_USUAL * float(np.median(moving))
+    places = _places(taken)
+    groups: dict[object, list[int]] = {}
+    for row in np.flatnonzero(np.isfinite(u) & np.isfinite(order)).tolist():
+        groups.setdefault(places[row] if upward else places[row][:2], []).append(row)
+    for rows in groups.values():
+        ordered = sorted(rows, key=order.__getitem__)
+        flows = [place for place, row in enumerate(ordered) if not zero[row]]
+        for left, right in pairwise(flows):
+            between = ordered[left + 1 : right]
+            one, other = u[ordered[left]], u[ordered[right]]
+            if between and min(abs(one), abs(other)) >= usual:
+                where = f", row {taken.lines[min(between)]}" if taken.lines else ""
+                raise InputError(
+                    f"{file}{where}: expected a velocity, got 0 between {one:.3g} and {other:.3g} m/s; write `missing: "
+                    "[0]` of this file if it was not measured, `missing: []` if the water stood there."
                 )
 
 

@@ -34,9 +34,18 @@ BYTES_OF_CELL = 8  # bytes that a cell of a workbook takes at least, empty or no
 # Equal rows may be repeats that agree in the few digits of a table: four pairs in ten do where their scatter is 0.7 of
 # the last digit. Those of five places then all agree in one table of a hundred, of ten in a row in one of ten thousand.
 FEWEST_ROWS, FEWEST_IN_A_ROW = 5, 10
+MOST_ROWS_NAMED = 5  # rows that a note lists
+HIDDEN_ROW = re.compile(rb"<row\b[^>]*>")  # in the XML of a sheet
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?")
 # Thousands apart by one sign, decimals by another, which is thereby known: 1.236,00 and 1,236.00 and 1 236,00.
 GROUPED = re.compile(r"[-+]?\d{1,3}(?P<apart>[.,'’\s])\d{3}((?P=apart)\d{3})*(?!(?P=apart))(?P<decimal>[.,])\d*")
+# Rows of a summary among measurements: what their only words are.
+SUMMARY = re.compile(
+    r"(?:grand |sub ?)?(?:mean|average|avg|total|sum|mittel|mittelwert|summe|gesamt|moyenne|moy|somme|media|promedio"
+    r"|suma|gemiddelde?|totaal|som|medie|totale|soma|median|min|max|minimum|maximum|std|stdev|st dev|sd|rms|count)"
+    r"(?: (?:of )?\S+)?[.:]?",
+    re.IGNORECASE,
+)
 # The minus of mathematics, hyphens and dashes that word processors write.
 DASHES = str.maketrans(dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d", "-"))
 MISSING_WORDS = (
@@ -153,7 +162,7 @@ def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
     """
     if path.suffix.lower() in WORKBOOKS:
         fields, form = _lines_of_sheet(path, sheet)
-        return _table(path, fields, form, "", False)
+        return _without_summaries(_table(path, fields, form, "", False))
     there = [(number, text) for number, text in enumerate(readable_text(path).splitlines(), 1) if text.strip(" \t;,")]
     lines = [(number, text) for number, text in there if not text.lstrip().startswith(COMMENTS)]
     comments = len(there) - len(lines)
@@ -162,7 +171,8 @@ def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
     comma = separator != "," and has_decimal_comma(field for _, row in fields for field in row)
     words = [SEPARATORS[separator], *(["decimal comma"] if comma else [])]
     words += [so_many(comments, "comment line")] if comments else []
-    return _table(path, fields, ", ".join(words), separator, comma)
+    quoted = all(text.lstrip().startswith('"') for _, text in lines)
+    return _without_summaries(_table(path, fields, ", ".join(words), separator, comma, quoted))
 
 
 def _separator(lines: Sequence[str]) -> str:
@@ -193,7 +203,14 @@ def _separator(lines: Sequence[str]) -> str:
 
 def _fields(line: str, separator: str) -> list[str]:
     if separator == " ":
-        return UNIT_BEHIND_NAME.sub(lambda found: found[1] if is_unit(found[1]) else found[0], line).split()
+        line = UNIT_BEHIND_NAME.sub(lambda found: found[1] if is_unit(found[1]) else found[0], line)
+        if '"' not in line:
+            return line.split()
+        return [
+            field
+            for field in next(csv.reader([line.replace("\t", " ")], delimiter=" ", skipinitialspace=True))
+            if field
+        ]
     return [field.strip() for field in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
 
 
@@ -202,8 +219,13 @@ def _without_empty_end(fields: list[str]) -> list[str]:
     return fields[: next((place for place in range(len(fields), 1, -1) if fields[place - 1]), 1)]
 
 
-def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_comma: bool) -> ParsedTable:
-    """The longest stretch of rows of numbers, with the heading and the units above it."""
+def _table(
+    path: Path, whole: list[Line], form: str, separator: str, decimal_comma: bool, quoted: bool = False
+) -> ParsedTable:
+    """The longest stretch of rows of numbers, with the heading and the units above it.
+
+    quoted: whether all lines begin with a quotation mark, as names of rows in tables of R do.
+    """
     lines = [(number, _without_empty_end(fields)) for number, fields in whole]
     numeric = _rows_of_numbers(lines, separator)
     if not any(numeric):
@@ -221,6 +243,9 @@ def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_com
         form, head, of_units = f"{form}, a row of units", head - 1, True
     named = head >= 0 and len(lines[head][1]) >= min(width, 2) and not numeric[head]
     rows = [line for line in lines[first:] if len(line[1]) > 1]
+    if named and _has_row_names([fields for _, fields in rows], len(lines[head][1]), separator, quoted):
+        lines[head], whole[head] = ((number, ["", *fields]) for number, fields in (lines[head], whole[head]))
+        form = f"{form}, names of rows without a heading"
     room = len(whole[head][1]) if named else width
     for number, fields in rows if named else lines[begin:]:
         # A comma may be that of a number, wherever it stands; elsewhere words behind the last column are a remark.
@@ -250,6 +275,34 @@ def _table(path: Path, whole: list[Line], form: str, separator: str, decimal_com
         decimal_comma=decimal_comma,
         form=form,
     )
+
+
+def _has_row_names(rows: Sequence[Sequence[str]], headed: int, separator: str, quoted: bool) -> bool:
+    """Whether all rows have one field more than the heading, the first of which names the row: 1 to n, or words.
+
+    Between commas a field more may be a decimal comma: there the names stand in quotes.
+    """
+    names = [fields[0] for fields in rows]
+    if (
+        any(len(fields) != headed + 1 for fields in rows)
+        or len(set(names)) < len(names)
+        or (separator == "," and not quoted)
+    ):
+        return False
+    return names == [str(number) for number in range(1, len(names) + 1)] or not any(map(is_number, names))
+
+
+def _without_summaries(table: ParsedTable) -> ParsedTable:
+    """The table without rows of means, totals and the like, which one of their fields is called; not if all are."""
+    found = {
+        place
+        for place, fields in enumerate(table.rows)
+        if any(SUMMARY.fullmatch(field.strip()) for field in fields if not is_number(field))
+    }
+    if not found or len(found) == len(table.rows):
+        return table
+    rows = listed([str(table.row_numbers[place]) for place in sorted(found)[:MOST_ROWS_NAMED]])
+    return table.without(found, f"{so_many(len(found), 'row')} of means or totals left out (row {rows})")
 
 
 def _rows_of_numbers(lines: Sequence[Line], separator: str) -> list[bool]:
@@ -304,16 +357,39 @@ def _lines_of_sheet(path: Path, name: str | None) -> tuple[list[Line], str]:
         with closing(book):
             if name is not None and name not in book.sheetnames:
                 raise InputError(f"{shown_path(path)}: expected the sheet {name!r}, got {', '.join(book.sheetnames)}.")
-            chosen = book[name] if name is not None else book.worksheets[0]
-            others = [sheet.title for sheet in book.worksheets if sheet.title != chosen.title]
+            shown = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"] or book.worksheets
+            chosen = book[name] if name is not None else shown[0]
+            others = [sheet.title for sheet in shown if sheet.title != chosen.title]
+            hidden = _hidden_rows(packed, chosen)
             only = f" (only sheet {chosen.title}; measurements of {listed(others)} need a file of their own)"
-            lines, size = [], 0
+            lines, size, skipped = [], 0, []
             for number, row in enumerate(chosen.iter_rows(values_only=True), 1):
-                if any(cell is not None for cell in row):
+                if number in hidden and any(cell is not None for cell in row):
+                    skipped.append(str(number))
+                elif any(cell is not None for cell in row):
                     size += BYTES_OF_CELL * len(row)  # few bytes may have a last column 16,384 cells to the right
                     refuse_larger(path, size)
                     lines.append((number, ["" if cell is None else _text_of_cell(cell) for cell in row]))
-            return lines, "workbook" + (only if others and name is None else "")
+            form = "workbook" + (only if others and name is None else "")
+            if skipped:
+                more = [f"{len(skipped) - MOST_ROWS_NAMED} more"] if len(skipped) > MOST_ROWS_NAMED else []
+                rows = listed([*skipped[:MOST_ROWS_NAMED], *more])
+                form += f", {so_many(len(skipped), 'hidden row')} left out (row {rows})"
+            return lines, form
+
+
+def _hidden_rows(packed: ZipFile, sheet: object) -> set[int]:
+    """Numbers of the rows that a sheet hides, by a filter or by hand: what its author took out."""
+    part = str(getattr(sheet, "_worksheet_path", "")).lstrip("/")
+    if part not in packed.namelist():
+        return set()
+    hidden, number = set(), 0
+    for found in HIDDEN_ROW.finditer(packed.read(part)):
+        attributes = dict(re.findall(rb'(\w+)="([^"]*)"', found[0]))
+        number = int(attributes.get(b"r", number + 1))
+        if attributes.get(b"hidden") in (b"1", b"true"):
+            hidden.add(number)
+    return hidden
 
 
 def _text_of_cell(cell: object) -> str:

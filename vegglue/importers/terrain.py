@@ -1,5 +1,6 @@
 """Grid, bed and friction of a surveyed site: GeoTIFF and ESRI ASCII grids, scattered points, and cross-sections."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, Regul
 from scipy.spatial import QhullError
 
 from vegglue.arrays import Array, Mask
+from vegglue.case.frame import Frame
 from vegglue.case.grid import Grid, centres
 from vegglue.case.resolved_config import Tree
 from vegglue.case.size_limits import MOST_CELLS
@@ -17,27 +19,35 @@ from vegglue.case.terrain import Raster, read_raster
 from vegglue.case.text_files import case_name
 from vegglue.case.zones import beyond_slope_break, slope
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import role_of, words_of
+from vegglue.importers.column_names import UNITS, role_of, unit_named, words_of
 from vegglue.importers.config_parts import MANNING_BED, even
+from vegglue.importers.coordinate_systems import StatedSystem, refuse_other_system, system_of_wkt
 from vegglue.importers.file_options import FileOptions, read_file_options
-from vegglue.importers.library_files import importing, read_by_library, refuse_larger
+from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_larger
 from vegglue.importers.measured_files import data_folder, record
 from vegglue.importers.measured_rows import Placement, in_the_channel, read_rows
 from vegglue.importers.site_file import FieldSite, FileOfSite, SiteGrid
 from vegglue.importers.stations import ONE_PLACE
 from vegglue.importers.table_parser import parse_table
 from vegglue.importers.vector_files import note_on_units, read_polygons
-from vegglue.wording.numbers import in_digits
+from vegglue.wording.numbers import in_digits, listed, so_many
 
 # Endings of files of levels on a grid.
 RASTERS = (".tif", ".tiff", ".asc", ".grd")
 # How a geometry of HEC-RAS begins (.g01 and on), of which no reader is kept here.
 GEOMETRY_OF_RAS = b"Geom Title="
 # Tags of a GeoTIFF: size of a pixel, a point of it and its place on the map, keys, and, of GDAL, what marks no data.
-PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA = 33550, 33922, 34735, 42113
+PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA, GDAL_METADATA = 33550, 33922, 34735, 42113, 42112
 # Among the keys, in fours from the fifth number on: the one of the type of raster, and its value if a place on the map
-# is that of the middle of a pixel, not of its corner.
+# is that of the middle of a pixel, not of its corner; of the kind of system, and its value for degrees; of the
+# system, of the units of its coordinates and of levels, and metres in these (GeoTIFF 1.1: 9002 foot, 9003 US survey).
 TYPE_OF_RASTER, OF_POINTS = 1025, 2
+KIND_OF_SYSTEM, OF_DEGREES, PROJECTED_SYSTEM, LENGTH_UNITS, VERTICAL_UNITS = 1024, 2, 3072, 3076, 4099
+FEET = {9002: 0.3048, 9003: 1200.0 / 3937.0}
+USER_DEFINED = 32767
+# No river lies below the Dead Sea or above mountains [m]; a mark of no value lies so far from all levels [m].
+LOWEST, HIGHEST, APART_FROM_LEVELS = -450.0, 9000.0, 20.0
+FILL_VALUES = (0.0, -1.0, 255.0, -99.0, -999.0, 99.0, 999.0, -100.0, -9.0, 9.0)
 SEPARATE = 2  # of a TIFF whose bands lie one behind the other, not pixel by pixel
 # Levels of a raster that are sought along a centreline to know how far it reaches, for a message.
 MOST_FOR_EXTENT = 5000
@@ -51,18 +61,20 @@ SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0
 NO_LEVEL = -9999
 MOST_LEVELS = 10 * MOST_CELLS  # of some eight bytes each; a case reads no larger file
 BANK = "bank"
+TAKEN_NAMES = ("n_b", "n_w")  # parameters of the bed and of walls
 BANK_CLASS = {"law": "keulegan", "k_s": "k_s"}
 
 
 @dataclass(frozen=True)
 class Ground:
     """tree: keys grid, bed and friction of a case; imported: what was taken from which file; texts: of files to be
-    written beside the config, by their paths.
+    written beside the config, by their paths; level: of the bed, from x and y (n,) to z (n,) in the channel [m].
     """
 
     tree: Tree
     imported: list[Tree]
     texts: Mapping[Path, str]
+    level: Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True)
@@ -94,19 +106,7 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
     taken = f"bed: {terrain.taken}"
     if beyond > 0.0:
         taken += f"; {100.0 * beyond:.0f} % of the grid lies beyond it, with the nearest level"
-    friction: Tree = {"classes": {"bed": MANNING_BED}, "default": "bed"}
-    imported: list[Tree] = []
-    if site.classes is not None:  # classes share one coefficient until the user parts them
-        classes = _file_of(folder, site.classes, "classes")
-        polygons = read_polygons(classes, place.frame)
-        zones = []
-        for polygon in polygons:
-            name = case_name(polygon.friction_class or polygon.name)
-            friction["classes"].setdefault(name, MANNING_BED)
-            zones.append({"class": name, "polygon": [list(corner) for corner in polygon.corners]})
-        note = "; ".join([f"friction classes: {len(zones)} polygons", *note_on_units(polygons)])
-        friction = friction | {"zones": zones}
-        imported.append(record(classes, None, note))
+    friction, imported = mapped_classes(folder, site, place)
     steeper = slope_of_banks(site)
     if steeper is not None and site.channel is not None and BANK not in friction["classes"]:
         (west, east), (south, north), (dx, dy) = grid["x"], grid["y"], grid["cell"]
@@ -125,7 +125,25 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
         else:
             taken += f"; no bank, as it is nowhere steeper than {steeper:g}, half the stated slope of the banks"
     tree = {"grid": grid, "bed": [{kind: f"{data_folder(target).name}/{file}"}], "friction": friction}
-    return Ground(tree, [record(path, None, taken), *imported], {data_folder(target) / file: text})
+    return Ground(tree, [record(path, None, taken), *imported], {data_folder(target) / file: text}, terrain.level)
+
+
+def mapped_classes(folder: Path, site: FieldSite, place: Placement) -> tuple[Tree, list[Tree]]:
+    """One class of bed, and those of a file of polygons, each with a coefficient of its own; and what was taken."""
+    friction: Tree = {"classes": {"bed": MANNING_BED}, "default": "bed"}
+    if site.classes is None:
+        return friction, []
+    path = _file_of(folder, site.classes, "classes")
+    polygons = read_polygons(path, place.frame)
+    zones = []
+    for polygon in polygons:
+        name = case_name(polygon.friction_class or polygon.name)
+        coefficient = f"n_{re.sub('[^a-z0-9]', '_', name)}"
+        own = {"law": "manning", "n": f"{coefficient}_class" if coefficient in TAKEN_NAMES else coefficient}
+        friction["classes"].setdefault(name, own)
+        zones.append({"class": name, "polygon": [list(corner) for corner in polygon.corners]})
+    note = "; ".join([f"friction classes: {so_many(len(zones), 'polygon')}", *note_on_units(polygons)])
+    return friction | {"zones": zones}, [record(path, None, note)]
 
 
 def slope_of_banks(site: FieldSite) -> float | None:
@@ -222,7 +240,8 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
     """The bed in a file. sections: whether its points stand in cross-sections. InputError."""
     ending = path.suffix.lower()
     if ending in RASTERS:
-        raster = read_geotiff(path) if ending in (".tif", ".tiff") else read_raster(path)
+        raster = read_geotiff(path, place.frame) if ending in (".tif", ".tiff") else _read_grid(path, place.frame)
+        raster, filled_up = _without_fill(raster)
         reader = RegularGridInterpolator((raster.x, raster.y), raster.values, bounds_error=False, fill_value=np.nan)
         known = np.argwhere(~np.isnan(raster.values))
         shown = known if place.line is None else known[:: max(len(known) // MOST_FOR_EXTENT, 1)]
@@ -230,7 +249,7 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         return Terrain(
             lambda x, y: np.asarray(reader(np.column_stack(place.to_map(x, y)))),
             _extent(along, across),
-            f"grid of {len(known):,} levels, {raster.size:g} m apart",
+            f"grid of {len(known):,} levels, {raster.size:g} m apart{filled_up}",
         )
     with path.open("rb") as file:
         of_ras = file.read(len(GEOMETRY_OF_RAS)) == GEOMETRY_OF_RAS
@@ -255,14 +274,46 @@ def _extent(x: Array, y: Array) -> tuple[float, float, float, float]:
     return float(x.min()), float(x.max()), float(y.min()), float(y.max())
 
 
-def read_geotiff(path: Path) -> Raster:
-    """The first band of a GeoTIFF whose rows run along the map. InputError for another or a turned one."""
+def _read_grid(path: Path, frame: Frame | None) -> Raster:
+    """An ESRI ASCII grid, and the system in the .prj beside it. InputError."""
+    if (system := path.with_suffix(".prj")).is_file():
+        refuse_other_system(path, system_of_wkt(readable_text(system)), frame)
+    return read_raster(path)
+
+
+def _without_fill(raster: Raster) -> tuple[Raster, str]:
+    """The raster without levels that are none, declared or not, and a note on them.
+
+    Beyond LOWEST and HIGHEST lies no river; a usual mark of no value is one if it lies further from all other levels
+    than APART_FROM_LEVELS and than ten times what they span.
+    """
+    values = raster.values
+    wrong = np.isfinite(values) & ~((values >= LOWEST) & (values <= HIGHEST)) | np.isinf(values)
+    for mark in FILL_VALUES:
+        rest = values[np.isfinite(values) & ~wrong & (values != mark)]
+        if rest.size and (values == mark).any():
+            apart = max(float(rest.min()) - mark, mark - float(rest.max()))
+            if apart > max(APART_FROM_LEVELS, 10.0 * float(np.ptp(rest))):
+                wrong |= values == mark
+    if not wrong.any():
+        return raster, ""
+    marks = listed([f"{value:g}" for value in np.unique(values[wrong])[:3]])
+    note = f", {so_many(int(wrong.sum()), 'undeclared fill value')} left out ({marks})"
+    return replace(raster, values=np.where(wrong, np.nan, values)), note
+
+
+def read_geotiff(path: Path, frame: Frame | None = None) -> Raster:
+    """The first band of a GeoTIFF whose rows run along the map, in m, with the scale and offset that GDAL keeps.
+
+    InputError for another or a turned one, and for one in another system than the frame.
+    """
     with importing("tifffile", path, "GeoTIFFs", "field", "save it as an ESRI ASCII grid"):
         import tifffile
     with read_by_library(path, "a GeoTIFF", "tifffile"), tifffile.TiffFile(path) as file:
+        _teach_lzw(tifffile.tifffile.imagecodecs)
         page = file.pages.first
         refuse_larger(path, page.nbytes)  # before they are unpacked
-        known = (PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA)
+        known = (PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA, GDAL_METADATA)
         tags = {code: page.tags[code].value for code in known if code in page.tags}
         if PIXEL_SCALE not in tags or TIE_POINT not in tags or not 0.0 < tags[PIXEL_SCALE][0] == tags[PIXEL_SCALE][1]:
             raise InputError(
@@ -279,16 +330,75 @@ def read_geotiff(path: Path) -> Raster:
                 with np.errstate(over="ignore"):  # the largest of float64 is a usual mark, too
                     mark = np.float64(mark.astype(values.dtype))
             levels = np.where(levels == mark, np.nan, levels)
+        directory = tags.get(KEYS, ())
+        keys = dict(zip(directory[4::4], directory[7::4], strict=False))
+        _refuse_system_of_keys(path, keys, frame)
+        band = dict(
+            re.findall(r'<Item[^>]*sample="0"[^>]*role="(\w+)"[^>]*>([^<]*)<', str(tags.get(GDAL_METADATA, "")))
+        )
+        if {"scale", "offset"} & band.keys():
+            levels = levels * float(band.get("scale", 1.0)) + float(band.get("offset", 0.0))
+        unit = unit_named(band.get("unittype", ""), "length")
+        levels = levels * (UNITS["length"][unit] if unit else FEET.get(keys.get(VERTICAL_UNITS, 0), 1.0))
         size = tags[PIXEL_SCALE][0]
         column, row, _, east, north, _ = tags[TIE_POINT][:6]
-        keys = tags.get(KEYS, ())
-        of_points = (TYPE_OF_RASTER, OF_POINTS) in zip(keys[4::4], keys[7::4], strict=False)
-        middle = 0.0 if of_points else 0.5
+        middle = 0.0 if keys.get(TYPE_OF_RASTER) == OF_POINTS else 0.5
         x = np.array(east + (np.arange(levels.shape[1]) + middle - column) * size)
         y = np.array(north - (np.arange(levels.shape[0]) + middle - row) * size)
         if not (np.diff(x) > 0.0).all() or not (np.diff(y) < 0.0).all():
             raise ValueError(f"pixels of {size:g} m at {east:g}, {north:g} m have no places of their own")
         return Raster(x, y[::-1].copy(), size, levels[::-1].T)
+
+
+def _refuse_system_of_keys(path: Path, keys: Mapping[int, int], frame: Frame | None) -> None:
+    number = keys.get(PROJECTED_SYSTEM, 0)
+    metres = FEET.get(keys.get(LENGTH_UNITS, 0), 1.0) if keys.get(KIND_OF_SYSTEM) != OF_DEGREES else 0.0
+    refuse_other_system(path, StatedSystem(0 if number == USER_DEFINED else number, "its GeoTIFF keys", metres), frame)
+
+
+def _teach_lzw(codecs: Any) -> None:
+    """Give tifffile decoders of LZW and of predicted floating-point numbers if it has none, as without imagecodecs."""
+    if not hasattr(codecs, "lzw_decode"):
+        codecs.lzw_decode = lzw_decode
+    if not hasattr(codecs, "floatpred_decode"):
+        codecs.floatpred_decode = floatpred_decode
+
+
+def lzw_decode(data: bytes, out: object = None) -> bytes:
+    """Bytes packed by the LZW of TIFF 6.0 (section 13): codes of 9 to 12 bits, the highest first; 256 clears the table,
+    257 ends. One code earlier than in other LZW the codes become longer.
+    """
+    table: list[bytes] = []
+    found: list[bytes] = []
+    before, width, bits, held = b"", 9, 0, 0
+    for byte in data:
+        held, bits = held << 8 | byte, bits + 8
+        if bits < width:
+            continue
+        bits -= width
+        code, held = held >> bits, held & ((1 << bits) - 1)
+        if code == 257:
+            break
+        if code == 256:
+            table, width, before = [*(bytes([one]) for one in range(256)), b"", b""], 9, b""
+            continue
+        entry = table[code] if code < len(table) else before + before[:1]
+        if before:
+            table.append(before + entry[:1])
+        found.append(entry)
+        before = entry
+        width = min(max((len(table) + 1).bit_length(), 9), 12)
+    return b"".join(found)
+
+
+def floatpred_decode(data: Any, axis: int = -2, dist: int = 1, out: object = None) -> Any:
+    """Rows of floating-point numbers whose bytes are apart, the highest first, and differences (Adobe, TIFF note 3)."""
+    rows = np.moveaxis(np.asarray(data), axis, -1)
+    size, width = rows.dtype.itemsize, rows.shape[-1]
+    packed = np.ascontiguousarray(rows).view(np.uint8).reshape(-1, width * size)
+    planes = np.cumsum(packed, axis=1, dtype=np.uint8).reshape(-1, size, width)
+    levels = np.ascontiguousarray(np.moveaxis(planes, 1, -1)).view(f">f{size}").astype(rows.dtype)
+    return np.moveaxis(levels.reshape(rows.shape), -1, axis)
 
 
 def _points(path: Path, place: Placement, options: FileOptions) -> tuple[Array, list[str], str]:
@@ -299,6 +409,8 @@ def _points(path: Path, place: Placement, options: FileOptions) -> tuple[Array, 
     bare = {"x": "1", "y": "2", "z": "3"}
     unnamed = not options.columns and parse_table(path, options.sheet).headings == tuple(bare.values())
     taken = read_rows(path, replace(options, columns=bare) if unnamed else options)
+    if "z" not in taken.numbers and "z_bed" in taken.numbers:
+        taken = taken.renamed("z_bed", "z")
     if not {"x", "y", "z"} <= taken.numbers.keys():
         headings = taken.headings
         roles = {known[0] for heading in headings if (known := role_of(heading)) is not None}

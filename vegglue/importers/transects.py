@@ -1,7 +1,7 @@
 """A boat's transect as stations: profiles averaged over the depth, and along the section."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +16,15 @@ PROFILE_POWER = 1.0 / 6.0
 # Stations along a section, and the fewest ensembles whose scatter shows how well a station is known.
 STATIONS, FEWEST_ENSEMBLES = 15, 4
 LEAST_ERROR_OF_MEAN = 0.005  # m/s; the boat's own velocity is known no better
+# Neither water nor a boat is faster [m/s], nor a river deeper [m]: what is larger marks no value. A boat that leaps
+# further between two ensembles [m], and so many times further than it usually does, was lost in between. Chosen.
+FASTEST, DEEPEST_RIVER, LEAP, TIMES_USUAL = 7.0, 200.0, 10.0, 20.0
 
 
 @dataclass(frozen=True)
 class BoatProfile:
-    """One profile: east and north of the start of the transect [m], depth [m], heights of the cells above the bed
-    (cells,) [m] and their velocities to the east and north (cells, 2) [m/s].
+    """One profile: east and north of the start of the transect [m], NaN for unknown, depth [m], heights of the cells
+    above the bed (cells,) [m] and their velocities to the east and north (cells, 2) [m/s].
     """
 
     place: tuple[float, float]
@@ -40,19 +43,46 @@ def stations_of_transect(path: Path, options: FileOptions, profiles: Sequence[Bo
             f"{shown_path(path)}: expected where the boat started, `start: [x, y]`, as the file counts from there; "
             "add it to this file in `files`."
         )
-    used = [one for one in profiles if one.depth > 0.0 and one.height.size]
+    placed = [one for one in profiles if np.isfinite(one.place).all()]
+    used = []
+    for one in placed:
+        good = (np.abs(one.velocity) <= FASTEST).all(axis=1) & (one.height > 0.0)
+        if 0.0 < one.depth <= DEEPEST_RIVER and good.any():
+            used.append(replace(one, height=one.height[good], velocity=one.velocity[good]))
     if len(used) < FEWEST_ENSEMBLES:
-        raise InputError(f"{shown_path(path)}: expected ensembles with velocities, got {len(used)}; export it anew.")
+        lost = len(profiles) - len(placed)
+        raise InputError(
+            f"{shown_path(path)}: expected {FEWEST_ENSEMBLES} ensembles or more with a place and velocities, got "
+            f"{len(used)} ({lost} of {len(profiles)} have no place); export it anew."
+        )
     places = np.array([one.place for one in used]) + np.array(options.start)
     velocities = np.array([depth_mean(one) for one in used])
     x, y, mean, error = _along_the_section(places, velocities)
     numbers = {"x": x, "y": y, "east_velocity": mean[:, 0], "north_velocity": mean[:, 1]}
     numbers |= {"u_se": error[:, 0], "v_se": error[:, 1]}
-    dropped = len(profiles) - len(used)
-    note = f"{form}, {len(used)} ensembles" + (f", {dropped} without velocities left out" if dropped else "")
+    note = f"{form}, {len(used)} ensembles"
+    for dropped, what in ((len(placed) - len(used), "velocities"), (len(profiles) - len(placed), "a place")):
+        note += f", {dropped} without {what} left out" if dropped else ""
     columns = {"x": "distance east", "y": "distance north", "east_velocity": "east", "north_velocity": "north"}
     units = dict.fromkeys(columns, "m") | {"east_velocity": "m/s", "north_velocity": "m/s"}
     return MeasuredRows(numbers, {}, columns, units, (note,))
+
+
+def refuse_leaps(path: Path, profiles: Sequence[BoatProfile]) -> None:
+    """InputError if a boat leaps between two ensembles of one transect."""
+    places = np.array([one.place for one in profiles]).reshape(-1, 2)
+    known = np.flatnonzero(np.isfinite(places).all(axis=1))
+    if known.size < FEWEST_ENSEMBLES:
+        return
+    steps = np.linalg.norm(np.diff(places[known], axis=0), axis=1)
+    allowed = LEAP + TIMES_USUAL * float(np.median(steps)) * np.diff(known)
+    if (steps > allowed).any():
+        worst = int(np.argmax(steps - allowed))
+        raise InputError(
+            f"{shown_path(path)}: expected a boat that moves on by up to {allowed[worst]:.3g} m, got a leap of "
+            f"{steps[worst]:.3g} m from ensemble {known[worst] + 1} to {known[worst + 1] + 1}; leave out what the "
+            "instrument lost, and export it anew."
+        )
 
 
 def depth_mean(ensemble: BoatProfile) -> tuple[float, float]:

@@ -1,5 +1,7 @@
 """Polygons of patches and friction classes, and the line of a bend: GeoJSON, shapefiles, and tables of corners."""
 
+import codecs
+import glob
 import json
 import math
 import re
@@ -12,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from vegglue.arrays import Array
 from vegglue.case.centreline import Centreline, centreline_of
 from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
@@ -19,6 +22,7 @@ from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import UNITS, names_without_unit, role_of, words_of
 from vegglue.importers.column_roles import columns_of_table, taken_as_si
+from vegglue.importers.coordinate_systems import StatedSystem, epsg_number, refuse_other_system, system_of_wkt
 from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.library_files import importing, read_by_library, readable_text
 from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, read_rows, rows_of_table
@@ -42,6 +46,7 @@ LIKE_DENSITY = re.compile(r"dens|dicht|stem|steng|stang|halm|tige|tallo|shoot|(?
 NO_DENSITY = re.compile(r"diam|thick|height|hoog|hohe|haut|length|lengt|area|mass|(?:^| )(?:mm|cm|m)$")
 CLASSES = ("class", "friction class", "friction", "roughness", "type", "landuse")
 NAMES = ("name", "id", "patch", "fid")
+MOST_CORNERS = 20_000  # of a polygon whose sides are compared with one another
 MOST_STEMS = 1e7  # 1/m2, as in the site file
 FEWEST_CORNERS = 3
 # Points of a line that a case can hold; a curve through a few dozen has less of what they jitter.
@@ -89,7 +94,7 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
     if path.suffix.lower() in TABLES:
         features, unitless = _polygons_of_table(path, columns)
     elif path.suffix.lower() == ".shp":
-        with shapes_and_records(path, "POLYGON") as found:
+        with shapes_and_records(path, "POLYGON", frame) as found:
             features = [
                 (ring, one.record.as_dict()) for one in found for ring in _outlines(one.shape.__geo_interface__)
             ]
@@ -98,6 +103,8 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
     _refuse_degrees(path, frame, [ring for ring, _ in features])
+    for number, (ring, _) in enumerate(features, 1):
+        refuse_crossing(f"{shown_path(path)}: polygon {number}", ring)
     named = _columns_named(
         path, columns, list(dict.fromkeys(str(key) for _, properties in features for key in properties))
     )
@@ -297,13 +304,8 @@ def geojson_features(path: Path, what: str, frame: Frame | None = None) -> Itera
     """
     try:
         tree = json.loads(readable_text(path))
-        given = _epsg_number(json.dumps(tree.get("crs")))
-        own = _epsg_number(frame.crs or "" if frame is not None else "")
-        if given and own and given != own:
-            raise InputError(
-                f"{shown_path(path)}: expected coordinates in EPSG:{own}, the `crs` of `frame`, got EPSG:{given}; save "
-                "it in that system, or take its `crs` out where both are the same."
-            )
+        number = epsg_number(json.dumps(tree.get("crs")))
+        refuse_other_system(path, StatedSystem(number, ""), frame)
         yield tree["features"] if tree["type"] == "FeatureCollection" else [tree]
     except InputError:  # a ValueError, too
         raise
@@ -313,19 +315,64 @@ def geojson_features(path: Path, what: str, frame: Frame | None = None) -> Itera
         ) from None
 
 
-def _epsg_number(crs: str) -> str:
-    """`28992` of `EPSG:28992` and `urn:ogc:def:crs:EPSG::28992`; '' if there is none."""
-    found = re.search(r"EPSG:(?:[\d.]*:)?(\d+)", crs, re.IGNORECASE)
-    return found[1] if found else ""
-
-
 @contextmanager
-def shapes_and_records(path: Path, kind: str) -> Iterator[list[Any]]:
-    """Those of a shapefile whose type begins with a kind, such as POLYGON. InputError if it is none."""
+def shapes_and_records(path: Path, kind: str, frame: Frame | None) -> Iterator[list[Any]]:
+    """Those of a shapefile whose type begins with a kind, such as POLYGON.
+
+    Its .cpg names the encoding of its texts; without it they are UTF-8, or what Windows in the west writes. InputError
+    if it is none, or its .prj states another system than the frame.
+    """
+    beside = {one.suffix.lower(): one for one in path.parent.glob(f"{glob.escape(path.stem)}.*")}
+    if ".prj" in beside:
+        refuse_other_system(path, system_of_wkt(readable_text(beside[".prj"])), frame)
     with importing("pyshp", path, "shapefiles", "field", "save it as GeoJSON"):
         import shapefile
-    with read_by_library(path, "a shapefile"), shapefile.Reader(str(path)) as reader:
-        yield [one for one in reader.shapeRecords() if one.shape.shapeTypeName.startswith(kind)]
+    stated = readable_text(beside[".cpg"]).strip() if ".cpg" in beside else ""
+    encoding = stated if stated and _is_encoding(stated) else "utf-8"
+    with read_by_library(path, "a shapefile"):
+        try:
+            with shapefile.Reader(str(path), encoding=encoding) as reader:
+                found = list(reader.shapeRecords())
+        except UnicodeDecodeError:
+            with shapefile.Reader(str(path), encoding="cp1252", encodingErrors="replace") as reader:
+                found = list(reader.shapeRecords())
+        yield [one for one in found if one.shape.shapeTypeName.startswith(kind)]
+
+
+def _is_encoding(name: str) -> bool:
+    try:
+        codecs.lookup(name)
+    except (LookupError, ValueError):
+        return False
+    return True
+
+
+def refuse_crossing(where: str, ring: Sequence[tuple[float, float]]) -> None:
+    """InputError if the outline of a polygon crosses itself, like a bow tie: half of its area would be lost.
+
+    Sides a b and c d cross if c and d lie on different sides of a b, and a and b on different sides of c d; the lines
+    there and back to holes touch others at their ends only. where: how the message begins.
+    """
+    a = np.asarray(ring, dtype=np.float64)
+    if len(a) < 4 or len(a) > MOST_CORNERS:
+        return
+    a = a - a[0]  # products of map coordinates would lose the last digits
+    b = np.roll(a, -1, axis=0)
+
+    def side(p: Array, q: Array, r: Array) -> Array:
+        (x, y), (u, v) = (q - p).T, (r - p).T
+        return np.sign(x * v - y * u)
+
+    for i in range(len(a) - 2):
+        c, d = a[i + 2 :], b[i + 2 :]
+        p, q = np.broadcast_to(a[i], c.shape), np.broadcast_to(b[i], c.shape)
+        crosses = (side(p, q, c) * side(p, q, d) < 0.0) & (side(c, d, p) * side(c, d, q) < 0.0)
+        if crosses.any():
+            corner = ring[i]
+            raise InputError(
+                f"{where}: expected an outline that does not cross itself, got one that does between its corners "
+                f"{i + 1} and {i + 2} (at {corner[0]:.10g}, {corner[1]:.10g}); put them in their order around it."
+            )
 
 
 def _rounded(x: float, y: float) -> tuple[float, float]:
@@ -440,7 +487,7 @@ def _points_of_line(path: Path, taken: MeasuredRows) -> list[tuple[float, float]
 def read_line(path: Path, frame: Frame | None = None) -> MeasuredRows:
     """The one line in a file of a map program."""
     if path.suffix.lower() == ".shp":
-        with shapes_and_records(path, "POLYLINE") as records:
+        with shapes_and_records(path, "POLYLINE", frame) as records:
             shapes = [one.shape for one in records]
             ends = [list(zip(one.parts, [*one.parts[1:], len(one.points)], strict=True)) for one in shapes]
             found = [one.points[a:b] for one, parts in zip(shapes, ends, strict=True) for a, b in parts]
