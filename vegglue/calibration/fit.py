@@ -82,6 +82,10 @@ def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS, enoug
     ----------
     More (1978), doi:10.1007/BFb0067700.
     """
+
+    def lower_there(z: Array, limit: float, prediction: Array) -> bool:
+        return squared_misfit(noise, prediction) + float(z @ z) < limit
+
     point, longest = start, LONGEST_FIT_STEP
     for _ in range(steps):
         slope, residual = noise.whiten(noise.used(point.slope)), noise.whiten(noise.residual(point.prediction))
@@ -95,16 +99,11 @@ def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS, enoug
             step = _bent(model, noise, point, damped, step)
         there = point.z + step
         # The slopes of a step that is taken back are never computed: they are half of its work.
-        moved = linearise(model, there, point, partial(_is_below, before, noise, there))
+        moved = linearise(model, there, point, partial(lower_there, there, before))
         length = float(np.abs(step).max())
         longest = length / 4.0 if moved is None else min(max(longest, 2.0 * length), LONGEST_FIT_STEP)
         point = moved or point
     return at_point(noise, point)
-
-
-def _is_below(limit: float, noise: Noise, z: Array, prediction: Array) -> bool:
-    """Whether the objective of predictions (n,) at z is below a limit."""
-    return squared_misfit(noise, prediction) + float(z @ z) < limit
 
 
 def _step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Array, Array, float]:

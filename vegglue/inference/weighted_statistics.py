@@ -19,28 +19,50 @@ TRUSTED_K_HAT = 0.7
 def weighted_quantile(values: Array, weights: Array, levels: ArrayLike) -> Array:
     """q(p) interpolates the sorted values at p_k = (w_1 + ... + w_k - w_k/2) / sum w.
 
-    values: (member, ...); weights: (member,); returns (level, ...) in the unit of the values. Members of weight zero do
-    not count; where a value of any other member is NaN, so is the quantile.
+    Parameters
+    ----------
+    values : array (member, ...)
+        In any unit.
+    weights : array (member,)
+        Members of weight zero do not count [-].
+    levels : array-like
+        p [-].
+
+    Returns
+    -------
+    array (level, ...)
+        In the unit of the values; NaN if that of any weighted member is.
     """
     values, weights = values[weights > 0], weights[weights > 0]
-    columns = values.reshape(len(weights), -1)
-    quantiles = [_column_quantile(column, weights, np.atleast_1d(levels)) for column in columns.T]
+    columns, wanted = values.reshape(len(weights), -1), np.asarray(np.atleast_1d(levels), float)
+    quantiles = []
+    for column in columns.T:
+        order = np.argsort(column)
+        share = weights[order] / weights.sum()
+        known = not np.isnan(column).any()
+        found = np.interp(wanted, np.cumsum(share) - 0.5 * share, column[order]) if known else wanted * np.nan
+        quantiles.append(found)
     return np.reshape(np.transpose(quantiles), (np.size(levels), *values.shape[1:]))
-
-
-def _column_quantile(values: Array, weights: Array, levels: ArrayLike) -> Array:
-    if np.isnan(values).any():
-        return np.full(np.size(levels), np.nan)
-    order = np.argsort(values)
-    share = weights[order] / weights.sum()
-    return np.interp(np.asarray(levels, float), np.cumsum(share) - 0.5 * share, values[order])
 
 
 def mixture_quantile(centres: Array, weights: Array, sd: Array, levels: ArrayLike) -> Array:
     """q(p) with sum_k w_k Phi((q - c_k) / s) = p: quantiles of the members' predictions c_k plus a normal error.
 
-    centres: (member, station); weights: (member,); sd: (station,) > 0; returns (level, station) in the unit of centres.
-    Where a centre or sd is NaN the quantile is NaN.
+    Parameters
+    ----------
+    centres : array (member, station)
+        c [m/s or m].
+    weights : array (member,)
+        w [-].
+    sd : array (station,)
+        s > 0 [m/s or m].
+    levels : array-like
+        p [-].
+
+    Returns
+    -------
+    array (level, station)
+        By Newton's method within a bracket [m/s or m]; NaN if a centre or sd is.
     """
     kept = weights > 1e-12 * weights.max()  # the others together weigh less than rounding
     centres, share = centres[kept], weights[kept] / weights[kept].sum()
@@ -49,7 +71,9 @@ def mixture_quantile(centres: Array, weights: Array, sd: Array, levels: ArrayLik
     spread = np.sqrt(share @ (centres - share @ centres) ** 2 + sd**2)
     at = np.clip(share @ centres + spread * ndtri(np.clip(wanted, 1e-9, 1 - 1e-9)), low, high)
     for _ in range(QUANTILE_STEPS):
-        above, density = _mixture_above(at, wanted, centres, share, sd)
+        away = [(row - centres) / sd for row in at]
+        above = np.array([share @ ndtr(one) for one in away]) - wanted
+        density = np.array([share @ np.exp(-0.5 * one**2) for one in away]) / (np.sqrt(2 * np.pi) * sd)
         low, high = np.where(above < 0, at, low), np.where(above < 0, high, at)
         newton = at - above / np.maximum(density, 1e-300)
         following = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
@@ -58,14 +82,6 @@ def mixture_quantile(centres: Array, weights: Array, sd: Array, levels: ArrayLik
         if not still.any():
             break
     return at
-
-
-def _mixture_above(at: Array, wanted: Array, centres: Array, share: Array, sd: Array) -> tuple[Array, Array]:
-    """sum_k w_k Phi((q - c_k) / s) - p at q (level, station), and its derivative by q."""
-    away = [(row - centres) / sd for row in at]
-    distribution = np.array([share @ ndtr(one) for one in away])
-    density = np.array([share @ np.exp(-0.5 * one**2) for one in away]) / (np.sqrt(2 * np.pi) * sd)
-    return distribution - wanted, density
 
 
 def weighted_covariance(values: Array, weights: Array) -> Array:
@@ -81,21 +97,21 @@ def weighted_median(values: Array, weights: Array) -> float:
 
 
 def weighted_sd(values: Array, weights: Array) -> float:
-    """Square root of the weighted variance of values (member,), in their unit; NaN where a weighted one is infinite."""
+    """Square root of the weighted variance of values (member,), in their unit; NaN if a weighted one is infinite."""
     if not np.isfinite(values[weights > 0]).all():
         return float("nan")
     return float(np.sqrt(weighted_covariance(values[:, None], weights)[0, 0]))
 
 
 def correlation(covariance: Array) -> Array:
-    """r_ij = cov_ij / sqrt(cov_ii cov_jj) [-]; NaN where a quantity does not vary."""
+    """r_ij = cov_ij / sqrt(cov_ii cov_jj) [-]; NaN if a quantity does not vary."""
     sd = np.sqrt(np.diag(covariance))
     scale = np.outer(sd, sd)
     return np.divide(covariance, scale, out=np.full_like(covariance, np.nan), where=scale > 0)
 
 
 def effective_size(weights: Array) -> float:
-    """n = (sum w)^2 / sum w^2: equal members that the weights are worth [-]. Kish (1965), Survey Sampling."""
+    """n = (sum w)^2 / sum w^2: the effective sample size of weights [-]. Kish (1965), Survey Sampling."""
     return float(weights.sum() ** 2 / np.sum(weights**2))
 
 
@@ -113,8 +129,8 @@ def systematic_draws(weights: Array, count: int, random: np.random.Generator) ->
 def pareto_shape(weights: Array) -> float:
     """k-hat [-]: shape of the generalised Pareto distribution of the largest min(n/5, 3 sqrt(n)) weights.
 
-    Above TRUSTED_K_HAT the weighted means are not to be trusted, whatever the effective size says; NaN when fewer than
-    5 weights stand out. Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html; fit of Zhang and Stephens
+    Above TRUSTED_K_HAT the weighted means are not to be trusted, whatever the effective size is; NaN if fewer than 5
+    weights stand out. Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html; fit of Zhang and Stephens
     (2009), https://doi.org/10.1198/tech.2009.08017.
     """
     ordered = np.sort(weights / np.max(weights))
@@ -128,7 +144,7 @@ def pareto_smoothed(log_weights: Array) -> tuple[Array, float]:
     """Weights (m,) of sum 1, the largest replaced by quantiles of the Pareto distribution fitted to them; and k-hat.
 
     Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html. With fewer than 5 large weights nothing is replaced:
-    k-hat is then NaN, or infinite where the weights are worth fewer than 5 members.
+    k-hat is then NaN, or infinite if their effective number is below 5.
     """
     weights = np.exp(log_weights - np.max(log_weights))
     order = np.argsort(weights, kind="stable")
