@@ -52,7 +52,9 @@ def riversurveyor(places: list[float], depths: list[float], velocities: list[flo
     return "\n".join([*lines, "", "Comments; "])
 
 
-def winriver(east: np.ndarray, north: np.ndarray, depth, velocity, noise: float, seed: int = 3) -> str:
+def winriver(
+    east: np.ndarray, north: np.ndarray, depth, velocity, noise: float, seed: int = 3, reference: str = "BT"
+) -> str:
     """Classic ASCII output of WinRiver II: a boat at (east, north) of its start, a power law in cells of 0.1 m.
 
     depth, velocity: of the whole transect, or of each ensemble (n,), (n, 2).
@@ -69,7 +71,7 @@ def winriver(east: np.ndarray, north: np.ndarray, depth, velocity, noise: float,
             f"{np.hypot(x, y):.2f} {number * 1.0} {y:.3f} {x:.3f} {np.hypot(x, y):.3f}",
             "30000 30000 -32768 -32768 0",
             "1.0 0.2 0.1 0 0 0 0 0.3 1.2",
-            f"{cells.size} cm BT dB 0.43 0.139",
+            f"{cells.size} cm {reference} dB 0.43 0.139",
         ]
         for place in cells:
             shape = 7.0 / 6.0 * ((deep - place) / deep) ** (1.0 / 6.0)
@@ -99,20 +101,31 @@ def vectrino(mean: tuple[float, float, float], sd: float, samples: int, bad: int
 VECTRINO_HEADING = "[run.vno]\nNumber of measurements            1000\nSampling rate                         25 Hz\n"
 
 
-def pd0(east: np.ndarray, north: np.ndarray, depth: float, velocity: tuple[float, float], noise: float) -> bytes:
+def pd0(
+    east: np.ndarray,
+    north: np.ndarray,
+    depth: float,
+    velocity: tuple[float, float],
+    noise: float,
+    lost: tuple[int, ...] = (),
+    unranged: tuple[int, ...] = (),
+) -> bytes:
     """A raw transect as a Rio Grande writes it: the boat of `winriver`, one ensemble a second, 0.2 m deep in the water.
 
-    Header, fixed and variable leader, velocities against the boat, three blocks of quality, bottom track, check sum.
+    lost, unranged: ensembles, from 0, whose bottom track and whose ranges to the bottom are marked as lost. Each has
+    header, fixed and variable leader, velocities against the boat, three blocks of quality, bottom track, check sum.
     """
     random, cells, draft = np.random.default_rng(3), np.arange(30), 0.2
     boats = np.gradient(np.column_stack([east, north]), axis=0)
-    return b"".join(
-        _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise * random.standard_normal((cells.size, 2)))
-        for number, boat in enumerate(boats, 1)
-    )
+    ensembles = []
+    for number, boat in enumerate(boats):
+        own = noise * random.standard_normal((cells.size, 2))
+        marks = number in lost, number in unranged
+        ensembles.append(_pd0_ensemble(number + 1, boat, depth, draft, cells, velocity, own, marks))
+    return b"".join(ensembles)
 
 
-def _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise) -> bytes:
+def _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise, marks) -> bytes:
     minute, second = divmod(number, 60)
     clock = (20, 6, 3, 10, minute, second, 0)
     # Rio Grande 10.16; beams of 20 degrees; cells of 10 cm from 35 cm on; the frame of the earth, tilts used.
@@ -132,7 +145,9 @@ def _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise) -> bytes:
         struct.pack("<H", name) + bytes([value]) * rows.size
         for name, value in ((0x200, 120), (0x300, 90), (0x400, 100))
     ]
-    bottom = (*[round(100 * (depth - draft))] * 4, *(-1000.0 * boat).round().astype(int).tolist(), 0, 0)
+    lost, unranged = marks
+    track = [-32768] * 4 if lost else [*(-1000.0 * boat).round().astype(int).tolist(), 0, 0]
+    bottom = (*[0 if unranged else round(100 * (depth - draft))] * 4, *track)
     blocks += [
         struct.pack("<3H4BHI4H4h", 0x600, 1, 0, 220, 30, 0, 5, 1000, 0, *bottom)
         + bytes([255] * 4 + [100] * 8 + [0] * 37)

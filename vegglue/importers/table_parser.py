@@ -54,6 +54,7 @@ MISSING_WORDS = (
 )  # fmt: skip
 # What a workbook shows for a formula without a value, in any language: #DIV/0!, #N/A, #WERT!, #NOMBRE?
 OF_FORMULA = re.compile(r"#[^\W_]+(/[^\W_]+)?[!?]?")
+FORMULA_IN_FRONT = re.compile(r"\s*#(N/A|NV|[A-Z0/]+[!?])\s*[,;\t|]")  # no comment, though it begins like one
 Line = tuple[int, list[str]]  # number in the file, from 1, and fields
 
 
@@ -164,7 +165,11 @@ def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
         fields, form = _lines_of_sheet(path, sheet)
         return _without_summaries(_table(path, fields, form, "", False))
     there = [(number, text) for number, text in enumerate(readable_text(path).splitlines(), 1) if text.strip(" \t;,")]
-    lines = [(number, text) for number, text in there if not text.lstrip().startswith(COMMENTS)]
+    lines = [
+        (number, text)
+        for number, text in there
+        if not text.lstrip().startswith(COMMENTS) or FORMULA_IN_FRONT.match(text)
+    ]
     comments = len(there) - len(lines)
     separator = _separator([text for _, text in lines])
     fields = [(number, _fields(text, separator)) for number, text in lines]
