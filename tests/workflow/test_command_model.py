@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from reach import COARSE
 
 import vegglue
 from vegglue.calibration.candidates import Candidate, candidates_of, cause_of, with_effect
-from vegglue.calibration.command_place import command_place
+from vegglue.calibration.command_place import CommandPlace, command_place
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
@@ -22,8 +23,9 @@ from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.progress import silent
+from vegglue.wording.sentences import sentence
 from vegglue.workflow.case_run import CaseRun
-from vegglue.workflow.command_model import _beside_what_was_reckoned, _kept_place, command_tried, with_command
+from vegglue.workflow.command_model import command_compared, command_tried, kept_place, with_command
 
 SMALL = ("members: 1024", "members: 8")
 WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
@@ -203,7 +205,7 @@ def test_measurements_for_validation_are_predicted_by_the_command(tmp_path: Path
 @pytest.mark.parametrize("text", ["", "{}", '{"config_hash": "x", "z": [0, 0], "settled": true, "places": 1}'])
 def test_a_place_that_is_damaged_or_another_is_not_taken(tmp_path: Path, text: str) -> None:
     (tmp_path / "place.json").write_text(text, encoding="utf-8")
-    assert _kept_place(tmp_path / "place.json", "y", 2) is None
+    assert kept_place(tmp_path / "place.json", "y", 2) is None
 
 
 @pytest.mark.parametrize(("noise", "step", "rough"), [(0.0, 0.1, ()), (0.0, 1.0, ()), (0.5, 0.1, ("n_b", "phi"))])
@@ -218,34 +220,25 @@ def test_slopes_of_a_code_that_does_not_rest_are_told_to_be_rough(
 
 
 @pytest.mark.parametrize(
-    ("times", "said"),
-    [
-        ("100 * (", "times as large: check their unit, and that stations keep their numbers)"),
-        ("-(", "from the built-in engine (the other way: check their sign)"),
-        ("(", "from the built-in engine"),
-    ],
+    ("times", "sign", "unit"), [("100 * (", False, True), ("-(", True, False), ("(", False, False)]
 )
-def test_velocities_of_another_unit_or_sign_are_said(tmp_path: Path, times: str, said: str) -> None:
-    """Predictions in cm/s were told as they came, as if all were well."""
+def test_velocities_of_another_unit_or_sign_are_noticed(tmp_path: Path, times: str, sign: bool, unit: bool) -> None:
     program = SMOOTH.replace("{0.2 / n**0.5 - 0.05 * phi**0.2 + float(row['x']) / 1000!r}",
                              f"{{{times}0.2 / n**0.5 - 0.05 * phi**0.2 + float(row['x']) / 1000)!r}}")  # fmt: skip
     case = commanded(tmp_path, program, "", COARSE, SMALL, WITH_ERROR)
-    assert command_tried(model_of(case, read_observations(case)), tmp_path).removesuffix(".").endswith(said)
+    tried = command_tried(model_of(case, read_observations(case)), tmp_path)
+    assert [(one.opposite, one.of_another_unit) for one in tried.kinds] == [(sign, unit)]
+    assert sentence(tried)
 
 
-def test_what_cannot_be_compared_is_said_with_its_reason() -> None:
-    """Without a flow of the built-in engine it was `nothing to compare ()`."""
+def test_what_cannot_be_compared_has_no_distance() -> None:
     error = np.array([0.1, np.nan])
     point = Point(np.zeros(1), np.array([0.4, 0.4]), np.zeros((2, 1)), {})
-    assert _beside_what_was_reckoned(np.array([0.5, 9.0]), "", point, error) == (
-        "it differs from what was reckoned with by 1.00 errors; take sizes and chances with care",
-        pytest.approx(1.0),
-    )
-    for failure, reckoned, said in (
-        ("it ended with code 1.", point, "the command failed, so that nothing tells how far it is from"),
-        ("", None, "the built-in engine finds no steady flow, so that nothing tells how far the command is from"),
-    ):
-        words, off = _beside_what_was_reckoned(np.full(2, np.nan), failure, reckoned, error)
-        assert words.startswith(said)
-        assert words.endswith(failure.removesuffix(".") or "with care")
-        assert off == 0.0
+    place = CommandPlace(cast(Any, None), np.zeros(1), True, 1, ())
+    off = command_compared(place, 1, np.array([0.5, 9.0]), "", point, error)
+    assert (off.errors, off.careful) == (pytest.approx(1.0), True)
+    for failure, linear in (("it ended with code 1.", point), ("", None)):
+        unknown = command_compared(place, 1, np.full(2, np.nan), failure, linear, error)
+        assert np.isnan(unknown.errors)
+        assert unknown.failure == failure.removesuffix(".")
+

@@ -1,10 +1,10 @@
-"""The models of a case whose `engine` is a command: corrected to it where it fits best, which the next verb reads.
+"""Models of a case whose `engine` is a command: linearised from its predictions where it fits best.
 
 runs/<name>/engine/place.json holds that place and the hash of the case; all runs of the command lie beside it.
 """
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,50 +25,82 @@ from vegglue.progress import Watch
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.verdict import CommandCompared, CommandDiffers, CommandNotSettled
 from vegglue.whole_files import MAKE_ROOM
-from vegglue.wording.numbers import in_digits
 
 PLACE_FILE = "place.json"
-# Share of a standard error [-] by which the command may differ from what was reckoned with before it is a doubt.
-# Chosen, not measured: half an error hardly moves a score.
+# Difference between the command and its linear model [standard errors, root mean square] above which sizes and chances
+# are taken with care. Chosen, not measured: half an error hardly moves a score.
 CLOSE_ENOUGH = 0.5
-# Standard errors by which it may differ before no verdict is believed: larger than what names rest on. Chosen after a
-# command that gave the same numbers for all parameters was told as water that enters the channel.
+# The same above which no verdict is believed: larger than what names rest on. Chosen after a command that gave the same
+# numbers for all parameters was diagnosed as water that enters the channel.
 BEYOND_BELIEF = 3.0
-# How many times as large as those of the built-in engine velocities are that may be in another unit: 10 is dm/s.
-OF_ANOTHER_UNIT = 5.0
+
+
+@dataclass(frozen=True)
+class PredictedRange:
+    """Predictions of one kind by a command: its words, smallest and largest value [unit].
+
+    apart: root mean square difference from the built-in engine [unit], NaN without its flow; times: how many times as
+    large velocities along x are, by least squares [-], 1 for other kinds.
+    """
+
+    words: str
+    low: float
+    high: float
+    unit: str
+    apart: float
+    times: float
+
+    @property
+    def opposite(self) -> bool:
+        """Whether velocities have the other sign."""
+        return self.times < 0.0
+
+    @property
+    def of_another_unit(self) -> bool:
+        """Whether velocities may be in another unit: five times as large or small; dm/s are ten times."""
+        return not self.opposite and not 0.2 < self.times < 5.0
+
+
+@dataclass(frozen=True)
+class CommandTried:
+    """One run of the command of `engine` at the medians of the priors, and how long it took [s]."""
+
+    seconds: float
+    kinds: tuple[PredictedRange, ...]
 
 
 def with_command(model: Model, folder: Path, watch: Watch) -> Model:
     """The model with the engine of its command, if its case has one; folder: of the results of the case.
 
-    Errors: InputError when the command cannot be run, or fails where it fits best.
+    Raises InputError when the command cannot be run, or fails where it fits best.
     """
-    return model if model.case.engine is None else _place_of(model, folder, watch).model
+    return model if model.case.engine is None else place_of_command(model, folder, watch).model
 
 
 def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch) -> Model:
-    """The model at stations that no calibration sees, with the command corrected there at the place of `model`."""
+    """The model at held-out stations, with the command linearised there at the place of `model`."""
     if model.case.engine is None:
         return unseen
     runs = command_runs(model.case, folder)
-    correction = correction_at(runs, unseen, _place_of(model, folder, watch).z, watch)
+    correction = correction_at(runs, unseen, place_of_command(model, folder, watch).z, watch)
     return replace(unseen, engine=corrected(correction, runs, watch))
 
 
-def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: Watch) -> Diagnosis:
-    """The diagnosis with a remark, its first, on what the command said and what the built-in engine did; the command is
-    run once more for it, at the last parameters that were found.
+def with_command_compared(found: Diagnosis, model: Model, folder: Path, watch: Watch) -> Diagnosis:
+    """The diagnosis with a first note on how far the command is from its linear model at the last parameters.
+
+    The command is run once more for it. A verdict on numbers that the command does not give is not believed.
     """
     if model.case.engine is None:
         return found
-    place, runs = _place_of(model, folder, watch), command_runs(model.case, folder)
+    place, runs = place_of_command(model, folder, watch), command_runs(model.case, folder)
     bare = replace(without_effects(model), engine=place.model.engine)
     theta = {name: found.parameters.last[name][0] for name in bare.names}
     z = z_at(bare.case, {name: np.array([value]) for name, value in theta.items()})[0]
-    reckoned = linearise(bare, z)
+    linear = linearise(bare, z)
     why = "running the command once more"
-    there, reasons = command_predictions(runs, bare.case, model.station, [theta], watch, why)
-    compared = _compared(place, len(bare.names), there[0], reasons[0], reckoned, found.predictions.error)
+    there, failures = command_predictions(runs, bare.case, model.station, [theta], watch, why)
+    compared = command_compared(place, len(bare.names), there[0], failures[0], linear, found.predictions.error)
     verdict = replace(found.verdict, notes=(compared, *found.verdict.notes))
     if compared.errors > BEYOND_BELIEF:
         verdict = replace(verdict, kind="cannot-tell", distrust=CommandDiffers(compared.errors))
@@ -79,24 +111,21 @@ def with_words_on_command(found: Diagnosis, model: Model, folder: Path, watch: W
     return replace(found, verdict=verdict)
 
 
-def _compared(
-    place: CommandPlace, parameters: int, there: Array, failure: str, reckoned: Point | None, error: Array
+def command_compared(
+    place: CommandPlace, parameters: int, there: Array, failure: str, linear: Point | None, error: Array
 ) -> CommandCompared:
     """How far the command is from its linear model; error: of each station, NaN if it does not count."""
     off = float("nan")
-    if not failure and reckoned is not None:
+    if not failure and linear is not None:
         used = np.isfinite(error)
-        off = root_mean_square((there - reckoned.prediction)[used] / error[used])
+        off = root_mean_square((there - linear.prediction)[used] / error[used])
     return CommandCompared(
         place.places, parameters, off, failure.removesuffix("."), tuple(place.rough), place.settled, off > CLOSE_ENOUGH
     )
 
 
-def command_tried(model: Model, folder: Path) -> str:
-    """What came of one run of the command, at the medians of the priors; differences are root mean squares.
-
-    Errors: InputError when it fails.
-    """
+def command_tried(model: Model, folder: Path) -> CommandTried:
+    """Run the command once, at the medians of the priors. Raises InputError when it fails."""
     case, bare = model.case, without_effects(model)
     middle = np.zeros(len(bare.names))
     theta = {name: float(value[0]) for name, value in theta_at(bare.case, middle).items()}
@@ -107,38 +136,31 @@ def command_tried(model: Model, folder: Path) -> str:
             f"{shown_path(case.source)}: the command of `engine` failed at the medians of the priors: {end.reason}; "
             f"its files lie in {shown_path(runs.folder)}."
         )
-    own = linearise(bare, middle)
-    told = []
+    own, ranges = linearise(bare, middle), []
     for name, rows in stations_by_kind(model.station).items():
         kind, found = kind_of(name), end.prediction[rows]
-        off = "" if own is None else _beside_the_own(found, own.prediction[rows], name == STREAMWISE)
-        told.append(f"{kind.words} {in_digits(found.min())} to {in_digits(found.max())} {kind.unit}{off}")
-    return f"The command of `engine` took {end.seconds:.1f} s at the medians of the priors: {'; '.join(told)}."
-
-
-def _beside_the_own(found: Array, own: Array, along: bool) -> str:
-    """How far the command is from the built-in engine, and why velocities along x may be of another size or sign."""
-    said = f", {in_digits(root_mean_square(found - own), 2)} from the built-in engine"
-    times = float(found @ own) / float(own @ own) if along and own.any() else 1.0
-    if times < 0.0:
-        return f"{said} (the other way: check their sign)"
-    if not 1.0 / OF_ANOTHER_UNIT < times < OF_ANOTHER_UNIT:
-        return f"{said} ({in_digits(times, 2)} times as large: check their unit, and that stations keep their numbers)"
-    return said
+        apart, times = float("nan"), 1.0
+        if own is not None:
+            built_in = own.prediction[rows]
+            apart = root_mean_square(found - built_in)
+            if name == STREAMWISE and built_in.any():
+                times = float(found @ built_in) / float(built_in @ built_in)
+        ranges.append(PredictedRange(kind.words, float(found.min()), float(found.max()), kind.unit, apart, times))
+    return CommandTried(end.seconds, tuple(ranges))
 
 
 def refuse_command(case: Case, verb: str) -> None:
-    """Errors: InputError for a case with an `engine`, in a verb that needs the built-in one."""
+    """Raise InputError for a case with an `engine`, in a verb that needs the built-in one."""
     if case.engine is not None:
         raise InputError(
             f"{shown_path(case.source)}: `{verb}` works with the built-in engine only; take `engine` out of the config."
         )
 
 
-def _place_of(model: Model, folder: Path, watch: Watch) -> CommandPlace:
+def place_of_command(model: Model, folder: Path, watch: Watch) -> CommandPlace:
     """The place where the command fits best: as an earlier verb has left it, or searched and kept."""
     runs, path, wanted = command_runs(model.case, folder), folder / "engine" / PLACE_FILE, case_hash(model.case)
-    known = _kept_place(path, wanted, len(model.names))
+    known = kept_place(path, wanted, len(model.names))
     if known is not None:
         z, settled, places = known
         correction = correction_at(runs, model, z, watch)
@@ -150,12 +172,13 @@ def _place_of(model: Model, folder: Path, watch: Watch) -> CommandPlace:
     return found
 
 
-def _kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool, int] | None:
+def kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool, int] | None:
+    """The place in a file: z (p,), whether its search settled, and places tried; None if it is damaged or another."""
     try:
-        found = json.loads(read_text(path, LARGEST_JSON))
-        z = np.array(found["z"], dtype=float)
-        if found["config_hash"] == wanted and z.shape == (parameters,) and np.isfinite(z).all():
-            return z, bool(found["settled"]), int(found["places"])
+        kept = json.loads(read_text(path, LARGEST_JSON))
+        z = np.array(kept["z"], dtype=float)
+        if kept["config_hash"] == wanted and z.shape == (parameters,) and np.isfinite(z).all():
+            return z, bool(kept["settled"]), int(kept["places"])
     except (InputError, ValueError, KeyError, TypeError, RecursionError):
         pass
     return None

@@ -14,7 +14,7 @@ from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import diagnosis_that_fits, write_diagnosis
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run, excluded_in, keep_best_fit
-from vegglue.workflow.command_model import with_words_on_command
+from vegglue.workflow.command_model import with_command_compared
 
 
 @one_thread()
@@ -34,7 +34,7 @@ def diagnose(case: Case | CaseRun, *, runs: Path | str = "runs", jobs: int = -1,
     with at_most(run.jobs):
         model = run.commanded_model
         found = diagnose_model(model, run.watch, run.validation_model)
-        found = with_words_on_command(found, model, run.folder, run.watch)
+        found = with_command_compared(found, model, run.folder, run.watch)
     from vegglue.pages.diagnosis_figures import save_diagnosis_figure
 
     save_diagnosis_figure(found, run.case, run.folder / "diagnosis.png")
