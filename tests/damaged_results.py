@@ -14,7 +14,7 @@ from stored import ALL, HASH, WINDOW, a_header, write_chunks
 from vegglue.errors import InputError, StorageError
 from vegglue.flow.sensor import FlowFields
 from vegglue.results.diagnosis import diagnosis_json
-from vegglue.results.digest import LENGTH, with_digest
+from vegglue.results.hdf5 import LENGTH, with_digest
 from vegglue.results.result_files import (
     flow_that_fits,
     read_diagnosis,

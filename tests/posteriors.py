@@ -11,22 +11,20 @@ from stored import HASH, MEMBERS, a_header
 from vegglue.results.posterior import (
     LEVELS,
     CorrectedCanopy,
-    GoodnessOfFit,
-    InferenceSettings,
-    Marginals,
-    Posterior,
-    PredictiveDistribution,
-    WeightedSample,
-    WeightStatistics,
-)
-from vegglue.results.refinement import (
     ErrorModel,
+    GoodnessOfFit,
     GroupsLeftOut,
     ImportanceDraws,
+    InferenceSettings,
     LeaveOneOut,
+    Marginals,
     MisfitTest,
+    Posterior,
     PosteriorModes,
+    PredictiveDistribution,
     Refinement,
+    WeightedSample,
+    WeightStatistics,
 )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from vegglue.diagnosis.comparison import By
 from vegglue.diagnosis.stepwise_choice import WAYS, Choice, Names, Nominee, chosen, why_not_kept
-from vegglue.results.model_score import HeldOut, InSample, ModelScore, PredictiveScores
+from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
 
 STATIONS = 12
 EXPERIMENTS = ("low", "high")

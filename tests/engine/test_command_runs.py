@@ -14,7 +14,7 @@ from vegglue.engine.command import CommandRuns, command_predictions, command_run
 from vegglue.errors import InputError, StorageError
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most, task_backend
-from vegglue.results.lock import hold_lock
+from vegglue.results.resume import hold_lock
 
 THETAS = [{"n_b": 0.03, "phi": 2.0}, {"n_b": 0.04, "phi": 3.0}, {"n_b": 0.05, "phi": 4.0}]
 PHI = "json.load(open('parameters.json'))['parameters']['phi']['value']"

@@ -23,8 +23,7 @@ from vegglue.inference.refine import log_posterior, refinable, refine, solved_fo
 from vegglue.pages.posterior_words import posterior_in_words
 from vegglue.pages.validation_words import validation_in_words
 from vegglue.parallel import at_most
-from vegglue.results.posterior import Posterior
-from vegglue.results.refinement import GroupsLeftOut
+from vegglue.results.posterior import GroupsLeftOut, Posterior
 from vegglue.results.result_files import read_posterior, write_posterior
 
 

@@ -35,7 +35,7 @@ from vegglue.pages.ladder_figure import draw_ladder, save_ladder_figure
 from vegglue.pages.style import COLOUR
 from vegglue.results.causes import Step
 from vegglue.results.diagnosis import Diagnosis, Predictions
-from vegglue.results.model_score import HeldOut, InSample, ModelScore, PredictiveScores
+from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
 
 pytestmark = pytest.mark.slow
 

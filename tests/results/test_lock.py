@@ -8,12 +8,12 @@ import pytest
 from stored import start
 
 from vegglue.errors import StorageError
-from vegglue.results.lock import hold_lock
+from vegglue.results.resume import hold_lock
 
 HOLD = """
     import time
     from pathlib import Path
-    from vegglue.results.lock import hold_lock
+    from vegglue.results.resume import hold_lock
     with hold_lock(Path({path!r})):
         print("held", flush=True)
         time.sleep(60)

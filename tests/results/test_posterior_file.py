@@ -14,9 +14,9 @@ from vegglue.results.layout import stored_fields
 from vegglue.results.posterior import (
     CorrectedCanopy,
     Posterior,
+    Refinement,
     Transfer,
 )
-from vegglue.results.refinement import Refinement
 from vegglue.results.result_files import read_posterior, stored_hash, write_posterior
 
 

@@ -26,8 +26,7 @@ from stored import ALL, HASH, a_header, append, assert_whole, start, write_chunk
 
 from vegglue import sandboxed_reader
 from vegglue.errors import StorageError
-from vegglue.results.digest import state_of, with_digest
-from vegglue.results.hdf5_reading import READ_HDF5
+from vegglue.results.hdf5 import READ_HDF5, state_of, with_digest
 from vegglue.results.result_files import read_ensemble, stored_hash
 from vegglue.results.resume import ensemble_writer, part_file
 
@@ -199,8 +198,8 @@ def test_a_reader_ends_with_whoever_asked(tmp_path: Path) -> None:
         import os
         from pathlib import Path
         from vegglue import sandboxed_reader
-        from vegglue.results import digest, hdf5_reading
-        sandboxed_reader.why_unreadable(*digest.state_of(Path({path!r})), by=hdf5_reading.READ_HDF5)
+        from vegglue.results import hdf5
+        sandboxed_reader.why_unreadable(*hdf5.state_of(Path({path!r})), by=hdf5.READ_HDF5)
         print(sandboxed_reader._reader(os.getpid()).pid, flush=True)
         os.kill(os.getpid(), 9)
     """

@@ -12,7 +12,7 @@ from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.pages.homogeneity_words import REJECTED_BELOW
 from vegglue.results.causes import CandidateEffect
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.model_score import ModelScore
+from vegglue.results.model_comparison import ModelScore
 from vegglue.results.open_questions import Question
 from vegglue.wording.numbers import in_digits, range_in_digits, so_many
 from vegglue.workflow.compare import Comparison

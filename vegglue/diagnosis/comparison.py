@@ -23,7 +23,7 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
-from vegglue.results.model_score import HeldOut, InSample, ModelScore, PredictiveScores
+from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
 from vegglue.wording.numbers import in_digits, so_many
 
 # What is left out in turn.

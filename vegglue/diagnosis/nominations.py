@@ -12,7 +12,7 @@ from vegglue.diagnosis.comparison import By, model_score
 from vegglue.diagnosis.stepwise_choice import Choice, Names, Nominee, chosen
 from vegglue.results.causes import LocalAnomaly
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.model_score import ModelScore
+from vegglue.results.model_comparison import ModelScore
 
 Addition = tuple[Candidate, Mapping[str, float]]  # an effect, and values of its shapes
 

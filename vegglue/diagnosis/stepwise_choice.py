@@ -11,7 +11,7 @@ import numpy as np
 
 from vegglue.diagnosis.comparison import By, held_out_rmse, improvement
 from vegglue.diagnosis.refits import is_near_off
-from vegglue.results.model_score import ModelScore
+from vegglue.results.model_comparison import ModelScore
 
 # Fall of the held-out squares, over its standard error, from which it is clear: 19 times of 20 it is no chance.
 CLEAR = 2.0

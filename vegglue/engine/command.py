@@ -46,7 +46,7 @@ from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import LARGEST_READING
 from vegglue.parallel import cores_allowed, has_backend
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.lock import hold_lock
+from vegglue.results.resume import hold_lock
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 
 PARAMETERS_FILE, STATIONS_FILE, PREDICTIONS_FILE = "parameters.json", "stations.csv", "predictions.csv"

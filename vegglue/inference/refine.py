@@ -29,15 +29,17 @@ from vegglue.inference.posterior_summary import posterior_of
 from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
-from vegglue.results.posterior import InferenceSettings, Posterior, WeightedSample
-from vegglue.results.refinement import (
+from vegglue.results.posterior import (
     ErrorModel,
     GroupsLeftOut,
     ImportanceDraws,
+    InferenceSettings,
     LeaveOneOut,
     MisfitTest,
+    Posterior,
     PosteriorModes,
     Refinement,
+    WeightedSample,
 )
 from vegglue.version import VERSION
 from vegglue.wording.numbers import so_many

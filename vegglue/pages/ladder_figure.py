@@ -14,7 +14,7 @@ from vegglue.arrays import Array
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.pages.style import COLOUR, SMALL, WIDTH, label, save, styled
 from vegglue.pages.typography import fixed, short
-from vegglue.results.model_score import ModelScore
+from vegglue.results.model_comparison import ModelScore
 
 # p-value [-] of one value in all experiments, below which a parameter is drawn as one that moves: 1 in 20.
 MOVES_BELOW = 0.05

@@ -14,8 +14,7 @@ from vegglue.pages.homogeneity_words import homogeneity_in_words
 from vegglue.pages.prior_words import against_prior_in_words
 from vegglue.pages.typography import PLAIN_TEXT, Notation
 from vegglue.pages.validation_words import validation_in_words
-from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, Posterior
-from vegglue.results.refinement import ErrorModel, PosteriorModes, Refinement
+from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, ErrorModel, Posterior, PosteriorModes, Refinement
 from vegglue.results.verdict import MisfitTooSmall, is_too_small
 from vegglue.wording.numbers import in_digits, so_many, telling_digits
 from vegglue.wording.sentences import sentence

@@ -4,8 +4,7 @@ import numpy as np
 
 from vegglue.inference.refine import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
-from vegglue.results.posterior import Posterior
-from vegglue.results.refinement import GroupsLeftOut, LeaveOneOut, MisfitTest, Refinement
+from vegglue.results.posterior import GroupsLeftOut, LeaveOneOut, MisfitTest, Posterior, Refinement
 from vegglue.results.verdict import MisfitTooSmall, is_too_small
 from vegglue.wording.numbers import in_digits, so_many
 from vegglue.wording.sentences import phrase

@@ -39,8 +39,19 @@ from vegglue.results.diagnosis import (
     candidate_effect_json,
 )
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
-from vegglue.results.fitting import IN_WORDS, YES_OR_NO, ReadGroup, fitting, names_of, stated_as, stations_from
-from vegglue.results.layout import Group, Stored, Variable, table_group
+from vegglue.results.layout import (
+    IN_WORDS,
+    YES_OR_NO,
+    Group,
+    ReadGroup,
+    Stored,
+    Variable,
+    fitting,
+    names_of,
+    stated_as,
+    stations_from,
+    table_group,
+)
 from vegglue.results.verdict import (
     ChiSquare,
     EffectFound,

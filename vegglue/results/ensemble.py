@@ -18,8 +18,18 @@ from vegglue.flow.status import (
 )
 from vegglue.measurements.kinds import KINDS, stations_in_short
 from vegglue.results.fields import FieldWindow
-from vegglue.results.fitting import IN_WORDS, fitting, names_of, stated_as, stations_from
-from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
+from vegglue.results.layout import (
+    IN_WORDS,
+    Group,
+    Stored,
+    Variable,
+    fitting,
+    names_of,
+    stated_as,
+    stations_from,
+    stored_fields,
+    table_group,
+)
 from vegglue.wording.numbers import in_short, so_many
 
 VALUE_UNIT = ", ".join(f"{kind.unit} for {kind.words}" for kind in KINDS.values())

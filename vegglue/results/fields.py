@@ -11,8 +11,7 @@ from vegglue.case.grid import Grid
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
 from vegglue.flow.sensor import between
-from vegglue.results.fitting import fitting, names_of
-from vegglue.results.layout import Group, Stored, Variable, stored_fields
+from vegglue.results.layout import Group, Stored, Variable, fitting, names_of, stored_fields
 
 Quantity = Literal["level", "u", "v"]
 DIMS = ("member", "experiment", "x", "y")

@@ -1,24 +1,91 @@
 """HDF5 files that xarray and ArviZ read without this package: groups written and read, each file whole or not at all.
 
 Every group holds its own dimensions as scales. What is stored of which result stands in `result_files`, how an ensemble
-grows in `resume`.
+grows in `resume`. A digest of all bytes stands as a line behind the end of a file, where the HDF5 library does not
+look: what changed since is noticed when it is read.
 """
 
+import hashlib
+import os
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import h5py
 import numpy as np
 
 from vegglue.errors import InputError, StorageError
-from vegglue.results.digest import is_unchanged, state_of, with_digest
-from vegglue.results.foreign_files import why_foreign
-from vegglue.results.hdf5_reading import READ_HDF5
+from vegglue.results.hdf5_reading import READ_HDF5, why_foreign
 from vegglue.results.layout import Group
 from vegglue.sandboxed_reader import why_unreadable
 from vegglue.whole_files import lock, write_file
+
+MARK = b"\nvegglue sha256 "
+LENGTH = len(MARK) + 64 + 1
+BLOCK = 1 << 20  # bytes read at once
+
+
+def with_digest(content: bytes) -> bytes:
+    """The content of a file, and the line behind it."""
+    return content + _line(hashlib.sha256(content).hexdigest())
+
+
+def append_digest(path: Path) -> None:
+    """Put the line behind a file, in place of one that is there. Errors: OSError."""
+    with path.open("r+b") as file:
+        size = os.fstat(file.fileno()).st_size - (LENGTH if _stated(file) else 0)
+        digest = _digest_of(file, size)
+        file.seek(size)
+        file.write(_line(digest))
+        file.truncate()
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def state_of(path: Path) -> tuple[Path, int, int, int]:
+    """What is another as soon as a file is: its place, size [bytes], inode and time. Errors: OSError."""
+    now = path.stat()
+    if not stat.S_ISREG(now.st_mode):  # opening a pipe would wait
+        raise OSError("it is not a file")
+    return path.resolve(), now.st_size, now.st_ino, now.st_mtime_ns
+
+
+@lru_cache(maxsize=64)
+def is_unchanged(path: Path, *state: int) -> bool | None:
+    """Whether a file has the digest that stands behind it; None where none does. Errors: OSError.
+
+    state: looked at once for each, however often the file is opened.
+    """
+    with path.open("rb") as file:
+        stated = _stated(file)
+        return None if stated is None else stated == _digest_of(file, os.fstat(file.fileno()).st_size - LENGTH)
+
+
+def _line(digest: str) -> bytes:
+    return MARK + digest.encode() + b"\n"
+
+
+def _stated(file: IO[bytes]) -> str | None:
+    size = os.fstat(file.fileno()).st_size
+    if size < LENGTH:
+        return None
+    file.seek(size - LENGTH)
+    line = file.read(LENGTH)
+    return line[len(MARK) : -1].decode(errors="replace") if line.startswith(MARK) else None
+
+
+def _digest_of(file: IO[bytes], size: int) -> str:
+    """Of the first bytes of a file."""
+    digest = hashlib.sha256()
+    file.seek(0)
+    while size > 0 and (block := file.read(min(BLOCK, size))):
+        digest.update(block)
+        size -= len(block)
+    return digest.hexdigest()
+
 
 # What reading a damaged file may raise, of Python or of the HDF5 library.
 UNREADABLE = (OSError, RuntimeError, ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError)

@@ -12,8 +12,7 @@ from typing import Any, TypeVar
 
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.plain_json import plain
-from vegglue.results.model_comparison import ModelComparison, comparison_from
-from vegglue.results.model_score import ModelScore, model_score_from
+from vegglue.results.model_comparison import ModelComparison, ModelScore, comparison_from, model_score_from
 from vegglue.results.open_questions import Question, questions_from
 from vegglue.whole_files import MAKE_ROOM
 

@@ -13,10 +13,18 @@ import numpy as np
 
 from vegglue.measurements.kinds import KINDS
 from vegglue.results.ensemble import STATION_UNITS, VALUE_UNIT
-from vegglue.results.fitting import fitting, names_of, stated_as, stations_from
-from vegglue.results.layout import Group, Stored, Variable, stored_fields, table_group
-from vegglue.results.posterior import CHAINS, DRAWS_PER_CHAIN, LEVELS, CorrectedCanopy, Posterior, Transfer
-from vegglue.results.refinement import Refinement
+from vegglue.results.layout import (
+    Group,
+    Stored,
+    Variable,
+    fitting,
+    names_of,
+    stated_as,
+    stations_from,
+    stored_fields,
+    table_group,
+)
+from vegglue.results.posterior import CHAINS, DRAWS_PER_CHAIN, LEVELS, CorrectedCanopy, Posterior, Refinement, Transfer
 
 ROUNDING = 1e-6  # of a sum of a million weights
 LARGEST_PARAMETER = 1e100  # its square is still a number

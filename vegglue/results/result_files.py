@@ -4,9 +4,12 @@ A file whose config hash is not the wanted one is refused with the command that 
 `resume`, member by member.
 """
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
 
 from vegglue.errors import InputError, StorageError, shown_command
 from vegglue.flow.sensor import FlowFields
@@ -15,10 +18,40 @@ from vegglue.results.diagnosis_file import diagnosis_attributes, diagnosis_from,
 from vegglue.results.ensemble import Ensemble, ensemble_from
 from vegglue.results.fields import Fields, fields_from
 from vegglue.results.hdf5 import UNREADABLE, open_hdf5, read_groups, stored_attribute, write_whole
-from vegglue.results.median_flow import flow_attributes, flow_from, flow_groups
+from vegglue.results.layout import Group, Stored, Variable, fitting, names_of
 from vegglue.results.posterior import Posterior
 from vegglue.results.posterior_file import posterior_attributes, posterior_from, posterior_groups
 from vegglue.results.resume import part_file
+
+# Fields at cell centres, in units of FlowFields.
+FIELD_UNITS_KEPT = {"bed": "m", "depth": "m", "level": "m", "u": "m/s", "v": "m/s"}
+
+
+def flow_groups(flow: Mapping[str, FlowFields]) -> dict[str, Group]:
+    """The groups of flow.h5, from fields by experiment, of which there is at least one."""
+    first = next(iter(flow.values()))
+    coordinates = {"experiment": np.array(list(flow), object), "x": first.x, "y": first.y}
+    values = {
+        name: Variable(("experiment", "x", "y"), np.stack([getattr(one, name) for one in flow.values()]), unit)
+        for name, unit in FIELD_UNITS_KEPT.items()
+    }
+    return {"flow": Group(coordinates, values, {"x": "m", "y": "m"})}
+
+
+def flow_attributes(theta: Mapping[str, float]) -> dict[str, str]:
+    """The parameters the flow was solved with."""
+    return {"theta": json.dumps({name: float(value) for name, value in theta.items()}, sort_keys=True)}
+
+
+def flow_from(groups: Mapping[str, Mapping[str, Any]]) -> dict[str, FlowFields]:
+    """The fields by experiment of a file with these groups."""
+    at_cells = dict.fromkeys(FIELD_UNITS_KEPT, Stored(("experiment", "x", "y")))
+    kept = fitting(groups["flow"], at_cells | {"x": Stored(("x",)), "y": Stored(("y",))})
+    return {
+        experiment: FlowFields(kept["x"], kept["y"], **{name: kept[name][place] for name in FIELD_UNITS_KEPT})
+        for place, experiment in enumerate(names_of(kept, "experiment"))
+    }
+
 
 POSTERIOR_FORMAT, DIAGNOSIS_FORMAT, FLOW_FORMAT = "vegglue posterior 1", "vegglue diagnosis 9", "vegglue flow 1"
 Result = TypeVar("Result")

@@ -3,26 +3,34 @@
 The datasets of the part file are laid out whole before the first member is solved: appending then changes no structure
 and needs no more disk, so a run killed at any moment leaves a file that opens. The next run with the same config, seed,
 version and cut into chunks solves only the chunks that are not marked as finished, or whose digest is another.
+
+Fields wait as single-precision numbers in a plain file, every member at a place of its own: a compressed HDF5 file
+changes its structure with every append, and a kill in the middle could leave nothing of it.
 """
 
+import json
+import math
 import os
+import socket
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
+from vegglue.arrays import Single
 from vegglue.errors import StorageError
-from vegglue.results.digest import append_digest
 from vegglue.results.ensemble import ROWS, Header, unsolved
-from vegglue.results.fields import fields_group
+from vegglue.results.fields import QUANTITIES, FieldWindow, fields_group
 from vegglue.results.hdf5 import (
     UNREADABLE,
     WRITTEN_STAYS,
+    append_digest,
     open_hdf5,
     read_values,
     refuse_in_use,
@@ -30,17 +38,118 @@ from vegglue.results.hdf5 import (
     write_whole,
 )
 from vegglue.results.layout import Group
-from vegglue.results.lock import hold_lock
-from vegglue.results.unfinished_fields import (
-    FIELDS_PART,
-    UnfinishedFields,
-    all_fields,
-    is_reserved,
-    reserve,
-    unfinished_fields,
-    write_fields,
-)
-from vegglue.whole_files import failed_writes_told
+from vegglue.whole_files import NOT_FOLLOWED, failed_writes_told, lock
+
+
+@contextmanager
+def hold_lock(folder: Path) -> Iterator[None]:
+    """Hold `folder/.lock` for the length of the block; the file names its holder (pid, host, time).
+
+    The operating system drops the lock of a killed run. The file is emptied, not removed: removing a locked file would
+    let two runs hold two files of one name. A link is not followed. Raises StorageError if a living process holds the
+    lock, or the folder cannot be written.
+    """
+    path = folder / ".lock"
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | NOT_FOLLOWED, 0o644)
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be written ({error.strerror}); make {folder} writable.") from error
+    try:
+        try:
+            lock(handle)
+        except BlockingIOError as error:
+            raise StorageError(f"{folder} is in use by {_holder(path)}; wait for it to end, or stop it.") from error
+        except OSError as error:
+            raise StorageError(f"{path}: cannot be locked ({error.strerror}); use a local folder.") from error
+        since = datetime.now(UTC).isoformat(timespec="seconds")
+        os.ftruncate(handle, 0)
+        os.write(handle, json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "since": since}).encode())
+        yield
+        os.ftruncate(handle, 0)
+    finally:
+        os.close(handle)
+
+
+def _holder(path: Path) -> str:
+    try:
+        mark = json.loads(path.read_text(encoding="utf-8"))
+        return f"process {mark['pid']} on {mark['host']} since {mark['since']}"
+    except (OSError, ValueError, KeyError):
+        return "another process"
+
+
+FIELDS_PART = "fields.part"
+
+
+@dataclass(frozen=True)
+class UnfinishedFields:
+    """Where the fields of a run wait: an array of `shape` (member, ...) in single precision, behind a mark
+    that says which run it is.
+    """
+
+    path: Path
+    mark: bytes
+    shape: tuple[int, ...]
+    window: FieldWindow
+
+    @property
+    def member_bytes(self) -> int:
+        return 4 * math.prod(self.shape[1:])
+
+
+def unfinished_fields(folder: Path, header: Header) -> UnfinishedFields | None:
+    """What a run with this header writes its fields to, (member, experiment, quantity, x, y); None if it keeps none."""
+    if (window := header.window) is None:
+        return None
+    shape = (header.members, len(header.experiments), len(QUANTITIES), window.x.size, window.y.size)
+    return UnfinishedFields(folder / FIELDS_PART, f"vegglue fields of {header.config_hash}\n".encode(), shape, window)
+
+
+def reserve(unfinished: UnfinishedFields) -> None:
+    """Take the room of all members, each NaN. Errors: OSError when there is none, and then nothing is left behind."""
+    nothing = np.full(unfinished.shape[1:], np.nan, np.float32).tobytes()
+    try:
+        unfinished.path.unlink(missing_ok=True)  # a link there is not followed
+        with unfinished.path.open("xb") as file:
+            file.write(unfinished.mark)
+            for _ in range(unfinished.shape[0]):
+                file.write(nothing)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError:
+        unfinished.path.unlink(missing_ok=True)
+        raise
+
+
+def is_reserved(unfinished: UnfinishedFields) -> bool:
+    """Whether the file is there, of this run and of full size."""
+    if unfinished.path.is_symlink():
+        return False
+    try:
+        with unfinished.path.open("rb") as file:
+            mine = file.read(len(unfinished.mark)) == unfinished.mark
+            size = os.fstat(file.fileno()).st_size
+    except OSError:
+        return False
+    return mine and size == len(unfinished.mark) + unfinished.shape[0] * unfinished.member_bytes
+
+
+def write_fields(unfinished: UnfinishedFields, members: np.ndarray, values: Single) -> None:
+    """Write values (len(members), ...) of some members, onto the disk. Errors: OSError."""
+    if values.shape != (len(members), *unfinished.shape[1:]):
+        raise ValueError(f"expected fields of shape {(len(members), *unfinished.shape[1:])}, got {values.shape}")
+    with unfinished.path.open("r+b") as file:
+        for member, own in zip(members, values, strict=True):
+            file.seek(len(unfinished.mark) + int(member) * unfinished.member_bytes)
+            file.write(own.astype(np.float32).tobytes())
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def all_fields(unfinished: UnfinishedFields) -> Single:
+    """The whole array, read as it is used."""
+    return np.memmap(unfinished.path, np.float32, "r", offset=len(unfinished.mark), shape=unfinished.shape)
+
 
 ENSEMBLE_FORMAT, FIELDS_FORMAT = "vegglue ensemble 1", "vegglue fields 1"
 # What changes while a run is on its way, by group.

@@ -14,8 +14,7 @@ from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.json_store import comparison_that_fits, model_score_that_fits, write_comparison, write_model_score
-from vegglue.results.model_comparison import ComparedModel, ModelComparison
-from vegglue.results.model_score import ModelScore
+from vegglue.results.model_comparison import ComparedModel, ModelComparison, ModelScore
 from vegglue.wording.numbers import in_short, so_many
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run, excluded_in_all
 

@@ -20,10 +20,8 @@ from vegglue.flow.sensor import FlowFields
 from vegglue.inference.solve_ensemble import solve_flow
 from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.geotiff import write_geotiff
+from vegglue.results.field_exports import quantities, write_field_table, write_geotiff, write_mesh, write_station_table
 from vegglue.results.labelled_arrays import extra_library
-from vegglue.results.mesh_file import quantities, write_mesh
-from vegglue.results.point_tables import write_field_table, write_station_table
 from vegglue.results.result_files import read_posterior, stored_hash
 from vegglue.version import VERSION
 from vegglue.whole_files import folder_within

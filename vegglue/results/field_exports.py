@@ -1,6 +1,10 @@
-"""Fields as a netCDF file after CF 1.8 and UGRID 1.0: a mesh of quadrangles that xarray and map programs open."""
+"""Fields and stations for other programs: GeoTIFF, a netCDF mesh after CF 1.8 and UGRID 1.0, and CSV."""
 
+import csv
+import io
+import re
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -11,11 +15,66 @@ from vegglue.arrays import Array
 from vegglue.case.centreline import heading_at, on_map
 from vegglue.case.frame import Frame
 from vegglue.case.grid import Grid
-from vegglue.case.text_files import names_in_files
+from vegglue.case.text_files import names_in_files, write_text
+from vegglue.errors import InputError
 from vegglue.flow.sensor import FlowFields
-from vegglue.results.geotiff import epsg_code
 from vegglue.results.labelled_arrays import ENGINE, extra_library
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told, write_file
+
+# Tags of GeoTIFF 1.1 (OGC 19-008): the affine way from pixels to the map, and the coordinate system; and that of GDAL
+# for what marks no data.
+TRANSFORMATION, GEO_KEYS, MARKS_NO_DATA = 34264, 34735, 42113
+# Keys: a projected model, pixels as areas, the code of the system.
+MODEL_TYPE, RASTER_TYPE, PROJECTED = 1024, 1025, 3072
+NO_LEVEL_THERE = -9999.0
+
+
+def write_geotiff(path: Path, values: Array, grid: Grid, frame: Frame | None) -> None:
+    """Write values (nx, ny) at cell centres, NaN where there is none, as float64.
+
+    A pixel (column, row) lies at x = x_0 + column dx, y = y_1 - row dy, which the frame turns onto the map.
+    Errors: InputError without tifffile; StorageError.
+    """
+    try:
+        import tifffile
+    except ImportError:
+        raise InputError(
+            f"{path}: GeoTIFFs are written by tifffile, which is not installed; run `pip install 'vegglue[field]'`, or "
+            "leave them out by --only csv."
+        ) from None
+    keys = _keys(frame)
+    tags = [
+        (TRANSFORMATION, "d", 16, _affine(grid, frame), True),
+        (GEO_KEYS, "H", len(keys), keys, True),
+        (MARKS_NO_DATA, "s", 0, f"{NO_LEVEL_THERE:g}", True),
+    ]
+    north_up = np.where(np.isnan(values), NO_LEVEL_THERE, values).T[::-1]
+    content = BytesIO()
+    tifffile.imwrite(content, np.ascontiguousarray(north_up), extratags=tags, metadata=None, compression=None)
+    write_file(path, content.getvalue(), MAKE_ROOM)
+
+
+def _affine(grid: Grid, frame: Frame | None) -> tuple[float, ...]:
+    """The 4 by 4 matrix, row by row, from (column, row) to (east, north)."""
+    west, north_edge = float(grid.x[0]) - 0.5 * grid.dx, float(grid.y[-1]) + 0.5 * grid.dy
+    place = frame or Frame(origin=(0.0, 0.0), angle=0.0)
+    (a, d), (b, e) = place.turned_to_map(grid.dx, 0.0), place.turned_to_map(0.0, -grid.dy)
+    c, f = place.to_map(west, north_edge)
+    return (a, b, 0.0, c, d, e, 0.0, f, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def _keys(frame: Frame | None) -> tuple[int, ...]:
+    """The directory of keys; without a code of EPSG only that it is a map of areas."""
+    code = epsg_code(frame)
+    entries = [(MODEL_TYPE, 0, 1, 1), (RASTER_TYPE, 0, 1, 1)] + ([(PROJECTED, 0, 1, code)] if code else [])
+    return (1, 1, 0, len(entries), *(number for entry in entries for number in entry))
+
+
+def epsg_code(frame: Frame | None) -> int | None:
+    """2056 for EPSG:2056, None where the frame names no such code."""
+    found = re.fullmatch(r"EPSG:(\d{4,5})", (frame.crs or "").strip(), re.IGNORECASE) if frame is not None else None
+    return int(found[1]) if found else None
+
 
 # Quantities of a flow at cell centres: what they are called in words, and their unit.
 QUANTITIES_OF_FLOW = {
@@ -119,3 +178,55 @@ def _system(frame: Frame | None) -> dict[str, Any]:
     of_code = {"epsg": np.int32(code), "epsg_code": f"EPSG:{code}"} if code else {}
     origin = np.array(frame.origin)
     return {"long_name": frame.crs or "coordinates of the map", **of_code, "origin": origin, "angle": frame.angle}
+
+
+MAKE_ROOM_THERE = "make room and run it again"
+
+
+def write_field_table(path: Path, flow: FlowFields, grid: Grid, frame: Frame | None) -> None:
+    """One row a cell: x, y, east, north of its centre [m], then the quantities with their units; nothing where dry."""
+    x, y = (part.ravel() for part in np.meshgrid(flow.x, flow.y, indexing="ij"))
+    found = quantities(flow, grid, frame)
+    heading = [f"{name} [{QUANTITIES_OF_FLOW[name][1]}]" for name in found]
+    columns = [*_places(x, y, grid, frame), *(values.ravel() for values in found.values())]
+    _write(path, [*_place_headings(grid, frame), *heading], columns)
+
+
+def write_station_table(
+    path: Path, station: Mapping[str, Array], predicted: Array | None, grid: Grid, frame: Frame | None
+) -> None:
+    """One row a station, as the case reads them, with places on the map; and what the model gives there, if known.
+
+    station: columns (station,) of Observations.table.
+    """
+    x, y = station["x"].astype(float), station["y"].astype(float)
+    names = ("experiment", "kind", "section", "value", "standard_error", "used", "reason")
+    columns = [*_places(x, y, grid, frame), *(station[name] for name in names)]
+    more = [] if predicted is None else ["predicted"]
+    _write(
+        path, [*_place_headings(grid, frame), *names, *more], [*columns, *([] if predicted is None else [predicted])]
+    )
+
+
+def _place_headings(grid: Grid, frame: Frame | None) -> list[str]:
+    return ["x [m]", "y [m]", *(["east [m]", "north [m]"] if frame is not None or grid.centreline is not None else [])]
+
+
+def _places(x: Array, y: Array, grid: Grid, frame: Frame | None) -> list[Array]:
+    turned = frame is not None or grid.centreline is not None
+    return [x, y, *(on_the_map(x, y, grid, frame) if turned else ())]
+
+
+def _write(path: Path, heading: list[str], columns: list[Array]) -> None:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(heading)
+    writer.writerows([_shown(value) for value in row] for row in zip(*columns, strict=True))
+    write_text(path, text.getvalue(), MAKE_ROOM_THERE)
+
+
+def _shown(value: object) -> str:
+    """Numbers in full, so that they are the same when read again; nothing for what is unknown."""
+    if isinstance(value, float | np.floating):
+        return "" if np.isnan(value) else repr(float(value))
+    return str(value)
