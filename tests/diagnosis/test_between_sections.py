@@ -10,7 +10,7 @@ from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.noise import with_model_error
-from vegglue.diagnosis.between_sections import acts_elsewhere, halfway, largest_error_between
+from vegglue.diagnosis.errors_elsewhere import acts_elsewhere, halfway, largest_error_between
 from vegglue.engine.interface import Model, Point
 
 pytestmark = pytest.mark.slow
@@ -56,8 +56,8 @@ def told_and_true(one: Linear, seed: int, patched: pytest.MonkeyPatch) -> tuple[
         assert len(model.station) == 2 * len(STATION)
         return Point(z, one.slope @ z, one.slope, {})
 
-    patched.setattr("vegglue.diagnosis.between_sections.linearise", linearised)
-    patched.setattr("vegglue.diagnosis.between_sections.model_error_columns", lambda *_: one.columns)
+    patched.setattr("vegglue.diagnosis.errors_elsewhere.linearise", linearised)
+    patched.setattr("vegglue.diagnosis.errors_elsewhere.model_error_columns", lambda *_: one.columns)
     error = (truth - one.slope @ base.fitted.point.z)[len(STATION) :]
     return largest_error_between(base), float(np.sqrt(1.0 + np.mean(error**2) / ERROR**2))
 
@@ -132,7 +132,7 @@ def test_what_acts_mostly_where_nobody_measured_is_told(
     def predicted(model: Model, points: list[Point], z: Array) -> Array:
         return next(answers)[None]
 
-    monkeypatch.setattr("vegglue.diagnosis.between_sections.predict", predicted)
+    monkeypatch.setattr("vegglue.diagnosis.errors_elsewhere.predict", predicted)
     why = acts_elsewhere(before, after)
     assert bool(why) == told
     if told:

@@ -7,9 +7,8 @@ import pytest
 
 from vegglue.calibration import score_test
 from vegglue.diagnosis import competition
-from vegglue.diagnosis.competition import hypotheses_of
-from vegglue.diagnosis.rivals import followed_further, with_chances
-from vegglue.diagnosis.tempered_probabilities import tempered_odds, tempered_probabilities
+from vegglue.diagnosis.competition import hypotheses_of, tempered_odds, tempered_probabilities
+from vegglue.diagnosis.search_state import followed_further, with_chances
 from vegglue.progress import silent
 from vegglue.results.causes import Step
 

@@ -15,7 +15,7 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.cli.loop_commands import compare_command
 from vegglue.diagnosis.child_config import candidate_named
-from vegglue.diagnosis.excluded_stations import excluded_by, excluding, exclusion_in_words
+from vegglue.diagnosis.comparison import excluded_by, excluding, exclusion_in_words
 from vegglue.engine.interface import Model, Point
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import write_diagnosis

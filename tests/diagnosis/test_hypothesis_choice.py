@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import Hypothesis
-from vegglue.diagnosis.hypothesis_choice import (
+from vegglue.diagnosis.competition import (
     MOST_FOLLOWED,
+    Hypothesis,
     What,
     chance_of_a_place,
     chosen_hypothesis,

@@ -9,7 +9,7 @@ from linear_baseline import at_best, stations_of
 
 from vegglue.calibration.noise import with_correlation
 from vegglue.case.config import load_case
-from vegglue.diagnosis.misfit_zones import misfit_zones
+from vegglue.diagnosis.conclusion import misfit_zones
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 

@@ -15,8 +15,7 @@ from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.case.parameter_space import z_of
-from vegglue.diagnosis.competition import promising_spots
-from vegglue.diagnosis.place_search import found_place
+from vegglue.diagnosis.competition import found_place, promising_spots
 from vegglue.diagnosis.refits import RefitTrial, refits_of, start_with
 from vegglue.effects.library import library
 from vegglue.engine.interface import linearise

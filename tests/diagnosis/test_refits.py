@@ -16,10 +16,9 @@ from vegglue.calibration.candidates import Candidate, with_effect
 from vegglue.calibration.fit import covariance
 from vegglue.case.parameter_space import theta_at, z_of
 from vegglue.diagnosis import refits
-from vegglue.diagnosis.competition import Hypothesis, chances_of
+from vegglue.diagnosis.competition import Hypothesis, chances_of, tempering
 from vegglue.diagnosis.refits import RefitTrial
-from vegglue.diagnosis.rivals import rivals_among
-from vegglue.diagnosis.tempered_probabilities import tempering
+from vegglue.diagnosis.search_state import rivals_among
 from vegglue.effects.library import library
 
 Kept = tuple[dict[str, float], tuple[tuple[str, ...], ...]]

@@ -10,12 +10,12 @@ from diagnoses import a_candidate_effect
 from vegglue.calibration.baseline import Baseline, baseline
 from vegglue.calibration.residual_screening import screen
 from vegglue.case.parameter_space import theta_at, z_at
-from vegglue.diagnosis import rivals_again
+from vegglue.diagnosis import search_state
 from vegglue.diagnosis.candidate_effects import candidate_effects_of
 from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.diagnose import diagnose_model
-from vegglue.diagnosis.rivals_again import Again, with_rivals_again
+from vegglue.diagnosis.search_state import Again, with_rivals_again
 from vegglue.engine.interface import Model, linearise
 from vegglue.progress import silent
 from vegglue.results.causes import Step
@@ -106,10 +106,10 @@ def test_an_effect_is_in_the_model_with_the_shapes_that_are_told() -> None:
 @pytest.mark.parametrize("lost", ["no flow without it", "no flow with it"])
 def test_a_step_stays_where_no_flow_is_found(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
     less = None if lost == "no flow without it" else "less"
-    monkeypatch.setattr(rivals_again, "candidate_in_case", lambda *_: None)
-    monkeypatch.setattr(rivals_again, "without_effect", lambda *_: less)
-    monkeypatch.setattr(rivals_again, "screen", lambda *_: "screening")
-    monkeypatch.setattr(rivals_again, "hypotheses_of", lambda *_: [Hypothesis("probe", "probe", 1.0, 0, None)])
+    monkeypatch.setattr(search_state, "candidate_in_case", lambda *_: None)
+    monkeypatch.setattr(search_state, "without_effect", lambda *_: less)
+    monkeypatch.setattr(search_state, "screen", lambda *_: "screening")
+    monkeypatch.setattr(search_state, "hypotheses_of", lambda *_: [Hypothesis("probe", "probe", 1.0, 0, None)])
     base = Baseline(*coarse_twin()[:1], None, None, None, None)
     known = {TAKEN: a_candidate_effect(TAKEN)}
     assert with_rivals_again(base, (a_step(TAKEN),), (), known, silent) == (base, (a_step(TAKEN),), known)

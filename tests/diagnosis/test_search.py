@@ -17,7 +17,7 @@ from vegglue.calibration.laws_in_case import LEAST_SPREAD, laws_in_case, product
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.diagnosis.discovered import Discovery
-from vegglue.diagnosis.search import discover_laws
+from vegglue.diagnosis.law_search import discover_laws
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser

@@ -12,10 +12,10 @@ from diagnoses import IMPLAUSIBLE, an_anomaly, candidate_laws_of
 
 from vegglue.case.config import load_case
 from vegglue.decision_constants import constants
-from vegglue.diagnosis import unlisted_laws
+from vegglue.diagnosis import candidate_effects
+from vegglue.diagnosis.candidate_effects import candidate_laws, clearly_a_law, laws_beside
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.search_state import PriorWeight, SearchState
-from vegglue.diagnosis.unlisted_laws import candidate_laws, clearly_a_law, laws_beside
 from vegglue.effects.grammar import LAWS
 from vegglue.results.causes import CandidateLaws, Step
 from vegglue.workflow.case_run import CaseRun
@@ -35,8 +35,8 @@ def suspected(
         p=p, of_each=np.array([9.0, 7.0, 1.0]), laws=laws, settings=[{"reference": 0.4}] * 2 + [{}],
         best_column=lambda law: law, gain=lambda law: -0.5,
     )  # fmt: skip
-    patched.setattr(unlisted_laws, "law_fingerprints", lambda *_: SimpleNamespace(laws=laws))
-    patched.setattr(unlisted_laws, "screen_laws", lambda *_: screening)
+    patched.setattr(candidate_effects, "law_fingerprints", lambda *_: SimpleNamespace(laws=laws))
+    patched.setattr(candidate_effects, "screen_laws", lambda *_: screening)
     kinds = tuple(SimpleNamespace(total=one) for one in rivals)
     base = SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None)))
     last: Any = SimpleNamespace(base=base, flagged=(), fingerprints=None, kinds=kinds)
@@ -56,7 +56,7 @@ def test_laws_are_told_that_hold_their_chance_together(monkeypatch: pytest.Monke
 def test_where_no_law_has_anything_to_act_on_none_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     last: Any = SimpleNamespace(base=SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None))),
                                 fingerprints=None)  # fmt: skip
-    monkeypatch.setattr(unlisted_laws, "law_fingerprints", lambda *_: SimpleNamespace(laws=[]))
+    monkeypatch.setattr(candidate_effects, "law_fingerprints", lambda *_: SimpleNamespace(laws=[]))
     assert candidate_laws(last, last, SearchState(), partial(laws_beside, last)) is None
 
 
@@ -73,7 +73,7 @@ def test_their_alarm_keeps_its_rate(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_beside_a_listed_effect_a_law_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(unlisted_laws, "log_evidence", lambda _: 0.0)
+    monkeypatch.setattr(candidate_effects, "log_evidence", lambda _: 0.0)
     step = Step("wind", ("wind",), (1.0,), (("wind",),), 200.0, 5.0, 1e-4)
     assert suspected(monkeypatch, SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, 8.0),))) is None
     assert suspected(monkeypatch, SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, 1.0),))) is not None
@@ -81,7 +81,7 @@ def test_beside_a_listed_effect_a_law_has_to_explain_clearly_more(monkeypatch: p
 
 def test_a_place_is_compared_with_laws_by_what_it_explained(monkeypatch: pytest.MonkeyPatch) -> None:
     """To explain more than laws it has to have gained more evidence."""
-    monkeypatch.setattr(unlisted_laws, "log_evidence", lambda _: 0.0)
+    monkeypatch.setattr(candidate_effects, "log_evidence", lambda _: 0.0)
     chances = []
     for gained in (1.0, 30.0):
         laws = suspected(

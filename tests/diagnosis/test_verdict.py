@@ -20,8 +20,7 @@ from vegglue.calibration.candidates import START_OFF_ENDS, Instrument
 from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.refits import Refit
-from vegglue.diagnosis.rivals import undecided_of
-from vegglue.diagnosis.search_state import rivals_in
+from vegglue.diagnosis.search_state import rivals_in, undecided_of
 from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival, Step
 from vegglue.results.verdict import (
     AT_BOUND,

@@ -16,16 +16,16 @@ from vegglue.calibration.candidates import start_amplitude
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named, with_additions
-from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.diagnosis.nominations import (
+from vegglue.diagnosis.comparison import excluded_by
+from vegglue.diagnosis.stepwise_choice import (
     Addition,
+    Names,
     choice_among,
     found_additions,
     tried_additions,
     values_found,
     values_tried,
 )
-from vegglue.diagnosis.stepwise_choice import Names
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.inference.weighted_statistics import root_mean_square

@@ -13,8 +13,7 @@ from vegglue.calibration.candidates import candidates_in_case
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
-from vegglue.diagnosis.comparison import held_out_rmse, model_score
-from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.diagnosis.comparison import excluded_by, held_out_rmse, model_score
 from vegglue.engine.interface import Model, linearise
 from vegglue.importers.confluence import case_from_confluence, flat_bed, holds_confluence
 from vegglue.workflow.case_run import CaseRun, calibrated

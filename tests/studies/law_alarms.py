@@ -23,7 +23,7 @@ from vegglue.calibration.noise import noise_of
 from vegglue.calibration.residual_screening import screen
 from vegglue.calibration.score_test import alarm_p
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.product import PRODUCT_ALARMS
+from vegglue.diagnosis.law_search import PRODUCT_ALARMS
 from vegglue.engine.interface import Point, linearise
 from vegglue.parallel import at_most
 

@@ -26,8 +26,8 @@ from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.discovered import Discovery
+from vegglue.diagnosis.law_search import laws_beyond
 from vegglue.diagnosis.refits import Refit
-from vegglue.diagnosis.search import laws_beyond
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.inference.weighted_statistics import root_mean_square

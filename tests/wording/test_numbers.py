@@ -14,7 +14,7 @@ from stored import ALL, a_header, write_chunks
 
 from vegglue.case.config import load_case
 from vegglue.cli.tables import show_ladder
-from vegglue.diagnosis.excluded_stations import MEASUREMENT
+from vegglue.diagnosis.comparison import MEASUREMENT
 from vegglue.flow.status import FAILED
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.open_questions import ProposedMeasurement, Question

@@ -17,7 +17,7 @@ from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.diagnosis.comparison import excluded_by
 from vegglue.engine.interface import Model, Point, Wanted, always
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError

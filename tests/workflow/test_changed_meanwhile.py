@@ -14,7 +14,7 @@ from reach import COARSE, write_reach
 import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.diagnosis.comparison import excluded_by
 from vegglue.errors import InputError
 from vegglue.inference import solve_ensemble
 from vegglue.results.result_files import stored_hash

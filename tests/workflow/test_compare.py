@@ -12,7 +12,7 @@ import vegglue
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case, Validation
-from vegglue.diagnosis.excluded_stations import MEASUREMENT, excluded_by
+from vegglue.diagnosis.comparison import MEASUREMENT, excluded_by
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.results.json_store import comparison_that_fits, write_comparison

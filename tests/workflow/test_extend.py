@@ -15,8 +15,9 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error, with_additions
-from vegglue.diagnosis.nominations import (
+from vegglue.diagnosis.stepwise_choice import (
     Addition,
+    Choice,
     found_additions,
     in_doubt,
     nominees,
@@ -24,7 +25,6 @@ from vegglue.diagnosis.nominations import (
     values_found,
     values_tried,
 )
-from vegglue.diagnosis.stepwise_choice import Choice
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.observations import read_observations
 from vegglue.results.causes import LocalAnomaly, Step

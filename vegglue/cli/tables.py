@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vegglue.cli.output import console, print_table
-from vegglue.diagnosis.comparison import held_out_rmse, improvement
-from vegglue.diagnosis.excluded_stations import exclusion_in_words
+from vegglue.diagnosis.comparison import exclusion_in_words, held_out_rmse, improvement
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, Kind
 from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.pages.homogeneity_words import REJECTED_BELOW

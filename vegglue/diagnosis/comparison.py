@@ -6,13 +6,16 @@ Held out: each section, or each experiment, is left out in turn and the model ca
     spread^2 = diag(C_oo + J_o V J_o' - 2 J_o V J' C^-1 C_o),
 
 C_o between those kept and those left out: what the model errs by in both is calibrated away with the parameters.
+
+Stations that a diagnosis excluded judge none of the compared models.
 """
 
 from collections.abc import Collection
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from scipy.special import ndtri
 
 from vegglue.arrays import Array, Mask
@@ -23,8 +26,47 @@ from vegglue.engine.interface import Model, linearise
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
+from vegglue.measurements.observations import SET_ASIDE
+from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
 from vegglue.wording.numbers import in_digits, so_many
+
+# What makes a measurement the same in a case and in those that extend it.
+MEASUREMENT = ["experiment", "kind", "section", "x", "y", "value"]
+
+
+def excluded_by(*found: Diagnosis) -> pd.DataFrame:
+    """The measurements that any of the diagnoses has flagged."""
+    flagged = [
+        one.predictions.station.iloc[list(one.errors.flagged)][MEASUREMENT] for one in found if one.errors.flagged
+    ]
+    return pd.concat(flagged, ignore_index=True).drop_duplicates() if flagged else pd.DataFrame(columns=MEASUREMENT)
+
+
+def excluding(model: Model, aside: pd.DataFrame) -> Model:
+    """The model, with these measurements not used."""
+    return replace(model, station=without_stations(model.station, aside))
+
+
+def without_stations(station: pd.DataFrame, aside: pd.DataFrame) -> pd.DataFrame:
+    """A table of stations, with these measurements not used."""
+    known = set(aside.itertuples(index=False, name=None))
+    there = np.array([row in known for row in station[MEASUREMENT].itertuples(index=False, name=None)], dtype=bool)
+    there &= station["used"].to_numpy()
+    return station.assign(used=station["used"].mask(there, False), reason=station["reason"].mask(there, SET_ASIDE))
+
+
+def exclusion_in_words(aside: pd.DataFrame) -> str:
+    """One sentence for a reader of what was compared, '' when nothing was set aside."""
+    if aside.empty:
+        return ""
+    places = "; ".join(
+        f"{' '.join(filter(None, (row.experiment, row.section)))} at x = {row.x:g}, y = {row.y:g} m"
+        for row in aside.itertuples()
+    )
+    many, they = ("1 station is", "it") if len(aside) == 1 else (f"{len(aside)} stations are", "them")
+    return f"{many} left out of every model, as the diagnosis set {they} aside: {places}."
+
 
 # What is left out in turn.
 By = Literal["sections", "experiments"]

@@ -1,32 +1,177 @@
 """One competition of everything that could explain a misfit: listed effects, places and instruments.
 
     E_j = ln B_j + ln prior_j
+    p_j ~ exp((E_j - max E) / w_j),   w_j = 1 + e^2 2 E_j
 
 Of each kind the most promising hypotheses are calibrated in earnest, and their evidence E is Laplace's (`refits`); of
 those of its kind that were not, it is the one to first order, corrected as that of the best of them. Instruments change
-no flow: to first order is exact for them but for the parameters. What is how likely before says `evidence`, and
-their chances are tempered, see `tempered_probabilities`.
+no flow: to first order is exact for them but for the parameters. What is how likely before is in `evidence`. Chances
+are tempered: e is the relative error of a fingerprint. That of an effect in nature differs from the model's, whose
+cells and laws are not nature's: if much is explained, errors count as w^(1/2) times as large.
+
+Where something at a place lies is searched between the spots of the screening, in the flow that it leaves:
+
+    ln B(x, y) = ln B_refit + b(x, y) - b(x_refit, y_refit)
+
+b is ln B to first order of the same thing at another place, in the flow with it (see `evidence`): there its own wake is
+seen at its true size. The best of such places is refitted, until none promises more. Of the evidence, the spots of the
+screening near by are replaced by the mean over these places, which stand closer.
+
+Hypotheses nearly as likely as the best are followed a step further, and what is vaguer has to lead. Something at a
+place says "none of what is known", which is vague: all places together have to lead all that is known by
+known_first_odds. Which of the places is taken need not be sure: they say the same. A place that nothing rivals within
+strong_odds is taken as it is: nothing is followed beside it.
 
 Smooth fields of a term (`field_scan`) are so free that they explain much of whatever is missing. They do not compete
 with a single cause, but with all that was accepted in the end.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
+from scipy.special import logsumexp
 
 from vegglue.arrays import Array
+from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
-from vegglue.calibration.candidates import Instrument, place_candidate
-from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Places
+from vegglue.calibration.candidates import Instrument, InstrumentKind, place_candidate, with_effect
+from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Places, places_around
 from vegglue.calibration.residual_screening import ConditionalScreening, Screening, conditional_screenings, refit_start
-from vegglue.calibration.score_test import HypothesisKind, kind_named
-from vegglue.diagnosis.place_search import found_place
+from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
-from vegglue.diagnosis.tempered_probabilities import tempered_probabilities, tempering
 from vegglue.effects.library import library
 from vegglue.progress import Progress, Watch
+
+# Odds beyond e^this are told as this: larger numbers say no more.
+LARGEST_LOG_ODDS = 100.0
+
+
+def tempered_probabilities(evidence: Array, trace_error: float | None = None) -> Array:
+    """p_j of E_j (k,) [-]; trace_error: relative error of a fingerprint [-]."""
+    weight = np.exp((evidence - evidence.max()) / tempering(evidence, trace_error))
+    return np.asarray(weight / weight.sum())
+
+
+def tempering(evidence: Array, trace_error: float | None = None) -> Array:
+    """w = 1 + e^2 2 E, at least 1, e the relative error of a fingerprint."""
+    error = constants().fingerprint_error if trace_error is None else trace_error
+    return np.asarray(1.0 + error**2 * 2.0 * np.maximum(evidence, 0.0))
+
+
+def tempered_odds(evidence: float, other: float) -> float:
+    """p_1 / p_2 of the chances of these two alone [-]."""
+    return float(np.exp(min((evidence - other) / float(tempering(np.array(min(evidence, other)))), LARGEST_LOG_ODDS)))
+
+
+def chances_in_set(evidence: Array) -> Array:
+    """p_j of the ln evidence of each (k,) [-], as in `competition`, with law_fingerprint_error."""
+    return tempered_probabilities(evidence, constants().law_fingerprint_error)
+
+
+# Distance of the places that are looked at around a refitted one, over that of the spots of the screening [-]. Chosen,
+# not measured.
+SHARE_OF_SPACING = 0.5
+# How often it is moved at most, and by how much ln B has to rise. Chosen, not measured: most are moved once or twice,
+# each time by two half lengths at most.
+MOST_MOVES, LEAST_RISE = 10, 0.3
+
+
+@dataclass(frozen=True)
+class Window:
+    """Places (spot,) around a refitted one: x, y [m], ln B of each, and its size there [unit of the effect]."""
+
+    x: Array
+    y: Array
+    log_factor: Array
+    gain: Array
+
+
+@dataclass(frozen=True)
+class FoundPlace:
+    """A refit where it explains most; log_evidence: of its term over all places; errors: root mean square distance in x
+    and y of where it may lie [m], by chances that allow for traces that are not nature's; spread: the same by the
+    evidence as it is.
+    """
+
+    refit: Refit
+    log_evidence: float
+    errors: tuple[float, float]
+    spread: tuple[float, float]
+
+
+def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot: int, refit: Refit) -> FoundPlace:
+    """Something refitted at a spot, moved to where it explains most."""
+    moved, window = _moved(search, places, refit, MOST_MOVES)
+    near = _is_near(places, spot, window)
+    # Elsewhere first-order evidence promises as much too much as at the spot that was refitted.
+    kept = refit.log_factor - float(log_factors(kind.scores, kind.size)[spot])
+    weight = np.concatenate([
+        kind.log_evidence[~near] + kept,
+        window.log_factor + kind.log_prior[spot] + 2.0 * np.log(SHARE_OF_SPACING),
+    ])  # fmt: skip
+    away = np.stack([
+        np.concatenate([places.x[~near], window.x]) - moved.shapes["x"],
+        np.concatenate([places.y[~near], window.y]) - moved.shapes["y"],
+    ])  # fmt: skip
+    total = float(logsumexp(weight))
+    errors, spread = (
+        _root_mean_square(away, chance) for chance in (tempered_probabilities(weight), np.exp(weight - total))
+    )
+    return FoundPlace(moved, total, errors, spread)
+
+
+def _root_mean_square(away: Array, chance: Array) -> tuple[float, float]:
+    """Of distances in x and y (2, spot), each with its chance (spot,)."""
+    along, across = np.sqrt(away**2 @ chance)
+    return float(along), float(across)
+
+
+def _moved(search: SearchModel, places: Places, refit: Refit, moves: int) -> tuple[Refit, Window]:
+    """The refit at the best place that it leads to, and the window around that."""
+    window = _window(search, places, refit)
+    best = int(np.argmax(window.log_factor))
+    if moves == 0 or window.log_factor[best] < refit.log_factor + LEAST_RISE:
+        return refit, window
+    shapes = {**refit.shapes, "x": round(float(window.x[best]), 2), "y": round(float(window.y[best]), 2)}
+    candidate = place_candidate(refit.candidate.effect, shapes, places.plausible)
+    if candidate.key in search.model.case.effects:  # it would take the place of what acts there
+        return refit, window
+    start = start_with(search.model.case, candidate, shapes, refit.fitted.point.z[:-1], float(window.gain[best]))
+    (there,) = refits_of(search, [RefitTrial(candidate, shapes, (start,))])
+    if there is None or there.log_factor < refit.log_factor + LEAST_RISE:
+        return refit, window
+    return _moved(search, places, there, moves - 1)
+
+
+def _window(search: SearchModel, places: Places, refit: Refit) -> Window:
+    """Places around a refit, to first order in the flow with it."""
+    point, noise, place = refit.fitted.point, search.noise, refit.shapes
+    model = replace(search.model, case=with_effect(search.model.case, refit.candidate, place))
+    around = places_around(model, point, places.term, place, SHARE_OF_SPACING)
+    traces = noise.whiten(noise.used(around.fingerprints))
+    own = int(np.argmin(np.hypot(around.x - place["x"], around.y - place["y"])))
+    # What it does where it is is taken away, and put elsewhere.
+    residual = noise.whiten(noise.residual(point.prediction)) + traces[:, own] * refit.amplitude
+    slope = noise.whiten(noise.used(point.slope[:, :-1]))
+    projected = score_test.project(slope, residual, point.z[:-1], traces)
+    size = projected.length * places.plausible
+    score = score_test.scores(projected, np.zeros(size.size, dtype=bool))
+    gain = expected_gain(score, projected.length, size)
+    first_order = log_factors(score, size)
+    return Window(around.x, around.y, first_order - first_order[own] + refit.log_factor, gain)
+
+
+def _is_near(places: Places, spot: int, window: Window) -> np.ndarray:
+    """Which spots of the size of that one the window has seen again (spot,)."""
+    alike = places.length == places.length[spot]
+    half = SHARE_OF_SPACING * np.array([places.length[spot], places.width[spot]])
+    within = (places.x >= window.x.min() - half[0]) & (places.x <= window.x.max() + half[0])
+    within &= (places.y >= window.y.min() - half[1]) & (places.y <= window.y.max() + half[1])
+    return np.asarray(alike & within)
+
 
 # Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
 # to be refitted, after w: e^-6 is one in 400. Chosen, not measured: more cost runs of the model.
@@ -231,3 +376,47 @@ def _instrument_hypotheses(screening: Screening) -> list[Hypothesis]:
         for kind in screening.kinds
         if kind.name in screening.instruments
     ]
+
+
+# Hypotheses of different kinds that are followed a step further at most: each costs a calibration and a screening.
+MOST_FOLLOWED = 3
+
+What = Literal["effect", "place", "instrument"]
+# Kinds of hypotheses that are in a list.
+KNOWN = ("effect", *get_args(InstrumentKind))
+
+
+def nearly_as_likely(hypotheses: Sequence[Hypothesis]) -> list[int]:
+    """Hypotheses of the best one's kind within same_kind_odds, of others within strong_odds; MOST_FOLLOWED at most,
+    what is known among them where any of it is so likely.
+    """
+    chance = chances_of(hypotheses)
+    odds = [
+        constants().same_kind_odds if one.kind == hypotheses[0].kind else constants().strong_odds for one in hypotheses
+    ]
+    likely = [j for j, p in enumerate(chance) if p * odds[j] >= chance[0]]
+    known = [j for j in likely if hypotheses[j].kind in KNOWN]
+    last = known[0] if known and known[0] not in likely[: MOST_FOLLOWED - 1] else None
+    return likely[:MOST_FOLLOWED] if last is None else [*likely[: MOST_FOLLOWED - 1], last]
+
+
+def chance_of_a_place(hypotheses: Sequence[Hypothesis], chances: Sequence[float]) -> float:
+    """That it is something at a place, of hypotheses with their chances (k,) [-]."""
+    return sum(chance for one, chance in zip(hypotheses, chances, strict=True) if one.kind not in KNOWN)
+
+
+def chosen_hypothesis(what: Sequence[What], evidence: Array, at_a_place: float) -> int | None:
+    """The likeliest of those followed; where that is a place, the likeliest listed effect that it leads by less than
+    known_first_odds, and None without one where places do not lead all that is known by so much.
+
+    what, evidence (k,): what each is, and the ln of its evidence [-]; at_a_place: chance of all places together, those
+    that were not followed among them.
+    """
+    best = int(np.argmax(evidence))
+    if what[best] != "place":
+        return best
+    ahead = (evidence[best] - evidence) / tempering(evidence[best])
+    listed = [j for j, one in enumerate(what) if one == "effect" and ahead[j] < np.log(constants().known_first_odds)]
+    if listed:
+        return min(listed, key=lambda j: float(ahead[j]))
+    return best if at_a_place >= constants().known_first_odds * (1.0 - at_a_place) else None

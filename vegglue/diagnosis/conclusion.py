@@ -1,4 +1,4 @@
-"""What a diagnosis concludes from its first and its last screening, as the values it is kept and told in."""
+"""What a diagnosis concludes from its first and its last screening: the verdict, the misfit by zone, all numbers."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -11,28 +11,27 @@ from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fingerprints import LEAST_DEPTH
 from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
 from vegglue.calibration.law_screening import LawScreening
-from vegglue.calibration.noise import with_correlation
+from vegglue.calibration.noise import Noise, covariance_of_data, with_correlation
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named
 from vegglue.case.case_effects import effect_of, parameters_of_effects
 from vegglue.case.centreline import on_map
-from vegglue.case.channel_geometry import half_width
+from vegglue.case.channel_geometry import channel_geometry, half_width
 from vegglue.case.grid import centreline_in
+from vegglue.case.gridded_site import cells_at
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.between_sections import largest_error_between
-from vegglue.diagnosis.candidate_effects import candidate_effects_of, not_excluded
+from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, clearly_a_law, not_excluded
 from vegglue.diagnosis.child_config import candidate_at
+from vegglue.diagnosis.competition import tempering
+from vegglue.diagnosis.errors_elsewhere import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
-from vegglue.diagnosis.held_out import HeldOutErrors, held_out_errors
-from vegglue.diagnosis.misfit_zones import misfit_zones
 from vegglue.diagnosis.search_state import SearchState, rivals_in
-from vegglue.diagnosis.tempered_probabilities import tempering
-from vegglue.diagnosis.unlisted_laws import candidate_laws, clearly_a_law
 from vegglue.effects.definition import Stage
-from vegglue.engine.interface import Model
+from vegglue.effects.surroundings import ChannelGeometry
+from vegglue.engine.interface import Model, Point
 from vegglue.inference.weighted_statistics import root_mean_square
-from vegglue.measurements.kinds import velocity_rows
+from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
 from vegglue.measurements.section_discharge import mismatched_discharges
 from vegglue.results.causes import (
     TERMS_AT_PLACES,
@@ -57,6 +56,75 @@ from vegglue.results.verdict import (
     make_verdict,
 )
 from vegglue.version import VERSION
+
+# Distance [m], in units of the half width of the floor, within which a station counts as at the edge of a patch.
+AT_EDGE = 0.2
+
+
+def misfit_zones(model: Model, noise: Noise, point: Point, aside: Sequence[int] = ()) -> pd.DataFrame:
+    """Mean misfit with its standard error, and chi2, by experiment, section and zone (floor, bank, plants, edge), of
+    all used stations but those set aside.
+
+    Zones of velocities across and of speeds are told apart from those of velocities along x: `floor (v)`.
+    """
+    used = model.station.iloc[noise.rows]
+    kinds = [kind_of(str(name)) for name in used["kind"]]
+    table = pd.DataFrame(
+        {
+            "experiment": used["experiment"].to_numpy(),
+            "section": [_section(kind, str(name)) for kind, name in zip(kinds, used["section"], strict=True)],
+            "zone": _zones(model, used, kinds),
+            "left": noise.residual(point.prediction),
+            "error": noise.data_error,
+        }
+    )
+    table = table.drop(index=list(aside))
+    rows = []
+    covariance = covariance_of_data(noise)
+    for (experiment, section, zone), part in table.groupby(["experiment", "section", "zone"], sort=False):
+        size, here = len(part), part.index.to_numpy()
+        rows.append(
+            {
+                "experiment": experiment,
+                "section": section,
+                "zone": zone,
+                "stations": size,
+                "mean": float(part["left"].mean()),
+                "standard_error": float(np.sqrt(covariance[np.ix_(here, here)].sum()) / size),
+                "chi2": float(((part["left"] / part["error"]) ** 2).sum()),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _section(kind: Kind, section: str) -> str:
+    """Gauges are one group; a discharge may have a section of its own."""
+    return section if kind.velocity else "gauges" if kind.instrument == "gauge" else section or "discharges"
+
+
+def _zones(model: Model, used: pd.DataFrame, kinds: Sequence[Kind]) -> list[str]:
+    x, y = used["x"].to_numpy(float), used["y"].to_numpy(float)
+    cells = zip(*cells_at(model.site, x, y), strict=True)
+    return [
+        _named(kind, channel_geometry(model.case, model.site, str(experiment)), *cell)
+        for experiment, kind, cell in zip(used["experiment"], kinds, cells, strict=True)
+    ]
+
+
+def _named(kind: Kind, ground: ChannelGeometry, i: int, j: int) -> str:
+    if not kind.velocity:
+        return kind.name
+    zone = _zone(ground, i, j)
+    return zone if kind.name == STREAMWISE else f"{zone} ({kind.column})"
+
+
+def _zone(geometry: ChannelGeometry, i: int, j: int) -> str:
+    if abs(geometry.edge[i, j, 0]) < AT_EDGE * geometry.half_width[i, j, 0]:
+        return "edge"
+    if geometry.planted[i, j, 0] >= 0.5:
+        return "plants"
+    return "bank" if geometry.bank[i, j, 0] else "floor"
+
 
 # Chance that errors alone make any effect look as strong, below which one is significant: the rate of the alarm beside
 # what was accepted (`diagnose`), which places, instruments and slack may keep silent all the same.

@@ -21,27 +21,32 @@ from vegglue.calibration.noise import with_unknown_errors
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.calibration.score_test import alarm_p
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.candidate_effects import candidate_effects_of
+from vegglue.diagnosis.candidate_effects import candidate_effects_of, laws_beside
 from vegglue.diagnosis.competition import (
     Hypothesis,
+    What,
+    chance_of_a_place,
     chances_of,
+    chosen_hypothesis,
     hypotheses_of,
+    nearly_as_likely,
     tempered_probabilities,
 )
 from vegglue.diagnosis.conclusion import assemble_diagnosis
-from vegglue.diagnosis.hypothesis_choice import What, chance_of_a_place, chosen_hypothesis, nearly_as_likely
 from vegglue.diagnosis.refits import Refit, calibrated_with, pruned
-from vegglue.diagnosis.rivals import (
+from vegglue.diagnosis.search_state import (
+    PriorWeight,
+    SearchState,
+    Undecided,
     anomaly_found,
     followed_further,
     instrument_found,
     place_followed_further,
+    refitted,
     step_found,
     undecided_of,
+    with_rivals_again,
 )
-from vegglue.diagnosis.rivals_again import refitted, with_rivals_again
-from vegglue.diagnosis.search_state import PriorWeight, SearchState, Undecided
-from vegglue.diagnosis.unlisted_laws import laws_beside
 from vegglue.engine.interface import Model
 from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError

@@ -215,9 +215,7 @@ def undeclared(effect: Effect) -> Iterator[Breach]:
         yield Breach(ContractRule.AMPLITUDE_FINITE)
         return
     if not (amplitude.low <= amplitude.off <= amplitude.high and amplitude.low < amplitude.high):
-        yield Breach(
-            ContractRule.OFF_WITHIN_SUPPORT, amplitude.name, (amplitude.off, amplitude.low, amplitude.high)
-        )
+        yield Breach(ContractRule.OFF_WITHIN_SUPPORT, amplitude.name, (amplitude.off, amplitude.low, amplitude.high))
     if not (0.0 < amplitude.scale <= amplitude.high - amplitude.low) or amplitude.power < 1:
         yield Breach(ContractRule.SCALE_WITHIN_SUPPORT)
     for shape in effect.shapes:

@@ -1,12 +1,30 @@
-"""What a search has found so far: effects, places and instruments, in the order in which they were accepted."""
+"""What a search has found so far, and how the winner of a competition becomes a step, a place or an instrument.
 
-from dataclasses import dataclass
+Where two things are missing, what explains the first may depend on the second: an effect that seemed sure is one of
+several, or another leads. The whole competition is then repeated without the effect, with what was accepted since.
+"""
 
-from vegglue.calibration.candidates import Instrument
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.calibration import score_test
+from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.candidates import Instrument, candidate_in_case, effect_entry, error_columns
+from vegglue.calibration.fit import chi2
+from vegglue.calibration.residual_screening import Screening, screen
+from vegglue.calibration.score_test import kind_named, prior_shrinkage
+from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import Hypothesis
+from vegglue.diagnosis.competition import Hypothesis, chances_of, hypotheses_of, tempered_odds
+from vegglue.diagnosis.refits import Refit, calibrated_with, without_effect
+from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues
-from vegglue.results.causes import FaultyInstrument, LocalAnomaly, Rival, Step
+from vegglue.normal_range import NORMAL95
+from vegglue.progress import Progress, Watch
+from vegglue.results.causes import CandidateEffect, FaultyInstrument, LocalAnomaly, Rival, Step
 
 
 @dataclass(frozen=True)
@@ -91,3 +109,252 @@ class SearchState:
     def accepted(self) -> int:
         """How many effects and places."""
         return len(self.steps) + len(self.places)
+
+
+# Share of the squared fingerprint of a spot above which an experiment is said to point at it.
+POINTS_AT_IT = 0.1
+
+
+def step_found(
+    screening: Screening, hypotheses: Sequence[Hypothesis], accepted: int, further: Baseline, p: float
+) -> Step:
+    """One hypothesis, a listed effect, as a step; further: the model with it; p: of the alarm."""
+    chance = chances_of(hypotheses)
+    listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
+    names = [hypotheses[j].name for j in listed]
+    columns = [hypotheses[j].column for j in listed]
+    cosine = score_test.cosines(screening.projected)[np.ix_(columns, columns)]
+    found, groups = rivals_among(names, chance[listed], cosine)
+    base, others = screening.base, _others(hypotheses, chance, "effect")
+    terms = {one.term for one in screening.fingerprints.places}
+    places = {
+        one.name: anomaly_found(screening, hypotheses, j, one.what)
+        for j, one in enumerate(hypotheses)
+        if one.name in others and one.kind in terms and isinstance(one.what, Refit)
+    }
+    step = Step(
+        accepted=hypotheses[accepted].name,
+        rivals=tuple(found),
+        chances=tuple(found.values()),
+        groups=groups,
+        chi2_before=chi2(base.noise, base.fitted.point),
+        chi2_after=further.fitted.chi2,
+        p_family=p,
+        others=others,
+        places=places,
+    )
+    # What is accepted on trial may lie outside the set of the likeliest.
+    return with_chances(step, step.accepted, found | others | {step.accepted: float(chance[accepted])})
+
+
+def shared_anew(told: Mapping[str, float], followed: Sequence[str], chance: Array) -> dict[str, float]:
+    """Chances by name, once some have been followed further: the chances that they have together are shared anew.
+
+    chance (k,): of each that was followed, were it one of them.
+    """
+    together = sum(told.get(name, 0.0) for name in followed)
+    return {**told, **{name: float(p) * together for name, p in zip(followed, chance, strict=True)}}
+
+
+def followed_further(step: Step, followed: Sequence[str], chance: Array) -> Step:
+    """The step once some hypotheses have been followed further, see `shared_anew`; the accepted one is among them."""
+    return with_chances(step, step.accepted, shared_anew(step.chance | step.others, followed, chance))
+
+
+def place_followed_further(
+    place: LocalAnomaly, followed: Sequence[Hypothesis], taken: int, evidence: Array
+) -> LocalAnomaly:
+    """The place, which was taken, with its odds against the others that have been followed; evidence (k,): ln [-]."""
+    odds = {
+        _rival_name(one): tempered_odds(float(evidence[taken]), float(of_one))
+        for one, of_one in zip(followed, evidence, strict=True)
+        if one.kind != place.term
+    }
+    return replace(place, odds=place.odds | odds)
+
+
+def _rival_name(one: Hypothesis) -> str:
+    """Under which a rival of a place is told: an effect by its own, another by its kind."""
+    return one.name if one.kind == "effect" else one.kind
+
+
+def undecided_of(hypotheses: Sequence[Hypothesis], followed: Sequence[str], chance: Array) -> Undecided:
+    """All hypotheses, none of them surely it, once some have been followed further, see `shared_anew`."""
+    told = dict(zip([one.name for one in hypotheses], map(float, chances_of(hypotheses)), strict=True))
+    told = shared_anew(told, followed, chance)
+    return Undecided(tuple(hypotheses), tuple(told[one.name] for one in hypotheses))
+
+
+def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
+    """The step with an accepted rival and other chances, by name; without what has become negligible."""
+    least = constants().rival_share * max(told.values())
+    possible = sorted({accepted, *(name for name in told if told[name] >= least)}, key=lambda name: -told[name])
+    rivals = tuple(name for name in possible if name in step.rivals or name == accepted)
+    groups = [group for old in step.groups if (group := tuple(name for name in old if name in rivals))]
+    if not any(accepted in group for group in groups):
+        groups.append((accepted,))
+    others = {name: told[name] for name in step.others if name in possible and name not in rivals}
+    chances = tuple(told[name] for name in rivals)
+    places = {name: place for name, place in step.places.items() if name in others}
+    return replace(
+        step, accepted=accepted, rivals=rivals, chances=chances, groups=tuple(groups), others=others, places=places
+    )
+
+
+def anomaly_found(screening: Screening, hypotheses: Sequence[Hypothesis], which: int, refit: Refit) -> LocalAnomaly:
+    """One hypothesis, something at a place, as a anomaly."""
+    best = hypotheses[which]
+    places = next(one for one in screening.fingerprints.places if one.term == best.kind)
+    kind = kind_named(screening.kinds, best.kind)
+    noise, column = screening.base.noise, places.fingerprints[:, best.column : best.column + 1]
+    white = noise.whiten(noise.used(column))[:, 0] ** 2
+    names = screening.base.model.station["experiment"].to_numpy()[noise.rows]
+    share = {str(name): float(white[names == name].sum() / white.sum()) for name in dict.fromkeys(names)}
+    # What was not worth a refit counts to first order.
+    evidence = {of.name: of.total for of in screening.kinds if of.name != "effect"}
+    evidence |= {_rival_name(one): one.log_evidence for one in reversed(hypotheses)}
+    return LocalAnomaly(
+        **refit.shapes,
+        x_error=best.errors[0],
+        y_error=best.errors[1],
+        x_spread=best.spread[0],
+        y_spread=best.spread[1],
+        term=best.kind,
+        effect=refit.candidate.effect.name,
+        amplitude=refit.amplitude,
+        interval95=refit.interval95,
+        unit=refit.candidate.amplitude.unit,
+        score=float(kind.scores[best.column]),
+        experiments=tuple(name for name, part in share.items() if part > POINTS_AT_IT),
+        odds={name: tempered_odds(best.log_evidence, other) for name, other in evidence.items() if name != best.kind},
+        plausible=places.plausible,
+    )
+
+
+def instrument_found(screening: Screening, best: Hypothesis, one: Instrument) -> FaultyInstrument:
+    """The best hypothesis, an instrument, with its offset: s^2 o' C^-1 r / (1 + s^2 o' C^-1 o), o 1 in its readings."""
+    noise = screening.base.noise
+    kind = kind_named(screening.kinds, best.kind)
+    length, score = float(kind.projected.length[best.column]), float(kind.scores[best.column])
+    shrunk = float(prior_shrinkage(kind.size[best.column]))
+    offset, spread = shrunk * score / length, np.sqrt(shrunk) / length
+    station = screening.base.model.station.iloc[noise.rows[one.readings[0]]]
+    return FaultyInstrument(
+        kind=one.kind,
+        x=one.x,
+        y=one.y,
+        stations=tuple(int(noise.rows[row]) for row in one.readings),
+        offset=offset,
+        interval95=(offset - NORMAL95 * spread, offset + NORMAL95 * spread),
+        unit=kind_of(str(station["kind"])).unit,
+        log_factor=best.log_evidence,
+        factor=_factor(screening, one),
+    )
+
+
+def _factor(screening: Screening, one: Instrument) -> float:
+    """What a probe reads over what is there [-], NaN where an offset explains its readings as well, to strong_odds."""
+    noise, point = screening.base.noise, screening.base.fitted.point
+    columns = error_columns(one, noise.value)
+    if columns.shape[1] < 2:
+        return float("nan")
+    residual, both = noise.whiten(noise.residual(point.prediction)), noise.whiten(columns)
+    projected = score_test.project(screening.whitened_slopes, residual, point.z, both)
+    offset, factor = score_test.scores(projected, np.zeros(2))
+    if 0.5 * (factor**2 - offset**2) < np.log(constants().strong_odds):
+        return float("nan")
+    return float(1.0 / (1.0 - factor / projected.length[1]))
+
+
+def rivals_among(
+    names: Sequence[str], chance: Array, cosine: Array
+) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
+    """The chance of each effect in the fewest groups that hold set_chance of what listed effects have together, the
+    likeliest first, and these groups.
+
+    chance (k,); cosine (k, k): between projected fingerprints.
+    """
+    near = chance >= constants().rival_share * chance.max()
+    alike = np.where(near & near[:, None], cosine, 0.0)
+    kept = score_test.fewest_groups(
+        score_test.alike_groups(range(len(names)), alike), chance, constants().set_chance * float(chance.sum())
+    )
+    likeliest = sorted((j for group in kept for j in group), key=lambda j: -chance[j])
+    return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
+
+
+def _others(hypotheses: Sequence[Hypothesis], chance: Array, kind: str) -> dict[str, float]:
+    """Chance of the hypotheses of other kinds, where it is not negligible against the best."""
+    return {
+        one.name: float(p)
+        for one, p in zip(hypotheses, chance, strict=True)
+        if one.kind != kind and p >= constants().rival_share * chance.max()
+    }
+
+
+# The model, the steps and the candidate_effects, as they are now.
+Again = tuple[Baseline, tuple[Step, ...], dict[str, CandidateEffect]]
+
+
+def with_rivals_again(
+    base: Baseline,
+    steps: Sequence[Step],
+    flagged: tuple[int, ...],
+    candidate_effects: Mapping[str, CandidateEffect],
+    watch: Watch,
+) -> Again:
+    """The model with the best rival of every step, the steps with the chances as they are now, and the effects with the
+    amplitudes of their refits.
+
+    steps: of effects that were accepted before what was last: an effect, something at a place, an instrument; flagged:
+    readings set aside, indices among the used stations.
+    """
+    kept, known = list[Step](), dict(candidate_effects)
+    for step in steps:
+        base, step, hypotheses = _again(base, step, flagged, watch)
+        known |= refitted(hypotheses, known)
+        kept.append(step)
+    return base, tuple(kept), known
+
+
+def refitted(
+    hypotheses: Sequence[Hypothesis], candidate_effects: Mapping[str, CandidateEffect]
+) -> dict[str, CandidateEffect]:
+    """The listed effects that were refitted, with the amplitudes of their refits."""
+    return {
+        one.name: one.what.of(candidate_effects[one.name])
+        for one in hypotheses
+        if one.kind == "effect" and one.name in candidate_effects and isinstance(one.what, Refit)
+    }
+
+
+def _again(
+    base: Baseline, step: Step, flagged: tuple[int, ...], watch: Watch
+) -> tuple[Baseline, Step, Sequence[Hypothesis]]:
+    """One step and what competed, the best at the values of its shapes that it competed with; as it was where no flow
+    is found without its effect, or with any.
+    """
+    watch(Progress(f"comparing {step.accepted} again with all else"))
+    less = without_effect(base, candidate_in_case(base.model.case, step.accepted))
+    if less is None:
+        return base, step, ()
+    screening = screen(less, flagged)
+    hypotheses = hypotheses_of(screening, watch)
+    listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
+    if step.accepted not in [hypotheses[j].name for j in listed]:
+        return base, step, ()
+    best = hypotheses[listed[0]].what
+    assert isinstance(best, Refit)
+    if not _is_at_work(base.model.case, best):
+        further = calibrated_with(less, best)
+        if further is None:
+            return base, step, ()
+        base = further
+    again = step_found(screening, hypotheses, listed[0], base, step.p_family)
+    return base, replace(again, chi2_before=step.chi2_before, chi2_after=step.chi2_after), hypotheses
+
+
+def _is_at_work(case: Case, refit: Refit) -> bool:
+    """Whether an effect acts in the case as it was refitted: at other values of its shapes it is another."""
+    one = refit.candidate
+    return case.effects.get(one.key) == effect_entry(one, one.parameter, refit.shapes)

@@ -23,7 +23,7 @@ from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_ha
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_MEMBERS
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
-from vegglue.diagnosis.excluded_stations import excluded_by, excluding
+from vegglue.diagnosis.comparison import excluded_by, excluding
 from vegglue.engine.interface import Model, linearise_from
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError

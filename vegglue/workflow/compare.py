@@ -7,8 +7,13 @@ from pathlib import Path
 import pandas as pd
 
 from vegglue.case.schema import Case
-from vegglue.diagnosis.comparison import held_out_rmse, model_score, model_score_in_short
-from vegglue.diagnosis.excluded_stations import MEASUREMENT, exclusion_in_words
+from vegglue.diagnosis.comparison import (
+    MEASUREMENT,
+    exclusion_in_words,
+    held_out_rmse,
+    model_score,
+    model_score_in_short,
+)
 from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread

@@ -11,10 +11,9 @@ from vegglue.case.messages import nearest_effect
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import child_tree
-from vegglue.diagnosis.discovered import Discovery, LawFound
-from vegglue.diagnosis.effect_file import effect_name, effect_text
-from vegglue.diagnosis.excluded_stations import excluding, exclusion_in_words
-from vegglue.diagnosis.search import discover_laws
+from vegglue.diagnosis.comparison import excluding, exclusion_in_words
+from vegglue.diagnosis.discovered import Discovery, LawFound, effect_name, effect_text
+from vegglue.diagnosis.law_search import discover_laws
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread

@@ -13,7 +13,7 @@ from vegglue.case.parameter_space import refuse_without_parameters, theta_at
 from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import names_in_files
-from vegglue.diagnosis.excluded_stations import without_stations
+from vegglue.diagnosis.comparison import without_stations
 from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields

@@ -15,10 +15,16 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.resolved_config import as_yaml, case_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
-from vegglue.diagnosis.comparison import model_score
-from vegglue.diagnosis.excluded_stations import excluded_by
-from vegglue.diagnosis.nominations import Addition, choice_among, places_tried, tried_additions, values_tried
-from vegglue.diagnosis.stepwise_choice import Choice, Names
+from vegglue.diagnosis.comparison import excluded_by, model_score
+from vegglue.diagnosis.stepwise_choice import (
+    Addition,
+    Choice,
+    Names,
+    choice_among,
+    places_tried,
+    tried_additions,
+    values_tried,
+)
 from vegglue.engine.interface import Model
 from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError, shown_path

@@ -8,7 +8,7 @@ import numpy as np
 
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.excluded_stations import without_stations
+from vegglue.diagnosis.comparison import without_stations
 from vegglue.errors import InputError, shown_command
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refinable, refine

@@ -12,7 +12,7 @@ from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.diagnosis.candidate_effects import POWER_QUANTILE
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
-from vegglue.diagnosis.excluded_stations import excluded_by
+from vegglue.diagnosis.comparison import excluded_by
 from vegglue.diagnosis.next_measurement import Explanation, MeasurementWorth, worth_of_measurements
 from vegglue.effects.grammar import LAWS
 from vegglue.engine.model import with_compilation

@@ -7,7 +7,7 @@ from pathlib import Path
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
-from vegglue.diagnosis.excluded_stations import without_stations
+from vegglue.diagnosis.comparison import without_stations
 from vegglue.errors import InputError, shown_command, shown_path
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.pages.overview import write_overview

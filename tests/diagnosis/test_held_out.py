@@ -10,7 +10,7 @@ from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.noise import with_grid_error
-from vegglue.diagnosis.unseen import UnseenErrors, unseen_errors
+from vegglue.diagnosis.errors_elsewhere import HeldOutErrors, held_out_errors
 from vegglue.engine.interface import Point
 from vegglue.engine.newton import NEWTON
 
@@ -25,14 +25,14 @@ def base() -> Baseline:
 
 def told(
     base: Baseline, monkeypatch: pytest.MonkeyPatch, error: Array, slope: Array | float = 0.0, **columns: object
-) -> UnseenErrors:
+) -> HeldOutErrors:
     """Where predictions at unseen stations are off by error (station,); slope (station, p) there."""
     station = stations_of(CASE_OF_TWINS, SECTIONS, POINTS).assign(value=0.4 + error).assign(**columns)
     whole = np.zeros((len(station), base.fitted.point.z.size)) + slope
     point = Point(base.fitted.point.z, np.full(len(station), 0.4), whole, {})
-    monkeypatch.setattr("vegglue.diagnosis.unseen.linearise", lambda *_: point)
+    monkeypatch.setattr("vegglue.diagnosis.errors_elsewhere.linearise", lambda *_: point)
     unseen = SimpleNamespace(case=CASE_OF_TWINS, site=base.model.site, station=station, engine=NEWTON)
-    return unseen_errors(base, unseen)
+    return held_out_errors(base, unseen)
 
 
 def drawn(size: float) -> Array:
@@ -66,7 +66,7 @@ def test_what_parameters_and_grid_are_uncertain_by_is_expected(base: Baseline, m
 def test_the_models_own_error_is_expected(base: Baseline, monkeypatch: pytest.MonkeyPatch) -> None:
     count = len(stations_of(CASE_OF_TWINS, SECTIONS, POINTS))
     monkeypatch.setattr(
-        "vegglue.diagnosis.unseen.model_error_columns", lambda *_: np.full((count, 2), 0.02 / np.sqrt(2.0))
+        "vegglue.diagnosis.errors_elsewhere.model_error_columns", lambda *_: np.full((count, 2), 0.02 / np.sqrt(2.0))
     )
     assert told(base, monkeypatch, drawn(np.hypot(0.01, 0.02))).ratio == pytest.approx(1.0, rel=0.1)
 
@@ -82,12 +82,12 @@ def test_only_velocities_that_are_used_count(base: Baseline, monkeypatch: pytest
 
 
 def test_no_flow_for_what_was_not_seen_is_no_agreement(base: Baseline, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vegglue.diagnosis.unseen.linearise", lambda *_: None)
+    monkeypatch.setattr("vegglue.diagnosis.errors_elsewhere.linearise", lambda *_: None)
     station = stations_of(CASE_OF_TWINS, SECTIONS, POINTS)
     unseen = SimpleNamespace(case=CASE_OF_TWINS, site=base.model.site, station=station, engine=NEWTON)
-    assert unseen_errors(base, unseen).ratio == np.inf
+    assert held_out_errors(base, unseen).ratio == np.inf
     none = SimpleNamespace(case=CASE_OF_TWINS, site=base.model.site, station=station.assign(used=False), engine=NEWTON)
-    assert np.isnan(unseen_errors(base, none).ratio)
+    assert np.isnan(held_out_errors(base, none).ratio)
 
 
 @pytest.mark.parametrize("readings", [1, 3, 30])

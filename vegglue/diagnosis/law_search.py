@@ -5,6 +5,10 @@ Else the most promising laws are calibrated with the model and ranked by their e
 and instruments, which are as likely before as in a diagnosis; all laws together are a tenth as likely as all listed
 effects (`law_screening`), and so is something at a place, which is as vague. A law that is best is looked at again for
 products with another quantity (`product`).
+
+Products: the best law is in the model, calibrated. While errors alone leave as much for products, none is reported;
+else the best of them are calibrated, and one is reported if it is likelier than all else that could explain what is
+left.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,19 +16,83 @@ from dataclasses import replace
 
 import numpy as np
 
-from vegglue.calibration.baseline import Baseline, baseline
-from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
+from vegglue.calibration.baseline import Baseline, SearchModel, baseline
+from vegglue.calibration.candidates import with_effect
+from vegglue.calibration.fingerprints import Fingerprints
+from vegglue.calibration.law_screening import (
+    LARGEST_GAIN,
+    LawScreening,
+    law_fingerprints,
+    screen_laws,
+    screen_products,
+)
+from vegglue.calibration.laws_in_case import LawInCase
+from vegglue.case.parameter_space import theta_at
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.chances import chances_in_set
-from vegglue.diagnosis.competition import REACH, Hypothesis, hypotheses_of
+from vegglue.diagnosis.competition import REACH, Hypothesis, chances_in_set, hypotheses_of, tempering
 from vegglue.diagnosis.discovered import Discovery, LawFound, ProductFound
-from vegglue.diagnosis.product import product_beside
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
-from vegglue.diagnosis.tempered_probabilities import tempering
 from vegglue.effects.grammar import SAME_AS, Law
 from vegglue.engine.interface import Model
 from vegglue.engine.model import with_compilation
 from vegglue.progress import Progress, Watch
+
+# How often errors alone sound the alarm of products [-]: it comes on top of that of laws, as theirs in a diagnosis.
+PRODUCT_ALARMS = 0.01
+# Products that are calibrated. Chosen, not measured: each costs a fit.
+PRODUCTS_REFITTED = 2
+
+
+def product_beside(
+    search: SearchModel, listed: Fingerprints, law: LawInCase, refit: Refit, watch: Watch
+) -> ProductFound | None:
+    """The product that explains what a law leaves; None if none is needed.
+
+    search: without the law; listed: fingerprints of what is listed there; refit: of the law.
+    """
+    watch(Progress("looking for what that law changes with"))
+    case = with_effect(search.model.case, refit.candidate, refit.shapes)
+    base = Baseline(replace(search.model, case=case), search.noise, refit.fitted, None, None)
+    screening = screen_products(base, listed, law, refit.shapes.get("reference"))
+    if screening is None or screening.p > PRODUCT_ALARMS or screening.kind.total < screening.others:
+        return None
+    evidence, full = screening.kind.log_evidence, screening.full.search
+    of_each = [np.flatnonzero(screening.law_of == j) for j in range(len(screening.products))]
+    best_columns = [int(columns[np.argmax(evidence[columns])]) for columns in of_each]
+    columns = sorted(best_columns, key=lambda column: -evidence[column])[:PRODUCTS_REFITTED]
+    trials = []
+    for column in columns:
+        one, shapes = screening.products[screening.law_of[column]].candidate, screening.settings[column]
+        most = LARGEST_GAIN * one.amplitude.scale
+        gain = float(np.clip(float(screening.kind.gain[column]), -most, most))
+        trials.append(RefitTrial(one, shapes, (start_with(full.model.case, one, shapes, full.point.z, gain),)))
+    refits = refits_of(full, trials, watch)
+    ends = [(column, one) for column, one in zip(columns, refits, strict=True) if one is not None]
+    if not ends:
+        return None
+    prior = screening.kind.log_prior
+    column, best = max(ends, key=lambda end: end[1].log_factor + prior[end[0]])
+    total = screening.kind.total + best.log_factor + prior[column] - evidence[column]
+    chance = float(chances_in_set(np.array([total, screening.others, 0.0]))[0])
+    if chance < 0.5:
+        return None
+    one = screening.products[screening.law_of[column]]
+    found = LawFound(
+        law=one.law,
+        same_as="",
+        reference=best.shapes.get("reference"),
+        scale=best.candidate.amplitude.scale,
+        strength=best.amplitude,
+        interval95=best.interval95,
+        chance=chance,
+        log_evidence=total,
+        seen=one.seen,
+        alike=screening.alike(column),
+        first=best.shapes.get("first"),
+    )
+    theta = theta_at(full.model.case, best.fitted.point.z[:-1])
+    return ProductFound(found, best, float(theta[refit.candidate.parameter][0]))
+
 
 # Quantities of terms of which a law is calibrated at most; as many as listed effects in a diagnosis. Of the first two,
 # which decide what is told, two forms are. Chosen, not measured: each costs a fit.
