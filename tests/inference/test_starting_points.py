@@ -12,10 +12,9 @@ from vegglue.calibration.fit import MapEstimate
 from vegglue.calibration.noise import noise_of, with_correlation
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import z_at
-from vegglue.engine.interface import Point, linearise
+from vegglue.engine.interface import Engine, Point, linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
-from vegglue.inference import posterior_modes
 from vegglue.inference.posterior_modes import (
     distinct_modes,
     find_modes,
@@ -25,7 +24,6 @@ from vegglue.inference.posterior_modes import (
 )
 from vegglue.inference.refine import log_posterior, refine
 from vegglue.measurements.observations import read_observations
-from vegglue.pages.posterior_words import posterior_in_words
 from vegglue.parallel import at_most
 from vegglue.progress import silent
 from vegglue.results.posterior import Posterior
@@ -54,7 +52,6 @@ def test_points_of_the_prior_lead_to_the_same_posterior(reach: SolvedReach, refi
     for name, quantiles in refined.marginals.quantiles.items():
         sd = refined.marginals.sd[name]
         assert found.marginals.quantiles[name] == pytest.approx(quantiles, abs=0.15 * sd)
-    assert "of the prior" in posterior_in_words(found)[0]
 
 
 def test_points_of_the_prior_are_tried_on_coarse_cells(tmp_path: Path) -> None:
@@ -71,7 +68,7 @@ def test_points_of_the_prior_are_tried_on_coarse_cells(tmp_path: Path) -> None:
 
 def test_without_a_prior_nothing_is_tried(reach: SolvedReach) -> None:
     model = model_of(*reach[:2])
-    with pytest.raises(InputError, match="expected a prior or more"):
+    with pytest.raises(InputError, match=model.case.name):
         points_of_prior(replace(model, case=model.case.model_copy(update={"parameters": {}})))
 
 
@@ -101,9 +98,15 @@ def test_what_stands_out_is_standard_normal_otherwise(reach: SolvedReach) -> Non
     assert np.argmax(np.abs(standardised_residual(replace(noise, value=value), point))) == 4
 
 
-def test_where_no_flow_is_found_from_coarse_cells_the_search_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def lost_from_coarse_cells(engine: Engine) -> Engine:
+    """One that finds no flow at a place from the flow there on cells of another size."""
+    return replace(
+        engine, linearise=lambda model, z, near, wanted:
+        None if near is not None and near.z is z else engine.linearise(model, z, near, wanted),
+    )  # fmt: skip
+
+
+def test_where_no_flow_is_found_from_coarse_cells_the_search_goes_on(tmp_path: Path) -> None:
     """A floodplain ended without a posterior: from the one mode on coarse cells no flow was found on its own."""
     case = load_case(write_reach(tmp_path, ("cell: [1.0, 0.5]", "cell: [0.5, 0.375]"), STATED_ERRORS))
     observations = read_observations(case)
@@ -111,7 +114,6 @@ def test_where_no_flow_is_found_from_coarse_cells_the_search_goes_on(
     with at_most(1):
         tried = points_of_prior(model)
         usual = find_modes(model, noise, tried, watch=silent)
-        monkeypatch.setattr(posterior_modes, "_refine", lambda *_: None)
-        anew = find_modes(model, noise, tried, watch=silent)
+        anew = find_modes(replace(model, engine=lost_from_coarse_cells(model.engine)), noise, tried, watch=silent)
     assert usual.on_coarse, "there are coarse cells to begin with"
     assert anew.fits[0].objective == pytest.approx(usual.fits[0].objective, abs=0.1)
