@@ -27,7 +27,7 @@ LONGEST = [
         "workflow/test_run.py",
         "end_to_end/test_own_engine_faults.py",
         "end_to_end/test_faults.py",
-        "inference/test_another_processor.py",
+        "inference/test_solve_ensemble.py",
         "diagnosis/test_effect_contract.py",
         "end_to_end/test_kills.py",
         "studies/test_ranks_of_twins.py",

@@ -1,6 +1,9 @@
-"""A baseline and its point on cells of twice the size."""
+"""A baseline, its point on coarse cells, and how long it is kept."""
 
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +11,11 @@ from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 
 from vegglue.arrays import Array
 from vegglue.calibration import baseline
+from vegglue.calibration.baseline import MOST_KEPT, Baseline, kept_baseline
+from vegglue.case.config import load_case
 from vegglue.engine.interface import Model, Point
+from vegglue.engine.model import model_of
+from vegglue.measurements.observations import read_observations
 
 
 @pytest.mark.parametrize("away", [0.0, 0.1])
@@ -27,3 +34,70 @@ def test_a_flow_on_coarse_cells_is_found_once_at_a_place(away: float, monkeypatc
     assert found is not None
     assert np.array_equal(found.z, base.fitted.point.z)
     assert len(places) == (away > 0.0)
+
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    case = load_case(ROOT / "configs" / "twin.yaml")
+    return model_of(case, read_observations(case))
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Model]:
+    """The models that a baseline was computed of."""
+    models: list[Model] = []
+
+    def computed(model: Model) -> Any:
+        models.append(model)
+        return Baseline(model, SimpleNamespace(), SimpleNamespace(), None, None)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(baseline, "baseline", computed)
+    monkeypatch.setattr(baseline, "_kept", type(baseline._kept)())
+    return models
+
+
+def named(model: Model, **changes: Any) -> Model:
+    return replace(model, case=model.case.model_copy(update=changes))
+
+
+def test_the_same_model_is_computed_once_whatever_it_is_called(model: Model, made: list[Model]) -> None:
+    other = named(model, name="other", title="of another name")
+    first, second = kept_baseline(model), kept_baseline(other)
+    assert len(made) == 1
+    assert second.fitted is first.fitted
+    assert second.model.case.name == "other"
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        lambda model: replace(model, station=model.station.assign(value=model.station["value"] + 1e-9)),
+        lambda model: replace(model, station=model.station.assign(used=False)),
+        lambda model: replace(model, site=replace(model.site, bed=model.site.bed + 1e-9)),
+        lambda model: named(model, eddy_viscosity=0.02),
+        lambda model: named(model, model_error=model.case.model_error.model_copy(update={"friction": 0.5})),
+        lambda model: named(model, parameters=dict(list(model.case.parameters.items())[:-1])),
+    ],
+)
+def test_another_model_is_computed_by_itself(changed: Any, model: Model, made: list[Model]) -> None:
+    kept_baseline(model)
+    kept_baseline(changed(model))
+    assert len(made) == 2
+
+
+def test_codes_of_others_are_asked_each_time(model: Model, made: list[Model]) -> None:
+    of_others = replace(model, engine=replace(model.engine, name="command"))
+    with_file = named(model, effect_file=Path("own.py"))
+    for one in (of_others, of_others, with_file, with_file):
+        kept_baseline(one)
+    assert len(made) == 4
+
+
+def test_no_more_are_kept_than_a_case_and_its_child(model: Model, made: list[Model]) -> None:
+    models = [named(model, eddy_viscosity=0.01 * (1 + k)) for k in range(MOST_KEPT + 1)]
+    for one in [*models, models[0]]:
+        kept_baseline(one)
+    assert len(made) == MOST_KEPT + 2

@@ -1,4 +1,4 @@
-"""Screening of a residual that is errors only: the whole way, errors estimated as for any other."""
+"""Screening of a residual that is errors only, the whole way; and conditional screenings."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,16 +6,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.stats
-from linear_baseline import at_best, stations_of
+from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
 from vegglue.arrays import Array
+from vegglue.calibration.baseline import SearchModel, search_model
 from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Fingerprints, Places
-from vegglue.calibration.fit import at_point, chi2, covariance
+from vegglue.calibration.fit import at_point, chi2, covariance, objective
 from vegglue.calibration.noise import noise_of, with_correlation
-from vegglue.calibration.residual_screening import Screening, _estimated_noise, screen
+from vegglue.calibration.residual_screening import (
+    MOST_CONDITIONAL,
+    OFF,
+    Screening,
+    _estimated_noise,
+    conditional_places,
+    screen,
+)
 from vegglue.calibration.score_test import HypothesisKind, alarm_p
 from vegglue.case.config import load_case
+from vegglue.case.schema import EffectEntry
 from vegglue.effects.definition import Amplitude
+from vegglue.engine.interface import Point
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
 STATION = stations_of(CASE, ("A", "B"), 6)
@@ -185,3 +195,40 @@ def test_a_parameter_that_is_known_to_a_thousandth_leaves_errors_as_they_are(len
         noise, (slope, 0.5 * slope), noise.error * random.standard_normal(noise.rows.size), np.array([5.0])
     )
     assert (found.correlation, found.scale) == (0.0, 1.0)
+
+
+SECTIONS, PARAMETERS = ("A", "B"), len(CASE_OF_TWINS.parameters)
+
+
+def calibrated() -> SearchModel:
+    slope, values = measured_linearly(SECTIONS, 10, PARAMETERS)
+    return search_model(at_best(CASE_OF_TWINS, stations_of(CASE_OF_TWINS, SECTIONS, 10), values, slope))
+
+
+def test_there_one_parameter_is_in_the_middle_and_the_others_fit_best() -> None:
+    search = calibrated()
+    z, places = search.point.z, conditional_places(search)
+    off = sorted(np.flatnonzero(np.abs(z) > OFF), key=lambda j: -abs(z[j]))[:MOST_CONDITIONAL]
+    assert len(places) == len(off) > 0
+    for j, place in zip(off, places, strict=True):
+        assert abs(place[j]) < 1e-12
+        here = objective_at(search, place)
+        for k in range(z.size):
+            step = 0.01 * np.eye(z.size)[k] * (k != j)
+            assert objective_at(search, place + step) >= here
+            assert objective_at(search, place - step) >= here
+
+
+def objective_at(search: SearchModel, z: np.ndarray) -> float:
+    slope = search.point.slope
+    return objective(search.noise, Point(z, slope @ z, slope, {}))
+
+
+def test_amplitudes_of_effects_and_what_lies_as_expected_are_left_alone() -> None:
+    search = calibrated()
+    case, names = search.model.case, search.model.names
+    middle = replace(search.point, z=np.zeros(PARAMETERS))
+    assert conditional_places(replace(search, point=middle)) == []
+    entry = EffectEntry(effect="wind", values=dict(zip("abcdefgh", names, strict=False)))
+    of_effects = replace(search.model, case=case.model_copy(update={"effects": {"wind": entry}}))
+    assert conditional_places(replace(search, model=of_effects)) == []

@@ -1,4 +1,4 @@
-"""What is shown of a posterior: commands that can be copied whatever the path of the config, and how a misfit is judged."""
+"""What is shown of a posterior: commands that can be copied, and how a misfit is judged."""
 
 from dataclasses import replace
 from pathlib import Path

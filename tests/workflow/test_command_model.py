@@ -241,4 +241,3 @@ def test_what_cannot_be_compared_has_no_distance() -> None:
         unknown = command_compared(place, 1, np.full(2, np.nan), failure, linear, error)
         assert np.isnan(unknown.errors)
         assert unknown.failure == failure.removesuffix(".")
-

@@ -1,22 +1,37 @@
-"""Spots of something unlisted: their fingerprints are responses to the effects that stand for them."""
+"""Fingerprints of spots and of laws are responses to the effects that stand for them, on cells of any size."""
+
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from coarse_twin import CASE, coarse_twin
 
-from vegglue.calibration.candidates import cause_of, place_candidate
+from vegglue.calibration.baseline import SearchModel
+from vegglue.calibration.candidates import Candidate, cause_of, place_candidate
 from vegglue.calibration.fingerprints import (
     EFFECT_AT_PLACE,
     SPOT_LENGTHS,
+    Fingerprints,
     Places,
+    fingerprints_of,
     places_around,
     places_of,
     plausible_size,
 )
+from vegglue.calibration.laws_in_case import law_traces
+from vegglue.calibration.model_error import model_error_columns
+from vegglue.calibration.noise import noise_of
 from vegglue.case.channel_geometry import half_width
+from vegglue.case.config import load_case
+from vegglue.case.schema import ModelError
+from vegglue.effects.grammar import LAWS
 from vegglue.effects.library import library
-from vegglue.engine.interface import Model, Point, flow_at_centres, responses
+from vegglue.engine.interface import Model, Point, by_itself, flow_at_centres, linearise, responses
+from vegglue.engine.model import coarser, model_of
 from vegglue.flow.local_changes import Term
+from vegglue.measurements.observations import read_observations
+from vegglue.workflow.case_run import CaseRun
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +117,88 @@ def test_water_too_shallow_for_a_spot_has_none(flowing: tuple[Model, Point], mon
     for one in places_of(*flowing, half_width(flowing[0].site)):
         assert (one.x.size, one.fingerprints.shape[1]) == (0, 0)
         assert np.isfinite(one.plausible)
+
+
+CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
+NAMES = (
+    "law_floor_speed_power", "law_bank_shear_step", "law_bank_depth_hump", "law_plants_along_stretch",
+    "law_viscosity_offset_ramp", "law_viscosity_front_fading", "law_advection_speed_step", "law_advection_along_trend",
+    "law_advection_edge_fading",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    coarse = coarser(CaseRun(load_case(CONFIG)).model)
+    assert coarse is not None
+    return coarse
+
+
+@pytest.fixture(scope="module")
+def borrowed(model: Model) -> Point:
+    """A point that leans on the factors of one nearby."""
+    near = linearise(model, np.zeros(len(model.names)))
+    assert near is not None
+    point = linearise(model, np.full(len(model.names), 0.02), near)
+    assert point is not None
+    assert any(flow.moved > 0.0 for flow in point.flows.values())
+    return point
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_trace_is_the_response_to_the_effect(model: Model, borrowed: Point, name: str) -> None:
+    law = LAWS[name]
+    settings = {shape.name: shape.default for shape in law.effect.shapes}
+    exact = responses(model, borrowed, [cause_of(model.case, Candidate(law.effect), settings)])
+    trace = law_traces(model, borrowed).of(law, [settings])
+    assert trace == pytest.approx(exact, abs=0.02 * np.abs(exact).max())
+
+
+def test_an_experiment_without_measurements_is_no_obstacle(model: Model) -> None:
+    """It was a traceback, after a minute."""
+    seen = model.station[model.station["experiment"] != "mid"].reset_index(drop=True)
+    part = replace(model, station=seen)
+    point = linearise(part, np.zeros(len(part.names)))
+    assert point is not None
+    assert np.isfinite(law_traces(part, point).of(LAWS[NAMES[0]], [{"reference": 0.5}])).all()
+    allowed = ModelError(friction=0.05, edges=0.1)
+    assert len(model_error_columns(part, point, allowed)) == len(seen)
+
+
+def test_a_point_by_itself_borrows_nothing(model: Model, borrowed: Point) -> None:
+    alone = by_itself(model, borrowed)
+    assert all(flow.moved == 0.0 for flow in alone.flows.values())
+    assert by_itself(model, alone).flows["mid"].factors is alone.flows["mid"].factors
+    assert np.array_equal(alone.prediction, borrowed.prediction)
+
+
+# Standard errors at a plausible size below which nobody looks at a trace.
+UNSEEN = 0.01
+# Length of a trace on coarse cells over that on the case's own. Shear is smoother there, least resolved in a layer of
+# 0.3 m on cells of 0.375 m: half as long. A size that is
+# counted in cells is off by 1.4 times where cells are wider, by twice or four times where they are longer as well.
+SHORTEST, LONGEST = 0.4, 1.1
+
+
+def traces(model: Model) -> Fingerprints:
+    point = linearise(model, np.zeros(len(model.names)))
+    assert point is not None
+    return fingerprints_of(SearchModel(model, noise_of(model.station), point), half_width(model.site))
+
+
+@pytest.fixture(scope="module")
+def both() -> tuple[Fingerprints, Fingerprints]:
+    coarse, _ = coarse_twin()
+    return traces(model_of(CASE, read_observations(CASE))), traces(coarse)
+
+
+def test_a_size_means_the_same_on_coarse_cells(both: tuple[Fingerprints, Fingerprints]) -> None:
+    own, coarse = both
+    assert own.settings == coarse.settings
+    length, other = (np.linalg.norm(one.values, axis=0) for one in both)
+    seen = length > UNSEEN
+    share = other[seen] / length[seen]
+    cosine = np.sum(own.values * coarse.values, axis=0)[seen] / (length * other)[seen]
+    assert share.min() > SHORTEST
+    assert share.max() < LONGEST
+    assert cosine.min() > 0.9
