@@ -27,7 +27,7 @@ from vegglue.case.config import load_case
 from vegglue.case.schema import ModelError
 from vegglue.effects.grammar import LAWS
 from vegglue.effects.library import library
-from vegglue.engine.interface import Model, Point, by_itself, flow_at_centres, linearise, responses
+from vegglue.engine.interface import Model, Point, flow_at_centres, linearise, relinearised, responses
 from vegglue.engine.model import coarser, model_of
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.observations import read_observations
@@ -165,10 +165,10 @@ def test_an_experiment_without_measurements_is_no_obstacle(model: Model) -> None
     assert len(model_error_columns(part, point, allowed)) == len(seen)
 
 
-def test_a_point_by_itself_borrows_nothing(model: Model, borrowed: Point) -> None:
-    alone = by_itself(model, borrowed)
+def test_a_relinearised_point_reuses_nothing(model: Model, borrowed: Point) -> None:
+    alone = relinearised(model, borrowed)
     assert all(flow.moved == 0.0 for flow in alone.flows.values())
-    assert by_itself(model, alone).flows["mid"].factors is alone.flows["mid"].factors
+    assert relinearised(model, alone).flows["mid"].factors is alone.flows["mid"].factors
     assert np.array_equal(alone.prediction, borrowed.prediction)
 
 

@@ -14,8 +14,8 @@ from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.parameter_space import parameters_at, sample_at
 from vegglue.case.prior import sample_prior, sobol_points
 from vegglue.case.schema import Case
+from vegglue.flow.anderson import minimise
 from vegglue.flow.batch import CLUSTER_SIZE, blend, put_rows, solve_members
-from vegglue.flow.block_elimination import minimise
 from vegglue.flow.chord import ChordSolution, stream
 from vegglue.flow.jacobian import eliminate
 from vegglue.flow.parameter_metric import clusters, principal_axes, spline_weights

@@ -68,7 +68,7 @@ def test_members_without_a_flow_on_coarser_cells_are_solved(
 def test_members_that_stalled_go_on_with_the_next_reference(
     grids_and_points: tuple[list[GridProblem], np.ndarray], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Few steps for each reference: members that stalled go on, and reach the same flow in hardly more steps."""
+    """Few steps for each reference: members go on where they stalled, to the same flow in fewer steps."""
     grids, points = grids_and_points
     whole = solve_nested(grids, points, TOLERANCE, USUAL_FALL_BACK)
     monkeypatch.setattr(nested_grids, "MOST_NESTED_STEPS", 4)

@@ -15,7 +15,7 @@ from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_ind
 from vegglue.case.channel_geometry import cells_across
 from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.case.resolved_config import dumped, plain_tree
-from vegglue.engine.interface import Model, Point, by_itself, linearise, linearise_from
+from vegglue.engine.interface import Model, Point, linearise, linearise_from, relinearised
 from vegglue.engine.model import coarser
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
@@ -222,8 +222,8 @@ def searched_by_itself(base: Baseline) -> Baseline:
     """The baseline with factors of its own at the point of its search: many responses are computed there."""
     searched = coarse_search(base)
     if searched is not None:
-        return replace(base, on_coarse=by_itself(*searched))
-    return replace(base, fitted=replace(base.fitted, point=by_itself(base.model, base.fitted.point)))
+        return replace(base, on_coarse=relinearised(*searched))
+    return replace(base, fitted=replace(base.fitted, point=relinearised(base.model, base.fitted.point)))
 
 
 def log_evidence(base: Baseline) -> float:

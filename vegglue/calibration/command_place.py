@@ -13,7 +13,7 @@ from vegglue.calibration.baseline import Baseline, baseline, places_of_prior
 from vegglue.calibration.fit import NEGLIGIBLE_DECREASE, objective
 from vegglue.calibration.noise import Noise
 from vegglue.engine.command import CommandRuns
-from vegglue.engine.corrected import Correction, DeafCommandError, corrected, correction_at
+from vegglue.engine.corrected import Correction, InsensitiveCommandError, corrected, correction_at
 from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError
 from vegglue.progress import Watch
@@ -95,7 +95,7 @@ def _start(runs: CommandRuns, model: Model, watch: Watch) -> tuple[Array, Correc
         try:
             correction_at(runs, model, z, watch, slopes=False)  # alone: a command that fails may take its time
             return z, correction_at(runs, model, z, watch)
-        except DeafCommandError:  # it fails anywhere else too
+        except InsensitiveCommandError:  # it fails anywhere else too
             raise
         except InputError as error:
             refused = error

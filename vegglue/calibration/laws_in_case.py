@@ -25,7 +25,7 @@ from vegglue.case.channel_geometry import channel_geometry
 from vegglue.effects.definition import Shape
 from vegglue.effects.grammar import LAWS, PLAUSIBLE_STRENGTH, PRODUCTS, SAME_AS, Law
 from vegglue.effects.surroundings import Cells
-from vegglue.engine.interface import Model, Point, by_itself, flow_at_centres
+from vegglue.engine.interface import Model, Point, flow_at_centres, relinearised
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
 
@@ -154,7 +154,7 @@ def centre_cells(model: Model, point: Point, experiment: str) -> Cells:
 
 def at_sections(model: Model, cells: Cells, experiment: str) -> Cells:
     """The same, dry but for the columns in which velocities were measured."""
-    station, grid = model.station_of(experiment), model.site.grid
+    station, grid = model.stations[experiment], model.site.grid
     x = station["x"].to_numpy(float)[velocity_rows(station) & station["used"].to_numpy()]
     measured = np.zeros((grid.x.size, 1, 1), dtype=bool)
     measured[np.abs(grid.x[:, None] - x).argmin(axis=0)] = True
@@ -182,7 +182,7 @@ class LawTraces:
 
 def law_traces(model: Model, point: Point) -> LawTraces:
     """Of a model at a point."""
-    responses = cell_responses(model, by_itself(model, point), tuple(dict.fromkeys(RELATIVE_TERM.values())))
+    responses = cell_responses(model, relinearised(model, point), tuple(dict.fromkeys(RELATIVE_TERM.values())))
     flows = tuple((rows, centre_cells(model, point, experiment)) for experiment, rows in model.rows.items())
     return LawTraces(responses, flows)
 

@@ -27,7 +27,6 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -38,8 +37,9 @@ from vegglue.case.case_effects import value_of
 from vegglue.case.channel_geometry import patches_present
 from vegglue.case.consistency import values
 from vegglue.case.engine_schema import CommandEngine
+from vegglue.case.parts import Value
 from vegglue.case.resolved_config import digest_of, last_changes
-from vegglue.case.schema import Case, Experiment
+from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.kinds import kind_of
@@ -51,30 +51,44 @@ from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 
 PARAMETERS_FILE, STATIONS_FILE, PREDICTIONS_FILE = "parameters.json", "stations.csv", "predictions.csv"
 COLUMNS_LEFT = ("station", "prediction")
+LOG_FILE = "command.log"
 # Most that predictions.csv may take [bytes]: the most stations of a case, with fifty signs each.
 LARGEST_PREDICTIONS = 1_000_000
+# Most that a command may print [bytes]. Chosen: more than any model prints, and no disk is full before it is noticed.
+LONGEST_LOG = 1_000_000_000
+# How often a running command is looked at [s]. Chosen: short against any run of a flow model, and hardly any work.
+LOOK_EVERY = 0.05
+# Signs of the last line of the log that a reason quotes: enough for a path; a reason of an ensemble has room for 240.
+QUOTED = 160
+OneTheta = Mapping[str, float]
+Changes = Mapping[str, tuple[tuple[str, int, int], ...]]
 
 
 class BadPredictionsError(ValueError):
-    """What a command left is not what was asked for: says where, what was expected and what came."""
+    """The predictions of a command are not as expected: row, what was expected and what came."""
 
 
 def parameters_text(case: Case, theta: Mapping[str, float]) -> str:
     """parameters.json: theta in the units of the case, and discharge [m3/s], level [m] and plants of experiments."""
+    values = {parameter: np.array([value]) for parameter, value in theta.items()}
+
+    def number(value: Value) -> float:
+        return float(value_of(value, values, 1)[0])
+
     parameters = {name: {"value": value, "unit": case.parameters[name].unit} for name, value in theta.items()}
-    experiments = {name: _flow_of(case, name, one, theta) for name, one in case.experiments.items()}
+    experiments = {
+        name: {
+            "discharge": {inflow: number(value) for inflow, value in one.discharge.items()},
+            "level": number(one.level),
+            "plants": [case.plants.patches[index].name for index in patches_present(case, name)],
+        }
+        for name, one in case.experiments.items()
+    }
     return json.dumps({"case": case.name, "parameters": parameters, "experiments": experiments}, indent=1) + "\n"
 
 
-def _flow_of(case: Case, name: str, one: Experiment, theta: Mapping[str, float]) -> dict[str, Any]:
-    values = {parameter: np.array([value]) for parameter, value in theta.items()}
-    discharge = {inflow: float(value_of(value, values, 1)[0]) for inflow, value in one.discharge.items()}
-    plants = [case.plants.patches[index].name for index in patches_present(case, name)]
-    return {"discharge": discharge, "level": float(value_of(one.level, values, 1)[0]), "plants": plants}
-
-
 def stations_text(station: pd.DataFrame) -> str:
-    """stations.csv: places in the coordinates of the grid [m], depth as measured [m], empty where it was not."""
+    """stations.csv: places in the coordinates of the grid [m], depth as measured [m], empty if it was not."""
     columns = ["experiment", "kind", "section", "x", "y", "depth"]
     units = [kind_of(str(kind)).unit for kind in station["kind"]]
     table = station[columns].reset_index(drop=True).assign(unit=units)
@@ -83,7 +97,25 @@ def stations_text(station: pd.DataFrame) -> str:
 
 
 def read_predictions(path: Path, stations: int) -> Array:
-    """Predictions (station,) [m/s, m or m3/s] of predictions.csv, in any order. Errors: BadPredictionsError."""
+    """Predictions of predictions.csv, in any order.
+
+    Parameters
+    ----------
+    path
+        The file.
+    stations
+        How many there must be.
+
+    Returns
+    -------
+    array
+        (station,) [m/s, m or m3/s].
+
+    Raises
+    ------
+    BadPredictionsError
+        If the file is missing, cannot be read, or lacks a finite prediction of a station.
+    """
     if not path.is_file():
         raise BadPredictionsError(f"the command ended well and left no {PREDICTIONS_FILE}")
     try:
@@ -97,48 +129,28 @@ def read_predictions(path: Path, stations: int) -> Array:
         )
     found = np.full(stations, np.nan)
     for row, line in enumerate(lines[1:], 2):
-        if line.strip():
-            number, value = _row(row, line, stations)
-            if np.isfinite(found[number]):
-                raise BadPredictionsError(f"{PREDICTIONS_FILE}, row {row}: station {number} stands there twice")
-            found[number] = value
+        if not line.strip():
+            continue
+        words, number, value = line.split(","), -1, math.nan
+        with suppress(ValueError, IndexError):
+            number, value = int(words[0]), float(words[1])
+        problem = ""
+        if len(words) != len(COLUMNS_LEFT) or not math.isfinite(value):
+            problem = f"expected a station and a finite number, got {line[:40]!r}"
+        elif abs(value) > LARGEST_READING:
+            problem = f"expected a prediction of at most {LARGEST_READING:g}, got {value:g}"
+        elif not 0 <= number < stations:
+            problem = f"expected a station from 0 to {stations - 1}, got {number}"
+        elif np.isfinite(found[number]):
+            problem = f"station {number} stands there twice"
+        if problem:
+            raise BadPredictionsError(f"{PREDICTIONS_FILE}, row {row}: {problem}")
+        found[number] = value
     missing = np.flatnonzero(np.isnan(found))
     if missing.size:
         more = f" and {missing.size - 1} more" if missing.size > 1 else ""
         raise BadPredictionsError(f"{PREDICTIONS_FILE}: no prediction of station {missing[0]}{more}")
     return found
-
-
-def _row(row: int, line: str, stations: int) -> tuple[int, float]:
-    """The station and the prediction of one line."""
-    words = [word.strip() for word in line.split(",")]
-    try:
-        number, value = int(words[0]), float(words[1])
-        sound = len(words) == len(COLUMNS_LEFT) and math.isfinite(value)
-    except (ValueError, IndexError):
-        sound = False
-    if not sound:
-        raise BadPredictionsError(
-            f"{PREDICTIONS_FILE}, row {row}: expected a station and a finite number, got {line[:40]!r}"
-        )
-    if abs(value) > LARGEST_READING:
-        raise BadPredictionsError(
-            f"{PREDICTIONS_FILE}, row {row}: expected a prediction of at most {LARGEST_READING:g}, got {value:g}"
-        )
-    if not 0 <= number < stations:
-        raise BadPredictionsError(
-            f"{PREDICTIONS_FILE}, row {row}: expected a station from 0 to {stations - 1}, got {number}"
-        )
-    return number, value
-
-
-LOG_FILE = "command.log"
-# Most that a command may say [bytes]. Chosen: more than any model prints, and no disk is full before it is noticed.
-LONGEST_LOG = 1_000_000_000
-# How often a running command is looked at [s]. Chosen: short against any run of a flow model, and hardly any work.
-LOOK_EVERY = 0.05
-# Signs of the last line of the log that a reason quotes: enough for a path; a reason of an ensemble has room for 240.
-QUOTED = 160
 
 
 @dataclass(frozen=True)
@@ -153,14 +165,33 @@ class CommandEnd:
 def run_command_once(
     words: tuple[str, ...], folder: Path, given: Mapping[str, str], stations: int, timeout: float, stop: Event
 ) -> CommandEnd:
-    """Start a command in an empty folder with the files it is given, wait for it, and read what it leaves.
+    """Start a command in an empty folder, wait for it, and read what it leaves.
 
-    given: text of each file by its name; timeout [s]; stop: is set when nobody waits any more, which ends the run.
-    Errors: StorageError when the folder cannot be written.
+    Parameters
+    ----------
+    words
+        Program and arguments.
+    folder
+        Where it runs; what an earlier run has left there is removed.
+    given
+        Text of each file that it is given, by name.
+    stations
+        How many predictions are expected.
+    timeout
+        Time after which it is stopped [s].
+    stop
+        Is set to end the run early.
+
+    Raises
+    ------
+    StorageError
+        If the folder cannot be written.
     """
     with failed_writes_told(folder, MAKE_ROOM):
-        if folder.exists():
-            _clear_away(folder)
+        if folder.exists():  # a killed run that still writes there then writes beside, until it ends by itself
+            aside = Path(tempfile.mkdtemp(prefix="left-", dir=folder.parent))
+            folder.rename(aside / folder.name)
+            shutil.rmtree(aside, ignore_errors=True)
         folder.mkdir(parents=True)
         for name, text in given.items():
             (folder / name).write_text(text, encoding="utf-8")
@@ -174,16 +205,10 @@ def run_command_once(
     return CommandEnd(None, reason, time.monotonic() - began)
 
 
-def _clear_away(folder: Path) -> None:
-    """Remove what a killed run has left. One that still writes there then writes beside, until it ends by itself."""
-    aside = Path(tempfile.mkdtemp(prefix="left-", dir=folder.parent))
-    folder.rename(aside / folder.name)
-    shutil.rmtree(aside, ignore_errors=True)
-
-
 def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) -> str:
     """Why a command did not end well, '' when it did."""
-    with (folder / LOG_FILE).open("wb") as log:
+    path, code = folder / LOG_FILE, None
+    with path.open("wb") as log:
         try:
             process = subprocess.Popen(
                 words,
@@ -196,31 +221,31 @@ def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) 
         except OSError as error:
             return f"the command cannot be started: {error.strerror} ({words[0]})"
         try:
-            code = _waited_for(process, time.monotonic() + timeout, stop, log.fileno())
+            until = time.monotonic() + timeout
+            while code is None and not stop.is_set() and os.fstat(log.fileno()).st_size <= LONGEST_LOG:
+                left = until - time.monotonic()
+                if left <= 0.0:
+                    break
+                with suppress(subprocess.TimeoutExpired):
+                    code = process.wait(min(LOOK_EVERY, left))
         finally:
             _end_all(process)
     if stop.is_set():
         return "the command was stopped"
-    if code is None and (folder / LOG_FILE).stat().st_size > LONGEST_LOG:
-        (folder / LOG_FILE).unlink()
+    if code is None and path.stat().st_size > LONGEST_LOG:
+        path.unlink()
         return f"the command printed more than {LONGEST_LOG / 1e9:g} GB and was stopped"
     if code is None:
         return f"the command did not end within {timeout:g} s and was stopped"
-    if code:
-        how = f"exit code {code}" if code > 0 else f"signal {-code}"
-        return f"the command ended with {how}{_last_said(folder / LOG_FILE)}"
-    return ""
-
-
-def _waited_for(process: "subprocess.Popen[bytes]", until: float, stop: Event, log: int) -> int | None:
-    """The exit code; None when it was not there in time, or its log grew too long."""
-    while not stop.is_set() and os.fstat(log).st_size <= LONGEST_LOG:
-        left = until - time.monotonic()
-        if left <= 0.0:
-            return None
-        with suppress(subprocess.TimeoutExpired):
-            return process.wait(min(LOOK_EVERY, left))
-    return None
+    if not code:
+        return ""
+    with path.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        file.seek(max(file.tell() - 4096, 0))
+        lines = [line.strip() for line in file.read().decode(errors="replace").splitlines()]
+    last = next((line for line in reversed(lines) if line), "")
+    output = f"said: {last[:QUOTED]}" if last else f"said nothing; see {LOG_FILE}"
+    return f"the command ended with {f'exit code {code}' if code > 0 else f'signal {-code}'}, and {output}"
 
 
 def _end_all(process: "subprocess.Popen[bytes]") -> None:
@@ -236,24 +261,18 @@ def _end_all(process: "subprocess.Popen[bytes]") -> None:
     process.wait()
 
 
-def _last_said(log: Path) -> str:
-    """The last line of the output of a command, for a reason; '' when it said nothing."""
-    with log.open("rb") as file:
-        file.seek(0, os.SEEK_END)
-        file.seek(max(file.tell() - 4096, 0))
-        lines = [line.strip() for line in file.read().decode(errors="replace").splitlines()]
-    said = next((line for line in reversed(lines) if line), "")
-    return f", and said: {said[:QUOTED]}" if said else f", and said nothing; see {LOG_FILE}"
-
-
-OneTheta = Mapping[str, float]
-Changes = Mapping[str, tuple[tuple[str, int, int], ...]]
-
-
 @dataclass(frozen=True)
 class CommandRuns:
-    """A command that is ready to run: its words, a digest of it and of its files, when each of these was changed, and
-    where its runs are kept.
+    """A command that is ready to run.
+
+    Parameters
+    ----------
+    settings, words
+        `engine` of the case, and program and arguments.
+    digest, changed
+        Of the command and its files, and when each of these was changed.
+    folder
+        Where its runs are kept.
     """
 
     settings: CommandEngine
@@ -266,8 +285,10 @@ class CommandRuns:
 def command_runs(case: Case, folder: Path) -> CommandRuns:
     """The command of a case, with its runs kept in `engine` below the folder of the case's results.
 
-    Errors: InputError when its program is not there, when it is given no parameter, or on a cluster, whose machines
-    need not have it.
+    Raises
+    ------
+    InputError
+        If its program does not exist, if it is given no parameter, or on a cluster, whose machines may not have it.
     """
     settings = case.engine
     assert settings is not None
@@ -299,17 +320,6 @@ def _changes(settings: CommandEngine) -> Changes:
     return {name: last_changes(path) for name, path in settings.files.items()}
 
 
-def _refuse_changed(runs: CommandRuns) -> None:
-    """Errors: InputError when a file of the command is another than when its digest was made."""
-    now = _changes(runs.settings)
-    for name, path in runs.settings.files.items():
-        if now[name] != runs.changed[name]:
-            raise InputError(
-                f"engine.files: expected `{name}` ({shown_path(path)}) to stay while vegglue runs, but it was changed; "
-                "what ran before is kept with what it was then. Run the same command again."
-            )
-
-
 def own_parameters(case: Case) -> tuple[str, ...]:
     """Names of the parameters that a command is given: all but those that only stand in `effects`, which the built-in
     engine adds.
@@ -324,7 +334,14 @@ def ended_runs(
 ) -> Generator[tuple[int, CommandEnd], None, None]:
     """The position of each theta and how its run ended, in the order in which they end; those kept come first.
 
-    What is closed early, or stopped by Ctrl-C, stops the runs under way. Errors: StorageError.
+    Closing it early, or Ctrl-C, stops the runs under way.
+
+    Raises
+    ------
+    InputError
+        If a file of the command changes while it runs.
+    StorageError
+        If the folder cannot be written, or another process runs the command there.
     """
     stations = stations_text(station)
     given = [{PARAMETERS_FILE: parameters_text(case, theta), STATIONS_FILE: stations} for theta in thetas]
@@ -343,19 +360,50 @@ def ended_runs(
             yield from ((position, end) for position, same in enumerate(keys) if same == key)
 
 
+def _kept(runs: CommandRuns, key: str, stations: int) -> CommandEnd | None:
+    """What is kept of a finished run; None if nothing is, or it is damaged."""
+    try:
+        found = json.loads(read_text(runs.folder / f"{key}.json", LARGEST_JSON))
+        prediction, seconds = np.array(found["prediction"], dtype=float), float(found["seconds"])
+    except (InputError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    sound = prediction.shape == (stations,) and bool(np.isfinite(prediction).all())
+    return CommandEnd(prediction, "", seconds) if sound else None
+
+
 def _new_runs(
     runs: CommandRuns, given: Mapping[str, Mapping[str, str]], stations: int
 ) -> Generator[tuple[str, CommandEnd], None, None]:
     """The key of each run and how it ended; given: its files by key. Of two vegglue in one folder one is refused."""
     if not given:
         return
+    settings, stop = runs.settings, Event()
+
+    def run(key: str, files: Mapping[str, str]) -> CommandEnd:
+        if stop.is_set():
+            return CommandEnd(None, "the command was not started", 0.0)
+        end = run_command_once(runs.words, runs.folder / key, files, stations, settings.timeout, stop)
+        if end.prediction is None:
+            return end
+        now = _changes(settings)
+        for name, path in settings.files.items():
+            if now[name] != runs.changed[name]:
+                raise InputError(
+                    f"engine.files: expected `{name}` ({shown_path(path)}) to stay while vegglue runs, but it was "
+                    "changed; what ran before is kept with what it was then. Run the same command again."
+                )
+        text = json.dumps({"prediction": end.prediction.tolist(), "seconds": round(end.seconds, 3)})
+        write_text(runs.folder / f"{key}.json", text, MAKE_ROOM)
+        if settings.keep == "failed":
+            shutil.rmtree(runs.folder / key, ignore_errors=True)
+        return end
+
     with failed_writes_told(runs.folder, MAKE_ROOM):
         runs.folder.mkdir(parents=True, exist_ok=True)
-    stop = Event()
     with hold_lock(runs.folder):
         pool = ThreadPoolExecutor(cores_allowed())
         try:
-            waiting = {pool.submit(_run, runs, key, files, stations, stop): key for key, files in given.items()}
+            waiting = {pool.submit(run, key, files): key for key, files in given.items()}
             while waiting:
                 ended, _ = wait(waiting, return_when=FIRST_COMPLETED)
                 for one in ended:
@@ -373,8 +421,8 @@ def command_predictions(
     watch: Watch = silent,
     why: str = "",
 ) -> tuple[Array, list[str]]:
-    """Predictions (m, station), NaN where a run failed, and the reason of each, '' where it did not; why: what the runs
-    are for, in the words of a progress line.
+    """Predictions (m, station), NaN if a run failed, and the reason of each, '' if it did not; why: what the runs are
+    for, the phase of their progress.
     """
     found, reasons, failed = np.full((len(thetas), len(station)), np.nan), [""] * len(thetas), 0
     watch(Progress(why, 0, len(thetas), "runs"))
@@ -387,29 +435,3 @@ def command_predictions(
                 found[position] = end.prediction
             watch(Progress(why, done, len(thetas), "runs", failed))
     return found, reasons
-
-
-def _kept(runs: CommandRuns, key: str, stations: int) -> CommandEnd | None:
-    """What is kept of a finished run; None where nothing is, or nothing sound."""
-    try:
-        found = json.loads(read_text(runs.folder / f"{key}.json", LARGEST_JSON))
-        prediction, seconds = np.array(found["prediction"], dtype=float), float(found["seconds"])
-    except (InputError, ValueError, KeyError, TypeError, RecursionError):
-        return None
-    sound = prediction.shape == (stations,) and bool(np.isfinite(prediction).all())
-    return CommandEnd(prediction, "", seconds) if sound else None
-
-
-def _run(runs: CommandRuns, key: str, given: Mapping[str, str], stations: int, stop: Event) -> CommandEnd:
-    if stop.is_set():
-        return CommandEnd(None, "the command was not started", 0.0)
-    folder, settings = runs.folder / key, runs.settings
-    end = run_command_once(runs.words, folder, given, stations, settings.timeout, stop)
-    if end.prediction is None:
-        return end
-    _refuse_changed(runs)
-    text = json.dumps({"prediction": end.prediction.tolist(), "seconds": round(end.seconds, 3)})
-    write_text(runs.folder / f"{key}.json", text, MAKE_ROOM)
-    if settings.keep == "failed":
-        shutil.rmtree(folder, ignore_errors=True)
-    return end

@@ -5,9 +5,10 @@
 f_c and J_c are predictions and slopes of the command, the latter by central differences; F and F_0 the built-in engine
 with and without the effects of the case, which the command does not know: they are added to what it predicts. At z_0
 this is exact. Further off the built-in engine only says how the flow bends away from the tangent, and draws of a
-posterior are runs of the command itself. What an effect or a cell would change is the built-in engine's word.
-Source: first-order correction of one model by another (Alexandrov and Lewis 2001, doi:10.1023/A:1016042505922; not
-checked against it).
+posterior are runs of the command itself. Responses to effects and cells are those of the built-in engine.
+
+References: first-order correction of one model by another, Alexandrov and Lewis 2001, doi:10.1023/A:1016042505922; not
+checked against it.
 """
 
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
 from vegglue.progress import Watch
 
-# Share of a difference [-] that is bend or noise, above which a slope is told to be rough: root mean square over
+# Share of a difference [-] that is bend or noise, above which a slope counts as rough: root mean square over
 # stations of f(h) + f(-h) - 2 f(0) over f(h) - f(-h). A flow that bends as much as it slopes has a twentieth at a step
 # of 0.1, and half at the largest step there is; noise alone has 1.7.
 ROUGH_SHARE = 0.5
@@ -35,11 +36,20 @@ SAME_STATION = ["experiment", "kind", "section", "x", "y"]
 
 @dataclass(frozen=True)
 class Correction:
-    """What the command has more than the built-in engine at z (q,) of the parameters `names` that it is given.
+    """What the command has more than the built-in engine at one place.
 
-    station: of which; value (n,) [m/s or m]; slope (n, q), zero where it was not asked for; rough: parameters whose
-    slopes are mostly noise. A station that is not among them, such as one that could be measured next, is predicted by
-    the built-in engine alone.
+    A station that is not in it, such as one that could be measured next, is predicted by the built-in engine alone.
+
+    Parameters
+    ----------
+    names, z
+        The parameters that the command is given, and their place (q,).
+    station
+        The stations (n rows).
+    value, slope
+        f_c - F_0 (n,) [unit of each station] and J_c - J_0 (n, q), zero if slopes were not wanted.
+    rough
+        Parameters whose slopes are mostly noise.
     """
 
     names: tuple[str, ...]
@@ -49,121 +59,45 @@ class Correction:
     slope: Array
     rough: tuple[str, ...] = ()
 
+    def at(self, model: Model, z: Array) -> tuple[Array, Array]:
+        """What is added to predictions (n,) and slopes (n, p) of the built-in engine at z (p,)."""
+        known = {key: row for row, key in enumerate(self.station[SAME_STATION].itertuples(index=False, name=None))}
+        keys = model.station[SAME_STATION].itertuples(index=False, name=None)
+        rows = np.array([known.get(key, -1) for key in keys], dtype=np.int64)
+        columns = [model.names.index(name) for name in self.names]
+        of_stations = np.vstack([self.slope, np.zeros((1, len(columns)))])[rows]
+        slope = np.zeros((rows.size, z.size))
+        slope[:, columns] = of_stations
+        return np.append(self.value, 0.0)[rows] + of_stations @ (z[columns] - self.z), slope
 
-class DeafCommandError(InputError):
+
+class InsensitiveCommandError(InputError):
     """A command that predicts the same whatever its parameters are."""
 
 
 def corrected(correction: Correction, runs: CommandRuns, watch: Watch) -> Engine:
-    """The engine; its predictions at many points are runs of the command."""
-    return Engine(
+    """f(z) = F(z) + [f_c - F_0](z_0) + [J_c - J_0](z_0) (z - z_0): the engine of a command.
+
+    Parameters
+    ----------
+    correction
+        Of the built-in engine, at one place.
+    runs
+        The command; predictions at many points are runs of it.
+    watch
+        Called with the progress of these.
+    """
+    return replace(
+        NEWTON,
         name="command",
         linearise=partial(_linearised, correction),
         predict=partial(_predicted, runs, watch),
         responses=partial(_responses, correction),
-        responses_to_cells=NEWTON.responses_to_cells,
-        flow_at_centres=NEWTON.flow_at_centres,
-        by_itself=NEWTON.by_itself,
-        with_coarse_correction=NEWTON.with_coarse_correction,
     )
-
-
-def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slopes: bool = True) -> Correction:
-    """The correction at z (p,) of a model; slopes: whether to run the command for them, twice for each parameter.
-
-    Errors: InputError when the command fails there, or the built-in engine finds no flow.
-    """
-    bare = without_effects(model)
-    names = bare.names
-    here = _own(model, z[None], names)[0]
-    points = _around(here, runs.settings.step) if slopes else here[None]
-    found, reasons = command_predictions(
-        runs, bare.case, model.station, _thetas(bare, points), watch, f"running the command of {model.case.name}"
-    )
-    own = linearise(bare, here)
-    if own is None:
-        raise InputError(
-            f"{model.case.name}: the built-in engine finds no flow where the command is calibrated; widen the priors, "
-            "or look at the site with `vegglue check`."
-        )
-    if np.isnan(found[0]).any():
-        raise InputError(f"{model.case.name}: the command failed where it is calibrated: {reasons[0]}.")
-    value = found[0] - own.prediction
-    if not slopes:
-        return Correction(names, here, model.station, value, np.zeros_like(own.slope))
-    differences = _differences(model.case.name, names, points, found, reasons)
-    if names and not differences.any():
-        raise DeafCommandError(
-            f"{model.case.name}: expected a command of `engine` whose predictions change with {' or '.join(names)}, "
-            "got the same ones at either side of each; see whether it reads parameters.json."
-        )
-    return Correction(names, here, model.station, value, differences - own.slope, _rough(names, found))
-
-
-def without_effects(model: Model) -> Model:
-    """The model that a command stands for: no effects, and the parameters that the command is given."""
-    names = own_parameters(model.case)
-    parameters = {name: model.case.parameters[name] for name in names}
-    return replace(model, case=model.case.model_copy(update={"effects": {}, "parameters": parameters}), engine=NEWTON)
-
-
-def _thetas(bare: Model, z: Array) -> list[dict[str, float]]:
-    theta = theta_at(bare.case, z)
-    return [{name: float(values[member]) for name, values in theta.items()} for member in range(len(z))]
-
-
-def _own(model: Model, z: Array, names: Sequence[str]) -> Array:
-    """The columns of z (m, p) that are parameters of the command."""
-    return z[:, [model.names.index(name) for name in names]]
-
-
-def _around(here: Array, step: float) -> Array:
-    """z (q,) itself, and places a step ahead and behind in each parameter (1 + 2 q, q)."""
-    steps = step * np.eye(here.size)
-    return np.clip(np.vstack([here[None], here + steps, here - steps]), -FURTHEST, FURTHEST)
-
-
-def _differences(name: str, names: Sequence[str], points: Array, found: Array, reasons: Sequence[str]) -> Array:
-    """Slopes (n, q) by central differences; by those of one side where the command fails on the other."""
-    q = len(names)
-    slope = np.zeros((found.shape[1], q))
-    for j in range(q):
-        ahead, behind = 1 + j, 1 + q + j
-        ends = [end for end in (ahead, behind) if np.isfinite(found[end]).all()]
-        if not ends:
-            raise InputError(
-                f"{name}: the command failed on both sides of its best place for {names[j]}, so that it has no slope: "
-                f"{reasons[ahead]}."
-            )
-        first, last = (ahead, behind) if len(ends) == 2 else (ends[0], 0)
-        slope[:, j] = (found[first] - found[last]) / (points[first, j] - points[last, j])
-    return slope
-
-
-def _rough(names: Sequence[str], found: Array) -> tuple[str, ...]:
-    """Parameters whose differences are mostly noise, see ROUGH_SHARE; found (1 + 2 q, n)."""
-    here, ahead, behind = found[0], found[1 : 1 + len(names)], found[1 + len(names) :]
-    bend = np.sqrt(np.mean((ahead + behind - 2.0 * here) ** 2, axis=1))
-    slope = np.sqrt(np.mean((ahead - behind) ** 2, axis=1))
-    return tuple(name for name, a, b in zip(names, bend, slope, strict=True) if a > ROUGH_SHARE * b)
-
-
-def _correction_in(correction: Correction, model: Model, z: Array) -> tuple[Array, Array]:
-    """What is added to predictions (n,) and slopes (n, p) of the built-in engine at z (p,)."""
-    known = {key: row for row, key in enumerate(correction.station[SAME_STATION].itertuples(index=False, name=None))}
-    keys = model.station[SAME_STATION].itertuples(index=False, name=None)
-    rows = np.array([known.get(key, -1) for key in keys], dtype=np.int64)
-    columns = [model.names.index(name) for name in correction.names]
-    nothing = np.zeros((1, len(columns)))
-    of_stations = np.vstack([correction.slope, nothing])[rows]
-    value = np.append(correction.value, 0.0)[rows]
-    slope = np.zeros((rows.size, z.size))
-    slope[:, columns] = of_stations
-    return value + of_stations @ (z[columns] - correction.z), slope
 
 
 def _linearised(correction: Correction, model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
-    value, slope = _correction_in(correction, model, z)
+    value, slope = correction.at(model, z)
     point = NEWTON.linearise(model, z, near, lambda prediction: wanted(prediction + value))
     if point is None:
         return None
@@ -174,9 +108,7 @@ def _predicted(runs: CommandRuns, watch: Watch, model: Model, points: Sequence[P
     """Runs of the command, and what the effects of the case change in the built-in engine."""
     bare = without_effects(model)
     z_own = _own(model, z, bare.names)
-    found, _ = command_predictions(
-        runs, bare.case, model.station, _thetas(bare, z_own), watch, f"running the command of {model.case.name}"
-    )
+    found, _ = _run(runs, model, bare, z_own, watch)
     if not model.case.effects:
         return found
     near = [linearise(bare, _own(model, point.z[None], bare.names)[0]) for point in points]
@@ -187,5 +119,86 @@ def _predicted(runs: CommandRuns, watch: Watch, model: Model, points: Sequence[P
 
 
 def _responses(correction: Correction, model: Model, point: Point, causes: Sequence[Cause]) -> Array:
-    value, _ = _correction_in(correction, model, point.z)
+    value, _ = correction.at(model, point.z)
     return NEWTON.responses(model, replace(point, prediction=point.prediction - value), causes)
+
+
+def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slopes: bool = True) -> Correction:
+    """f_c - F_0 and J_c - J_0 at one place of a model.
+
+    Parameters
+    ----------
+    runs, model
+        The command, and a model of its case.
+    z
+        The place (p,).
+    watch
+        Called with the progress of runs.
+    slopes
+        Whether to run the command for slopes, twice for each parameter.
+
+    Raises
+    ------
+    InputError
+        If the command fails there, or the built-in engine finds no flow.
+    InsensitiveCommandError
+        If its predictions change with no parameter.
+    """
+    bare, name = without_effects(model), model.case.name
+    names = bare.names
+    here, q = _own(model, z[None], names)[0], len(names)
+    steps = runs.settings.step * np.eye(q)  # the place itself, then a step ahead and behind in each parameter
+    points = np.clip(np.vstack([here[None], here + steps, here - steps]), -FURTHEST, FURTHEST) if slopes else here[None]
+    found, reasons = _run(runs, model, bare, points, watch)
+    own = linearise(bare, here)
+    if own is None:
+        raise InputError(
+            f"{name}: the built-in engine finds no flow where the command is calibrated; widen the priors, or look at "
+            "the site with `vegglue check`."
+        )
+    if np.isnan(found[0]).any():
+        raise InputError(f"{name}: the command failed where it is calibrated: {reasons[0]}.")
+    value = found[0] - own.prediction
+    if not slopes:
+        return Correction(names, here, model.station, value, np.zeros_like(own.slope))
+    slope = np.zeros((found.shape[1], q))
+    for j in range(q):  # central differences; one-sided if the command fails on the other side
+        ahead, behind = 1 + j, 1 + q + j
+        ends = [end for end in (ahead, behind) if np.isfinite(found[end]).all()]
+        if not ends:
+            raise InputError(
+                f"{name}: the command failed on both sides of its best place for {names[j]}, so that it has no slope: "
+                f"{reasons[ahead]}."
+            )
+        first, last = (ahead, behind) if len(ends) == 2 else (ends[0], 0)
+        slope[:, j] = (found[first] - found[last]) / (points[first, j] - points[last, j])
+    if names and not slope.any():
+        raise InsensitiveCommandError(
+            f"{name}: expected a command of `engine` whose predictions change with {' or '.join(names)}, got the same "
+            "ones at either side of each; see whether it reads parameters.json."
+        )
+    ahead_of, behind_of = found[1 : 1 + q], found[1 + q :]
+    curve = np.sqrt(np.mean((ahead_of + behind_of - 2.0 * found[0]) ** 2, axis=1))
+    change = np.sqrt(np.mean((ahead_of - behind_of) ** 2, axis=1))
+    rough = tuple(name for name, a, b in zip(names, curve, change, strict=True) if a > ROUGH_SHARE * b)
+    return Correction(names, here, model.station, value, slope - own.slope, rough)
+
+
+def without_effects(model: Model) -> Model:
+    """The model that a command stands for: no effects, and the parameters that the command is given."""
+    names = own_parameters(model.case)
+    parameters = {name: model.case.parameters[name] for name in names}
+    return replace(model, case=model.case.model_copy(update={"effects": {}, "parameters": parameters}), engine=NEWTON)
+
+
+def _own(model: Model, z: Array, names: Sequence[str]) -> Array:
+    """The columns of z (m, p) that are parameters of the command."""
+    return z[:, [model.names.index(name) for name in names]]
+
+
+def _run(runs: CommandRuns, model: Model, bare: Model, z: Array, watch: Watch) -> tuple[Array, list[str]]:
+    """Runs of the command at z (m, q)."""
+    theta = theta_at(bare.case, z)
+    thetas = [{name: float(values[member]) for name, values in theta.items()} for member in range(len(z))]
+    why = f"running the command of {model.case.name}"
+    return command_predictions(runs, bare.case, model.station, thetas, watch, why)

@@ -1,7 +1,7 @@
-"""What inference and diagnosis ask of a flow engine, and nothing else of it.
+"""What inference and diagnosis need of a flow engine: seven functions.
 
-A model is a function from z (p,) to predictions (n,) at stations. Points z are places of the prior in which every
-parameter is standard normal, z = Phi^-1(F(theta)), so that the misfit of the prior is |z|^2.
+A model is a function f from z (p,) to predictions (n,) at stations. z is a place of the prior in which every parameter
+is standard normal, z = Phi^-1(F(theta)), so that the misfit of the prior is |z|^2.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,9 +21,18 @@ from vegglue.flow.local_changes import Term
 
 @dataclass(frozen=True)
 class Point:
-    """A model linearised at z (p,): predictions (n,) [m/s or m] and slopes d prediction / dz (n, p).
+    """A model linearised at one place of the prior.
 
-    flows: by experiment, what the engine keeps of the flow there; nobody else looks into it.
+    Parameters
+    ----------
+    z
+        The place (p,) [standard deviations].
+    prediction
+        f(z) (n,) [unit of each station].
+    slope
+        df/dz (n, p).
+    flows
+        What the engine keeps of the flow by experiment, for its own use.
     """
 
     z: Array
@@ -34,10 +43,16 @@ class Point:
 
 @dataclass(frozen=True)
 class Cause:
-    """A change whose response is asked for: a case that differs by its effects alone, with one parameter more, which
-    does nothing at `amplitude.off`.
+    """A change of a model whose response is wanted.
 
-    experiments: where it acts, empty for all of them.
+    Parameters
+    ----------
+    case
+        A case that differs by its effects alone, with one parameter more.
+    parameter, amplitude
+        That parameter, and the amplitude that it is of; it does nothing at `amplitude.off`.
+    experiments
+        Where it acts; empty: in all.
     """
 
     case: Case
@@ -55,7 +70,7 @@ class CentreFlow:
     v: Array
 
 
-# Told predictions (n,), whether their slopes are worth their time. Where they are not no point is given, either.
+# Whether the slopes of predictions (n,) are worth their time. If not, no point is returned, either.
 Wanted = Callable[[Array], bool]
 
 
@@ -68,18 +83,28 @@ def always(prediction: Array) -> bool:
 class Engine:
     """How a flow is computed. A new engine is one value of this kind, see `newton` and `marching`.
 
-    linearise(model, z, near, wanted): the model and its slopes at z (p,), or None where no steady flow is found;
-        near: a point to start from, of this model or of one on cells of twice the size, whose experiments may be
-        fewer; wanted: see `Wanted`.
-    predict(model, points, z): predictions (m, n) at z (m, p), NaN where no flow is found; points: some that are known.
-    responses(model, point, causes): d prediction / d (amplitude - off)^power at off, (n, causes).
-    responses_to_cells(model, point, experiment, terms): d prediction / d term of the stations of an experiment, for a
-        change in each cell of one of the TERMS of `flow/local_changes`, (n, nx, ny) by term.
-    flow_at_centres(model, point, experiment): depth and velocities of a point.
-    by_itself(model, point): the point with nothing borrowed from a flow nearby, where `responses_to_cells` is to be
-        exact to a per cent.
-    with_coarse_correction(point, before, after): a point to start from, moved as the flow on cells of twice the size
-        moved from one point to another; the point itself where an engine has no use for it.
+    Parameters
+    ----------
+    name
+        Of the engine.
+    linearise
+        (model, z, near, wanted) -> f(z) and df/dz as a Point at z (p,), or None if no steady flow is found. near: a
+        point to start from, of this model or of one on cells of twice the size, whose experiments may be fewer.
+    predict
+        (model, points, z) -> f (m, n) at z (m, p), NaN where no flow is found; points: some that are known.
+    responses
+        (model, point, causes) -> df / d(amplitude - off)^power at off (n, causes).
+    responses_to_cells
+        (model, point, experiment, terms) -> df / d term (n, nx, ny) by term, of the stations of the experiment, for a
+        change in each cell; terms: of `flow.local_changes.TERMS`.
+    flow_at_centres
+        (model, point, experiment) -> depth and velocities of a point.
+    relinearised
+        (model, point) -> the point with nothing reused from a flow nearby, so that `responses_to_cells` is exact to a
+        per cent.
+    with_coarse_correction
+        (point, before, after) -> a point to start from, moved as the flow on cells of twice the size moved from
+        `before` to `after`; the point itself if an engine has no use for it.
     """
 
     name: str
@@ -88,13 +113,23 @@ class Engine:
     responses: Callable[["Model", Point, Sequence[Cause]], Array]
     responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], Mapping[Term, Single]]
     flow_at_centres: Callable[["Model", Point, str], CentreFlow]
-    by_itself: Callable[["Model", Point], Point]
+    relinearised: Callable[["Model", Point], Point]
     with_coarse_correction: Callable[[Point, Point, Point], Point]
 
 
 @dataclass(frozen=True)
 class Model:
-    """A case on its grid, read at stations by an engine: a function from z (p,) to predictions (n,)."""
+    """A case on its grid, read at stations by an engine: a function f from z (p,) to predictions (n,).
+
+    Parameters
+    ----------
+    case, site
+        The case, and its grid.
+    station
+        Table of stations (n rows), see `measurements.observations`.
+    engine
+        How its flows are computed.
+    """
 
     case: Case
     site: Site
@@ -107,50 +142,47 @@ class Model:
 
     @cached_property
     def rows(self) -> dict[str, np.ndarray]:
-        """Which stations stand in each experiment."""
+        """Rows of the stations of each experiment."""
         names = self.station["experiment"].to_numpy()
         return {experiment: np.flatnonzero(names == experiment) for experiment in self.case.experiments}
 
     @cached_property
-    def _stations(self) -> dict[str, pd.DataFrame]:
+    def stations(self) -> dict[str, pd.DataFrame]:
+        """The stations of each experiment."""
         return {experiment: self.station.iloc[rows] for experiment, rows in self.rows.items()}
-
-    def station_of(self, experiment: str) -> pd.DataFrame:
-        """The stations of one experiment."""
-        return self._stations[experiment]
 
 
 def linearise(model: Model, z: Array, near: Point | None = None, wanted: Wanted = always) -> Point | None:
-    """Predictions and slopes at z (p,); None when a flow finds no rest, or slopes are not `wanted`. near: a point to
-    start from.
+    """f(z) and df/dz at z (p,); None if a flow has no steady state, or slopes are not `wanted`. near: a point to start
+    from.
     """
     return model.engine.linearise(model, z, near, wanted)
 
 
 def linearise_from(model: Model, z: Array, near: Point | None) -> Point | None:
-    """`linearise` from a point nearby, and from afar where that leads nowhere or there is none."""
+    """`linearise` from a point nearby, and from afar if that fails or there is none."""
     found = None if near is None else linearise(model, z, near)
     return found or linearise(model, z)
 
 
 def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
-    """Predictions (m, n) at z (m, p), NaN where no flow is found; points: some that are known already."""
+    """f (m, n) at z (m, p), NaN where no flow is found; points: some that are known."""
     return model.engine.predict(model, points, z)
 
 
 def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
-    """d prediction / d (amplitude - off)^power at off, (n, causes): the fingerprints of causes at a point."""
+    """df / d(amplitude - off)^power at off, (n, causes): the fingerprints of causes at a point."""
     return model.engine.responses(model, point, causes)
 
 
 def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:
-    """d prediction / d term (n, nx, ny) [unit of a station per that of the term] for a change of it in each cell."""
+    """df / d term (n, nx, ny) [unit of a station per that of the term] for a change of it in each cell."""
     return model.engine.responses_to_cells(model, point, experiment, terms)
 
 
-def by_itself(model: Model, point: Point) -> Point:
-    """The point with nothing borrowed from a flow nearby: its responses to cells are then exact to a per cent."""
-    return model.engine.by_itself(model, point)
+def relinearised(model: Model, point: Point) -> Point:
+    """The point with nothing reused from a flow nearby: its responses to cells are exact to a per cent."""
+    return model.engine.relinearised(model, point)
 
 
 def linearise_as_coarse(model: Model, point: Point, before: Point, after: Point) -> Point | None:

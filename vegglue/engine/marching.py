@@ -5,7 +5,6 @@ Slow: for tests, on small channels.
 """
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -37,96 +36,94 @@ MARCHED_CHANGE: dict[Term, float] = {
 
 def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
     """The engine with steps of `time_step` [s]; a flow that does not rest within `longest` [s] has no steady state."""
+
+    def read_at_rest(model: Model, experiment: str, problem: Problem, start: Array) -> tuple[Array, Array]:
+        """States (nx, 3, ny, m) marched until all rest, and predictions (m, stations); NaN if a member does not."""
+        state = start
+        for _ in range(int(longest / (time_step * STEPS_BETWEEN_CHECKS))):
+            before = march(problem, state, time_step, STEPS_BETWEEN_CHECKS)
+            state = march(problem, before, time_step, 1)
+            rate = np.abs(state - before).max(axis=(0, 1, 2)) / time_step
+            if (rate < REST_RATE).all():
+                break
+        else:
+            state = np.where(rate < REST_RATE, state, np.nan)
+        return state, predictions_at_sensors(problem, state, model.site.grid, model.stations[experiment])
+
+    def linearise(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
+        """All members of the central differences are marched side by side, the first of them at z itself."""
+        steps = MARCHED_DIFFERENCE_STEP * np.eye(z.size)
+        members = np.vstack([z[None], z + steps, z - steps])
+        prediction, flows = np.full((len(members), len(model.station)), np.nan), {}
+        for experiment in model.case.experiments:
+            problem = problem_at(model, experiment, members)
+            state, readings = read_at_rest(model, experiment, problem, _start(problem, near, experiment))
+            prediction[:, model.rows[experiment]], flows[experiment] = readings, state[..., :1].copy()
+        if not np.isfinite(prediction).all() or not wanted(prediction[0]):
+            return None
+        ahead, behind = prediction[1 : 1 + z.size], prediction[1 + z.size :]
+        return Point(z, prediction[0], (ahead - behind).T / (2.0 * MARCHED_DIFFERENCE_STEP), flows)
+
+    def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
+        prediction = np.full((len(z), len(model.station)), np.nan)
+        for experiment in model.case.experiments:
+            problem = problem_at(model, experiment, z)
+            start = _start(problem, points[0], experiment)
+            prediction[:, model.rows[experiment]] = read_at_rest(model, experiment, problem, start)[1]
+        prediction[np.isnan(prediction).any(axis=1)] = np.nan
+        return prediction
+
+    def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
+        """(f(small) - f(off)) / gain of small; all causes that act in an experiment are marched side by side."""
+        found, theta = np.zeros((len(model.station), len(causes))), theta_at(model.case, point.z)
+        values = [np.array([cause.amplitude.off + cause.amplitude.small]) for cause in causes]
+        gains = np.array([cause.amplitude.gain(value[0]) for cause, value in zip(causes, values, strict=True)])
+        for experiment in model.case.experiments:
+            here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
+            if not here:
+                continue
+            with_causes = [
+                build_problem(causes[j].case, model.site, experiment, theta | {causes[j].parameter: values[j]})
+                for j in here
+            ]
+            problem, rows = joined(with_causes), model.rows[experiment]
+            start = _start(problem, point, experiment)
+            moved = read_at_rest(model, experiment, problem, start)[1] - point.prediction[rows]
+            found[np.ix_(rows, np.array(here))] = moved.T / gains[here]
+        return found
+
+    def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> dict[Term, Single]:
+        """(f(change) - f(-change)) / (2 change) for every cell of the grid: two members each. (f(change) - f(0)) /
+        change for water that enters, which comes without momentum, while water that leaves takes its own along.
+        """
+        nx, ny = model.site.bed.shape
+        one, found = problem_at(model, experiment, point.z[None]), dict[Term, Single]()
+        geometry, cells = channel_geometry(model.case, model.site, experiment), np.eye(nx * ny).reshape(nx, ny, -1)
+        for term in terms:
+            change, inflow = MARCHED_CHANGE[term], term == "inflow"
+            behind = np.zeros((nx, ny, 1)) if inflow else -change * cells
+            problem = with_changed_term(one, geometry, term, np.concatenate([change * cells, behind], axis=2))
+            start = np.repeat(point.flows[experiment], problem.members, axis=3)
+            prediction = read_at_rest(model, experiment, problem, start)[1]
+            response = (prediction[: nx * ny] - prediction[nx * ny :]).T / (change * (1.0 if inflow else 2.0))
+            found[term] = response.reshape(-1, nx, ny).astype(np.float32)
+        return found
+
+    def flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:
+        now = faces(problem_at(model, experiment, point.z[None]), point.flows[experiment])
+        u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
+        return CentreFlow(now.cell[..., 0], u[..., 0], v[..., 0])
+
     return Engine(
         name="marching",
-        linearise=partial(_linearised, time_step=time_step, longest=longest),
-        predict=partial(_predicted, time_step=time_step, longest=longest),
-        responses=partial(_responses, time_step=time_step, longest=longest),
-        responses_to_cells=partial(_responses_to_cells, time_step=time_step, longest=longest),
-        flow_at_centres=_flow_at_centres,
-        by_itself=lambda model, point: point,
+        linearise=linearise,
+        predict=predict,
+        responses=responses,
+        responses_to_cells=responses_to_cells,
+        flow_at_centres=flow_at_centres,
+        relinearised=lambda model, point: point,
         with_coarse_correction=lambda point, before, after: point,
     )
-
-
-def _linearised(
-    model: Model, z: Array, near: Point | None, wanted: Wanted, time_step: float, longest: float
-) -> Point | None:
-    """All members of the central differences are marched side by side, the first of them at z itself."""
-    steps = MARCHED_DIFFERENCE_STEP * np.eye(z.size)
-    members = np.vstack([z[None], z + steps, z - steps])
-    prediction = np.full((len(members), len(model.station)), np.nan)
-    flows = {}
-    for experiment in model.case.experiments:
-        problem = problem_at(model, experiment, members)
-        state = _rested(problem, _start(problem, near, experiment), time_step, longest)
-        prediction[:, model.rows[experiment]] = _read(model, experiment, problem, state)
-        flows[experiment] = state[..., :1].copy()
-    if not np.isfinite(prediction).all() or not wanted(prediction[0]):
-        return None
-    ahead, behind = prediction[1 : 1 + z.size], prediction[1 + z.size :]
-    return Point(z, prediction[0], (ahead - behind).T / (2.0 * MARCHED_DIFFERENCE_STEP), flows)
-
-
-def _predicted(model: Model, points: Sequence[Point], z: Array, time_step: float, longest: float) -> Array:
-    prediction = np.full((len(z), len(model.station)), np.nan)
-    for experiment in model.case.experiments:
-        problem = problem_at(model, experiment, z)
-        state = _rested(problem, _start(problem, points[0], experiment), time_step, longest)
-        prediction[:, model.rows[experiment]] = _read(model, experiment, problem, state)
-    prediction[np.isnan(prediction).any(axis=1)] = np.nan
-    return prediction
-
-
-def _responses(model: Model, point: Point, causes: Sequence[Cause], time_step: float, longest: float) -> Array:
-    """(f(small) - f(off)) / gain of small; all causes that act in an experiment are marched side by side."""
-    found = np.zeros((len(model.station), len(causes)))
-    theta = theta_at(model.case, point.z)
-    values = [np.array([cause.amplitude.off + cause.amplitude.small]) for cause in causes]
-    gains = np.array([cause.amplitude.gain(value[0]) for cause, value in zip(causes, values, strict=True)])
-    for experiment in model.case.experiments:
-        here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
-        if not here:
-            continue
-        with_causes = [
-            build_problem(causes[j].case, model.site, experiment, theta | {causes[j].parameter: values[j]})
-            for j in here
-        ]
-        problem = joined(with_causes)
-        state = _rested(problem, _start(problem, point, experiment), time_step, longest)
-        rows = model.rows[experiment]
-        moved = _read(model, experiment, problem, state) - point.prediction[rows]
-        found[np.ix_(rows, np.array(here))] = moved.T / gains[here]
-    return found
-
-
-def _responses_to_cells(
-    model: Model, point: Point, experiment: str, terms: Sequence[Term], time_step: float, longest: float
-) -> dict[Term, Single]:
-    """(f(change) - f(-change)) / (2 change) for every cell of the grid: two members each; (f(change) - f(0)) / change
-    for water that enters, which comes without momentum, while water that leaves takes its own along.
-    """
-    nx, ny = model.site.bed.shape
-    one = problem_at(model, experiment, point.z[None])
-    geometry, cells = channel_geometry(model.case, model.site, experiment), np.eye(nx * ny).reshape(nx, ny, nx * ny)
-    found: dict[Term, Single] = {}
-    for term in terms:
-        ahead, behind = MARCHED_CHANGE[term] * cells, -MARCHED_CHANGE[term] * cells
-        if term == "inflow":
-            behind = np.zeros((nx, ny, 1))
-        problem = with_changed_term(one, geometry, term, np.concatenate([ahead, behind], axis=2))
-        start = np.repeat(point.flows[experiment], problem.members, axis=3)
-        prediction = _read(model, experiment, problem, _rested(problem, start, time_step, longest))
-        apart = MARCHED_CHANGE[term] * (1.0 if term == "inflow" else 2.0)
-        response = (prediction[: nx * ny] - prediction[nx * ny :]).T / apart
-        found[term] = response.reshape(-1, nx, ny).astype(np.float32)
-    return found
-
-
-def _flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:
-    now = faces(problem_at(model, experiment, point.z[None]), point.flows[experiment])
-    u, v = 0.5 * (now.u[1:] + now.u[:-1]), 0.5 * (now.v[:, 1:] + now.v[:, :-1])
-    return CentreFlow(now.cell[..., 0], u[..., 0], v[..., 0])
 
 
 def _start(problem: Problem, near: Point | None, experiment: str) -> Array:
@@ -134,18 +131,3 @@ def _start(problem: Problem, near: Point | None, experiment: str) -> Array:
     if near is None or experiment not in near.flows or near.flows[experiment].shape[::2] != problem.shape:
         return backwater(problem)
     return np.repeat(near.flows[experiment], problem.members, axis=3)
-
-
-def _rested(problem: Problem, state: Array, time_step: float, longest: float) -> Array:
-    """States (nx, 3, ny, m) marched until all rest; NaN where a member does not."""
-    for _ in range(int(longest / (time_step * STEPS_BETWEEN_CHECKS))):
-        before = march(problem, state, time_step, STEPS_BETWEEN_CHECKS)
-        state = march(problem, before, time_step, 1)
-        rate = np.abs(state - before).max(axis=(0, 1, 2)) / time_step
-        if (rate < REST_RATE).all():
-            return state
-    return np.where(rate < REST_RATE, state, np.nan)
-
-
-def _read(model: Model, experiment: str, problem: Problem, state: Array) -> Array:
-    return predictions_at_sensors(problem, state, model.site.grid, model.station_of(experiment))

@@ -11,7 +11,7 @@ how discharge is shared over all cells of an inflow, that part is added on its o
     + (l_n . dR/d ln Q) d ln W/da_c
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -25,7 +25,6 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.compilation import compiled
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
 from vegglue.flow.batch import solve_members
-from vegglue.flow.chord import ChordSolution
 from vegglue.flow.equations import cell_depths, faces, residual
 from vegglue.flow.jacobian import (
     Factors,
@@ -49,76 +48,19 @@ from vegglue.flow.tangent import CAUSE_SLOTS, adjoints, tangents
 from vegglue.flow.wet_band import chord_in_band, rows_inside, widen
 from vegglue.parallel import in_threads, parallel_map
 
-
-def problem_at(model: Model, experiment: str, z: Array) -> Problem:
-    """The flow problem of one experiment at z, (p,) or (m, p)."""
-    return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
-
-
-# Points solved together: as many as fit the lanes of chord steps from one point.
+# Step of central differences in z [standard deviations of the prior], small against 1 and large against rounding.
+DIFFERENCE_STEP = 1e-3
+# Correction of a tangent, over its largest entry, that is the last to be made [-]: what is left then is far smaller. On
+# open-b chi2, parameters and their intervals are the same to five digits as with 1e-3, for a third less work.
+TANGENT_TOLERANCE = 1e-2
+# Chord steps with the factors of another flow before new ones are made [-]. Of 422 flows of a run 406 converged in ten,
+# most in three; factors cost as much as some ten steps.
+REUSED_STEPS = 10
+# Members solved side by side from one point: on 9,600 cells 384 draws take 5.1 s with 32, 5.3 s with 24 and 6.2 s with
+# 16; more need more memory. No result depends on it but in the last digits.
+SLOTS_FROM_A_POINT = 32
+# Points solved together: as many as fit the batch slots of chord steps from one point.
 RUNS_TOGETHER = 32
-
-PredictNear = Callable[[Model, Point, Array], Array]
-
-
-def predict_members(predict_near: PredictNear, model: Model, points: Sequence[Point], z: Array) -> Array:
-    """Predictions (m, n) at z (m, p): from the nearest point; on their own where that fails; NaN where both do.
-
-    Sets of members that are as far from their point are solved together, the same whatever the number of cores.
-    """
-    away = np.stack([np.linalg.norm(z - point.z, axis=1) for point in points])
-    nearest = away.argmin(axis=0)
-    sets = [
-        (k, part)
-        for k in range(len(points))
-        for part in _sets(np.flatnonzero(nearest == k)[np.argsort(away[k, nearest == k], kind="stable")])
-    ]
-    found = np.full((len(z), len(model.station)), np.nan)
-    work, tasks = partial(_from_one, predict_near, model, points), [(k, z[part]) for k, part in sets]
-    for (_, part), prediction in zip(sets, parallel_map(work, tasks), strict=True):
-        found[part] = prediction
-    left = np.flatnonzero(np.isnan(found).any(axis=1))
-    if left.size:
-        found[left] = _alone(model, z[left])
-    return found
-
-
-def _sets(index: np.ndarray) -> list[np.ndarray]:
-    return [index[first : first + RUNS_TOGETHER] for first in range(0, index.size, RUNS_TOGETHER)]
-
-
-def _from_one(predict_near: PredictNear, model: Model, points: Sequence[Point], k: int, z: Array) -> Array:
-    return predict_near(model, points[k], z)
-
-
-def _alone(model: Model, z: Array) -> Array:
-    """The same from no point, as members of an ensemble are solved."""
-    found = np.full((len(z), len(model.station)), np.nan)
-    tasks = [(experiment, z) for experiment in model.case.experiments]
-    readings_of = parallel_map(partial(_read_alone, model), tasks)
-    for experiment, readings in zip(model.case.experiments, readings_of, strict=True):
-        found[:, model.rows[experiment]] = readings
-    found[np.isnan(found).any(axis=1)] = np.nan
-    return found
-
-
-def _read_alone(model: Model, experiment: str, z: Array) -> Array:
-    numerics = model.case.numerics
-    how = fall_back(numerics.march_step, numerics.march_span)
-    problem = problem_at(model, experiment, z)
-    build = partial(_problem_in_cube, model, experiment)
-    solved = solve_members(problem, ndtr(z), build, numerics.tolerance, how=how)
-    state = np.ascontiguousarray(solved.state)
-    prediction = predictions_at_sensors(problem, state, model.site.grid, model.station_of(experiment))
-    prediction[solved.status == FAILED] = np.nan
-    return prediction
-
-
-def _problem_in_cube(model: Model, experiment: str, points: Array) -> Problem:
-    """The flow problem of one experiment at points (m, p) of the unit cube."""
-    return problem_at(model, experiment, ndtri(points))
-
-
 # Cells from one changed cell to the next [-]: a change reaches the residual of two neighbours on either side.
 CELL_STRIDE = 5
 # Stations whose adjoints are made together [-]. On 342 x 40 cells 1,000 stations take 1.6 s of a core with 128, 1.7 s
@@ -132,103 +74,19 @@ SMALL_CHANGE: dict[Term, float] = {
 
 
 @dataclass(frozen=True)
-class _Change:
-    """A term changed in each cell: dR/da at shares of the inflows as they are, in every CELL_STRIDE-th cell at once
-    (nx, 3, ny, CELL_STRIDE^2), and d ln W/da of each inflow that shares by depth, (cell,) each.
-    """
-
-    local: Single
-    of_whole: tuple[Array, ...]
-
-
-def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:
-    """See `Engine.responses_to_cells`; in single precision, one solve for each station."""
-    flow, grid, station = point.flows[experiment], model.site.grid, model.station_of(experiment)
-    problem = problem_at(model, experiment, point.z[None])
-    state, rows = widen(flow.state, flow.rows, flow.band), slice(*flow.band)
-    part = crop(problem, *flow.band)
-    geometry = rows_of(channel_geometry(model.case, model.site, experiment), *flow.band)
-    changes = {term: _change(part, flow.state, geometry, term) for term in terms}
-    inflows = shared_inflows(part)
-    discharges = [answer_to_discharge(part, flow.state, inflow).astype(np.float32) for inflow in inflows]
-    found = {term: np.zeros((len(station), grid.x.size, grid.y.size), np.float32) for term in terms}
-    for first in range(0, len(station), STATIONS_TOGETHER):
-        some = slice(first, first + STATIONS_TOGETHER)
-        weights = reading_weights(problem, state, grid, station.iloc[some])
-        sensitivity = adjoints(part, flow.state, flow.factors, weights[:, :, rows]).astype(np.float32)
-        of_discharges = [np.einsum("ikjn,ikj->n", sensitivity, discharge) for discharge in discharges]
-        for term, change in changes.items():
-            answers = _told_apart(sensitivity, change.local)
-            for inflow, of_discharge, of_whole in zip(inflows, of_discharges, change.of_whole, strict=True):
-                column, row = cells_of(part, inflow)
-                answers[:, column, row] += np.outer(of_discharge, of_whole)
-            found[term][some, :, rows] = answers
-    return found
-
-
-def _change(part: Problem, state: Array, geometry: ChannelGeometry, term: Term) -> _Change:
-    small, states = SMALL_CHANGE[term], np.repeat(state, CELL_STRIDE**2, axis=3)
-    many = with_changed_term(part, geometry, term, small * _lattice(*part.shape))
-    before, after = cell_depths(part, state), cell_depths(many, states)
-    rates = residual(with_kept_shares(many, before, after), states)
-    # The depth of a cell changes in the one member only in which the cell itself is changed.
-    of_whole = [changes_of_whole(part, one, before, after).sum(axis=1) / small for one in shared_inflows(part)]
-    return _Change(((rates - residual(part, state)) / small).astype(np.float32), tuple(of_whole))
-
-
-def _lattice(nx: int, ny: int) -> Array:
-    """1 in the cells that are changed in member m, (nx, ny, CELL_STRIDE^2): every so many-th both ways."""
-    i, j = np.arange(nx)[:, None, None] % CELL_STRIDE, np.arange(ny)[None, :, None] % CELL_STRIDE
-    member = np.arange(CELL_STRIDE**2)
-    return ((i == member // CELL_STRIDE) & (j == member % CELL_STRIDE)).astype(float)
-
-
-def _told_apart(sensitivity: Single, change: Single) -> Single:
-    """-l . dR of every cell (n, nx, ny), summed over the window of CELL_STRIDE cells around it.
-
-    sensitivity l (nx, 3, ny, n), change dR (nx, 3, ny, CELL_STRIDE^2).
-    """
-    nx, _, ny, n = sensitivity.shape
-    found = np.zeros((nx, ny, n), dtype=np.float32)
-    _sum_windows(sensitivity, change, found)
-    return np.ascontiguousarray(np.moveaxis(found, -1, 0))
-
-
-@compiled
-def _sum_windows(sensitivity: Single, change: Single, found: Single) -> None:
-    nx, equations, ny, n = sensitivity.shape
-    half = CELL_STRIDE // 2
-    for i in range(nx):
-        first, last = max(i - half, 0), min(i + half + 1, nx)
-        for j in range(ny):
-            member = (i % CELL_STRIDE) * CELL_STRIDE + j % CELL_STRIDE
-            lowest, highest = max(j - half, 0), min(j + half + 1, ny)
-            for a in range(first, last):
-                for b in range(lowest, highest):
-                    for k in range(equations):
-                        weight = change[a, k, b, member]
-                        if weight != 0.0:
-                            for station in range(n):
-                                found[i, j, station] -= sensitivity[a, k, b, station] * weight
-
-
-# Step of central differences in z [standard deviations of the prior], small against 1 and large against rounding.
-DIFFERENCE_STEP = 1e-3
-# Correction of a tangent, over its largest entry, that is the last to be made [-]: what is left then is far smaller. On
-# open-b chi2, parameters and their intervals are the same to five digits as with 1e-3, for a third less work.
-TANGENT_TOLERANCE = 1e-2
-# Chord steps with the factors of another flow before new ones are made [-]. Of 422 flows of a run 406 got there in ten,
-# most in three; factors cost as much as some ten steps.
-BORROWED_STEPS = 10
-# Members solved side by side from one point: on 9,600 cells 384 draws take 5.1 s with 32, 5.3 s with 24 and 6.2 s with
-# 16; more need more memory. No result depends on it but in the last digits.
-LANES_FROM_A_POINT = 32
-
-
-@dataclass(frozen=True)
 class SteadyFlow:
-    """One experiment at a point: its state (nx, 3, wet rows, 1) in a band of all `rows`, factors of a Jacobian, slopes
-    d state / dz_j (nx, 3, wet rows, p), and by how much at most the state has moved since those factors [m, m/s].
+    """One experiment at a point.
+
+    Parameters
+    ----------
+    state, band, rows
+        State (nx, 3, wet rows, 1) in a band of all `rows`.
+    factors
+        Of a Jacobian at a state nearby.
+    slopes
+        d state / dz_j (nx, 3, wet rows, p).
+    moved
+        By how much at most the state has moved since those factors [m, m/s].
     """
 
     state: Array
@@ -238,130 +96,74 @@ class SteadyFlow:
     slopes: Array
     moved: float
 
+    def after(self, step: Array) -> Array:
+        """The state (nx, 3, rows, 1) of all rows after a step (q,) in the first q parameters, along its slopes."""
+        whole = widen(self.state, self.rows, self.band)
+        return whole + widen(self.slopes[..., : step.size] @ step[:, None], self.rows, self.band)
+
+
+def problem_at(model: Model, experiment: str, z: Array) -> Problem:
+    """The flow problem of one experiment at z, (p,) or (m, p)."""
+    return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
+
+
+def _read(model: Model, experiment: str, problem: Problem, state: Array, band: tuple[int, int]) -> Array:
+    """Predictions (m, stations of the experiment) of states in a band."""
+    wide = widen(state, model.site.grid.y.size, band)
+    return predictions_at_sensors(problem, wide, model.site.grid, model.stations[experiment])
+
 
 def linearised(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
-    """See `Engine.linearise`; experiments side by side, their slopes once all flows are known."""
-    found = in_threads(_at_rest, [(model, experiment, z, near) for experiment in model.case.experiments])
+    """f(z) and df/dz, see `Engine.linearise`; experiments side by side, their slopes once all flows are known."""
+    experiments = list(model.case.experiments)
+    found = in_threads(_steady, [(model, experiment, z, near) for experiment in experiments])
     flows = [one for one in found if one is not None]
     if len(flows) < len(found):
         return None
     prediction, slope = np.full(len(model.station), np.nan), np.full((len(model.station), z.size), np.nan)
-    for experiment, (_, values) in zip(model.case.experiments, flows, strict=True):
+    for experiment, (_, values) in zip(experiments, flows, strict=True):
         prediction[model.rows[experiment]] = values
     if not wanted(prediction):
         return None
-    tasks = [(model, experiment, z, flow) for experiment, (flow, _) in zip(model.case.experiments, flows, strict=True)]
-    sloping = dict(zip(model.case.experiments, in_threads(_with_slopes, tasks), strict=True))
+    tasks = [(model, experiment, z, flow) for experiment, (flow, _) in zip(experiments, flows, strict=True)]
+    sloping = dict(zip(experiments, in_threads(_with_slopes, tasks), strict=True))
     for experiment, (_, slopes) in sloping.items():
         slope[model.rows[experiment]] = slopes
-    if np.isnan(slope[np.isfinite(prediction)]).any():  # an effect of the user's gives no numbers beside this flow
+    if np.isnan(slope[np.isfinite(prediction)]).any():  # an effect of a user's file gives no numbers beside this flow
         return None
     return Point(z, prediction, slope, {experiment: flow for experiment, (flow, _) in sloping.items()})
 
 
-def predict_near(model: Model, point: Point, z: Array) -> Array:
-    """Predictions (m, n) at z (m, p) around a point, with its factors; NaN rows where they do not lead there."""
-    found = np.full((len(z), len(model.station)), np.nan)
-    for first in range(0, len(z), LANES_FROM_A_POINT):
-        part = slice(first, min(first + LANES_FROM_A_POINT, len(z)))
-        found[part] = _few_near(model, point, z[part])
-    return found
-
-
-def _few_near(model: Model, point: Point, z: Array) -> Array:
-    found = np.full((len(z), len(model.station)), np.nan)
-    for experiment, flow in point.flows.items():
-        rows = model.rows[experiment]
-        problem = problem_at(model, experiment, z)
-        start = flow.state + flow.slopes @ (z - point.z).T
-        solution = chord_in_band(problem, start, flow.factors, flow.band, model.case.numerics.tolerance)
-        found[:, rows] = _read(model, experiment, problem, solution.state, flow.band)
-        found[~solution.converged] = np.nan
-    return found
-
-
-def responses_by_tangents(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
-    """See `Engine.responses`; one tangent for each cause, those that are solved together side by side with others."""
-    found = np.zeros((len(model.station), len(causes)))
-    tasks = []
-    for experiment in point.flows:
-        here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
-        tasks += [(experiment, here[first : first + CAUSE_SLOTS]) for first in range(0, len(here), CAUSE_SLOTS)]
-    work = partial(_responses_in, model, point)
-    parts = in_threads(work, [(experiment, [causes[j] for j in some]) for experiment, some in tasks])
-    for (experiment, some), part in zip(tasks, parts, strict=True):
-        found[np.ix_(model.rows[experiment], np.array(some))] = part
-    return found
-
-
-def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[Cause]) -> Array:
-    """Responses in one experiment, (stations of it, causes), to causes that act in it."""
-    flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), model.rows[experiment]
-    found = np.zeros((rows.size, len(causes)))
-    whole = problem_at(model, experiment, point.z)
-    base = crop(whole, *flow.band)
-    without_cause = residual(base, flow.state)
-    built, changes = [], np.zeros((*flow.state.shape[:3], len(causes)))
-    moving = [lane for lane, cause in enumerate(causes) if stages_of(cause.case, cause.parameter) != {"sensor"}]
-    for lane, cause in enumerate(causes):
-        amplitude = cause.amplitude
-        gain, value = amplitude.gain(amplitude.off + amplitude.small), np.array([amplitude.off + amplitude.small])
-        problem = with_effects_of(cause.case, model.site, experiment, theta | {cause.parameter: value}, whole)
-        if lane in moving:
-            changes[..., lane] = ((residual(crop(problem, *flow.band), flow.state) - without_cause) / gain)[..., 0]
-        built.append((problem, gain))
-    changes[..., moving] = tangents(base, flow.state, flow.factors, changes[..., moving], TANGENT_TOLERANCE)
-    for lane, (problem, gain) in enumerate(built):
-        state = flow.state + gain * changes[..., lane : lane + 1]
-        now = _read(model, experiment, problem, state, flow.band)[0]
-        found[:, lane] = (now - point.prediction[rows]) / gain
-    return found
-
-
-def with_own_factors(model: Model, point: Point) -> Point:
-    """See `Engine.by_itself`: with factors of a flow nearby answers to cells are off by some 5 %, with its own by
-    0.5 %.
+def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tuple[SteadyFlow, Array] | None:
+    """The flow of one experiment without its slopes, with the factors of a point nearby, else with its own, and its
+    predictions (stations of it,).
     """
-    flows = dict(point.flows)
-    for experiment, flow in point.flows.items():
-        if flow.moved > 0.0:
-            problem = crop(problem_at(model, experiment, point.z), *flow.band)
-            flows[experiment] = replace(flow, factors=factors(problem, flow.state), moved=0.0)
-    return replace(point, flows=flows)
+    problem, tolerance, warm, flow = problem_at(model, experiment, z), model.case.numerics.tolerance, None, None
+    before = None if near is None else near.flows.get(experiment)
+    if near is not None and before is not None:
+        # Along its slopes; from a point on cells of twice the size if need be.
+        warm = on_grid(before.after(_step_of_known(near.z, z)), problem.shape)
+        if before.state.shape[0] == problem.shape[0] and before.rows == problem.shape[1]:
+            start = rows_inside(warm, before.band)
+            end = chord_in_band(problem, start, before.factors, before.band, tolerance, REUSED_STEPS)
+            if end.converged[0]:
+                moved = before.moved + float(np.abs(end.state - before.state).max())
+                flow = replace(before, state=end.state, moved=moved)
+            elif end.correction[0] < CLOSE:  # factors made here lead on, and are those of the flow itself
+                warm = widen(end.state, before.rows, before.band)
+    if flow is None:
+        solution, own, band = settled(problem, warm, tolerance)
+        if own is None:
+            return None
+        flow = SteadyFlow(solution.state, band, problem.shape[1], own, EMPTY, 0.0)
+    return flow, _read(model, experiment, problem, flow.state, flow.band)[0]
 
 
-def with_coarse_correction(point: Point, before: Point, after: Point) -> Point:
-    """u + S dz + P (U_after - U_before - S_c dz): slopes of the point, and what they leave out on coarse cells.
-
-    u, U: states of the point and on cells of twice the size; S, S_c: their slopes; P: prolongation. See
-    `Engine.with_coarse_correction`. Source: coarse-grid correction of the full approximation scheme (Brandt 1977,
-    doi:10.1090/S0025-5718-1977-0431719-X; not checked against it).
+def _step_of_known(known: Array, z: Array) -> Array:
+    """z - z_known, to take along slopes known at one point; none if an effect was taken away since. An effect that was
+    added since has the last of z.
     """
-    flows, step = dict(point.flows), _step_of_known(point.z, after.z)
-    for experiment in point.flows.keys() & before.flows.keys() & after.flows.keys():
-        flow, first, last = (one.flows[experiment] for one in (point, before, after))
-        left = _whole(last) - _moved_along_slopes(first, step)
-        fine = _moved_along_slopes(flow, step) + on_grid(left, (flow.state.shape[0], flow.rows))
-        state = rows_inside(fine, flow.band)
-        moved = flow.moved + float(np.abs(state - flow.state).max())
-        flows[experiment] = replace(flow, state=state, moved=moved)
-    return replace(point, z=after.z[: point.z.size], flows=flows)
-
-
-def centre_flow(model: Model, point: Point, experiment: str) -> CentreFlow:
-    """See `Engine.flow_at_centres`: velocities are the mean of those on both faces."""
-    flow = point.flows[experiment]
-    now = faces(problem_at(model, experiment, point.z), widen(flow.state, model.site.grid.y.size, flow.band))
-    u = 0.5 * (now.u[1:] + now.u[:-1])[..., 0]
-    v = 0.5 * (now.v[:, 1:] + now.v[:, :-1])[..., 0]
-    return CentreFlow(now.cell[..., 0], u, v)
-
-
-def _at_rest(model: Model, experiment: str, z: Array, near: Point | None) -> tuple[SteadyFlow, Array] | None:
-    """The flow of one experiment without its slopes, and its predictions (stations of it,)."""
-    problem = problem_at(model, experiment, z)
-    found = _state_and_factors(model, experiment, problem, z, near)
-    return None if found is None else (found, _read(model, experiment, problem, found.state, found.band)[0])
+    return z[: known.size] - known if known.size <= z.size else np.zeros(0)
 
 
 def _with_slopes(model: Model, experiment: str, z: Array, flow: SteadyFlow) -> tuple[SteadyFlow, Array]:
@@ -380,68 +182,215 @@ def _with_slopes(model: Model, experiment: str, z: Array, flow: SteadyFlow) -> t
     return replace(flow, slopes=slopes), (read[:p] - read[p:]).T / (2.0 * DIFFERENCE_STEP)
 
 
-def _state_and_factors(
-    model: Model, experiment: str, problem: Problem, z: Array, near: Point | None
-) -> SteadyFlow | None:
-    """The flow without its slopes: with the factors of a point nearby, else with its own."""
-    tolerance, warm = model.case.numerics.tolerance, None
-    before = None if near is None else near.flows.get(experiment)
-    if near is not None and before is not None:
-        warm = _warm(near, before, z, problem.shape)
-        end = _borrowed(problem, before, warm, tolerance)
-        if end is not None and end.converged[0]:
-            moved = before.moved + float(np.abs(end.state - before.state).max())
-            return replace(before, state=end.state, moved=moved)
-        if end is not None and end.correction[0] < CLOSE:  # factors made here lead on, and are those of the flow itself
-            warm = widen(end.state, before.rows, before.band)
-    solution, own, band = settled(problem, warm, tolerance)
-    return None if own is None else SteadyFlow(solution.state, band, problem.shape[1], own, EMPTY, 0.0)
+def predict_members(model: Model, points: Sequence[Point], z: Array) -> Array:
+    """f(z) of many members, see `Engine.predict`: from the nearest point, and on their own where that fails.
 
-
-def _borrowed(problem: Problem, before: SteadyFlow, warm: Array, tolerance: float) -> ChordSolution | None:
-    """A few chord steps with factors of a flow nearby; None if that has other cells."""
-    if before.state.shape[0] != problem.shape[0] or before.rows != problem.shape[1]:
-        return None
-    start = rows_inside(warm, before.band)
-    return chord_in_band(problem, start, before.factors, before.band, tolerance, BORROWED_STEPS)
-
-
-def _warm(near: Point, before: SteadyFlow, z: Array, shape: tuple[int, int]) -> Array:
-    """A start (nx, 3, ny, 1) from a point nearby, along its slopes; from one on cells of twice the size if need be.
-
-    Where an effect was added since, its amplitude is the last of z.
+    Sets of members that are as far from their point are solved together, the same whatever the number of cores.
     """
-    return on_grid(_moved_along_slopes(before, _step_of_known(near.z, z)), shape)
+    away = np.stack([np.linalg.norm(z - point.z, axis=1) for point in points])
+    nearest, sets = away.argmin(axis=0), []
+    for k in range(len(points)):
+        index = np.flatnonzero(nearest == k)[np.argsort(away[k, nearest == k], kind="stable")]
+        sets += [(k, index[first : first + RUNS_TOGETHER]) for first in range(0, index.size, RUNS_TOGETHER)]
+    found = np.full((len(z), len(model.station)), np.nan)
+    tasks = [(points[k], z[part]) for k, part in sets]
+    for (_, part), prediction in zip(sets, parallel_map(partial(predict_near, model), tasks), strict=True):
+        found[part] = prediction
+    left, experiments = np.flatnonzero(np.isnan(found).any(axis=1)), list(model.case.experiments)
+    if left.size:  # as members of an ensemble are solved
+        alone = np.full((left.size, len(model.station)), np.nan)
+        readings_of = parallel_map(partial(_predict_alone, model), [(one, z[left]) for one in experiments])
+        for experiment, readings in zip(experiments, readings_of, strict=True):
+            alone[:, model.rows[experiment]] = readings
+        alone[np.isnan(alone).any(axis=1)] = np.nan
+        found[left] = alone
+    return found
 
 
-def _step_of_known(known: Array, z: Array) -> Array:
-    """z - z_known, to take along slopes known at one point; none where an effect was taken away since."""
-    return z[: known.size] - known if known.size <= z.size else np.zeros(0)
+def predict_near(model: Model, point: Point, z: Array) -> Array:
+    """Predictions (m, n) at z (m, p) around a point, with its factors; NaN rows where they do not lead there."""
+    found = np.full((len(z), len(model.station)), np.nan)
+    for first in range(0, len(z), SLOTS_FROM_A_POINT):
+        some = slice(first, min(first + SLOTS_FROM_A_POINT, len(z)))
+        part = found[some]
+        for experiment, flow in point.flows.items():
+            problem = problem_at(model, experiment, z[some])
+            start = flow.state + flow.slopes @ (z[some] - point.z).T
+            solution = chord_in_band(problem, start, flow.factors, flow.band, model.case.numerics.tolerance)
+            part[:, model.rows[experiment]] = _read(model, experiment, problem, solution.state, flow.band)
+            part[~solution.converged] = np.nan
+    return found
 
 
-def _moved_along_slopes(flow: SteadyFlow, step: Array) -> Array:
-    """State (nx, 3, ny, 1) of all rows after a step (q,) in the first q parameters."""
-    return _whole(flow) + widen(flow.slopes[..., : step.size] @ step[:, None], flow.rows, flow.band)
+def _predict_alone(model: Model, experiment: str, z: Array) -> Array:
+    numerics = model.case.numerics
+    how = fall_back(numerics.march_step, numerics.march_span)
+
+    def problem_of(points: Array) -> Problem:
+        return problem_at(model, experiment, ndtri(points))
+
+    problem = problem_at(model, experiment, z)
+    solved = solve_members(problem, ndtr(z), problem_of, numerics.tolerance, how=how)
+    state = np.ascontiguousarray(solved.state)
+    prediction = predictions_at_sensors(problem, state, model.site.grid, model.stations[experiment])
+    prediction[solved.status == FAILED] = np.nan
+    return prediction
 
 
-def _whole(flow: SteadyFlow) -> Array:
-    """Its state (nx, 3, ny, 1) with the rows beside its band."""
-    return widen(flow.state, flow.rows, flow.band)
+def responses_by_tangents(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
+    """df/dg of each cause, see `Engine.responses`: tangents, those of one experiment side by side."""
+    found, tasks = np.zeros((len(model.station), len(causes))), []
+    for experiment in point.flows:
+        here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
+        tasks += [(experiment, here[first : first + CAUSE_SLOTS]) for first in range(0, len(here), CAUSE_SLOTS)]
+    work = partial(_responses_in, model, point)
+    parts = in_threads(work, [(experiment, [causes[j] for j in some]) for experiment, some in tasks])
+    for (experiment, some), part in zip(tasks, parts, strict=True):
+        found[np.ix_(model.rows[experiment], np.array(some))] = part
+    return found
 
 
-def _read(model: Model, experiment: str, problem: Problem, state: Array, band: tuple[int, int]) -> Array:
-    """Predictions (m, stations of the experiment) of states in a band."""
-    wide = widen(state, model.site.grid.y.size, band)
-    return predictions_at_sensors(problem, wide, model.site.grid, model.station_of(experiment))
+def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[Cause]) -> Array:
+    """Responses in one experiment, (stations of it, causes), to causes that act in it."""
+    flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), model.rows[experiment]
+    found = np.zeros((rows.size, len(causes)))
+    whole = problem_at(model, experiment, point.z)
+    base = crop(whole, *flow.band)
+    without_cause = residual(base, flow.state)
+    built, changes = [], np.zeros((*flow.state.shape[:3], len(causes)))
+    moving = [column for column, cause in enumerate(causes) if stages_of(cause.case, cause.parameter) != {"sensor"}]
+    for column, cause in enumerate(causes):
+        amplitude = cause.amplitude
+        gain, value = amplitude.gain(amplitude.off + amplitude.small), np.array([amplitude.off + amplitude.small])
+        problem = with_effects_of(cause.case, model.site, experiment, theta | {cause.parameter: value}, whole)
+        if column in moving:
+            changes[..., column] = ((residual(crop(problem, *flow.band), flow.state) - without_cause) / gain)[..., 0]
+        built.append((problem, gain))
+    changes[..., moving] = tangents(base, flow.state, flow.factors, changes[..., moving], TANGENT_TOLERANCE)
+    for column, (problem, gain) in enumerate(built):
+        state = flow.state + gain * changes[..., column : column + 1]
+        now = _read(model, experiment, problem, state, flow.band)[0]
+        found[:, column] = (now - point.prediction[rows]) / gain
+    return found
+
+
+def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:
+    """df/da_c of each cell, see `Engine.responses_to_cells`; in single precision, one solve for each station."""
+    flow, grid, station = point.flows[experiment], model.site.grid, model.stations[experiment]
+    problem = problem_at(model, experiment, point.z[None])
+    state, rows = widen(flow.state, flow.rows, flow.band), slice(*flow.band)
+    part = crop(problem, *flow.band)
+    geometry = rows_of(channel_geometry(model.case, model.site, experiment), *flow.band)
+    changes = {term: _cell_changes(part, flow.state, geometry, term) for term in terms}
+    inflows = shared_inflows(part)
+    discharges = [answer_to_discharge(part, flow.state, inflow).astype(np.float32) for inflow in inflows]
+    found = {term: np.zeros((len(station), grid.x.size, grid.y.size), np.float32) for term in terms}
+    for first in range(0, len(station), STATIONS_TOGETHER):
+        some = slice(first, first + STATIONS_TOGETHER)
+        weights = reading_weights(problem, state, grid, station.iloc[some])
+        sensitivity = adjoints(part, flow.state, flow.factors, weights[:, :, rows]).astype(np.float32)
+        of_discharges = [np.einsum("ikjn,ikj->n", sensitivity, discharge) for discharge in discharges]
+        nx, _, ny, n = sensitivity.shape
+        for term, (local, of_wholes) in changes.items():
+            windows = np.zeros((nx, ny, n), dtype=np.float32)
+            _sum_windows(sensitivity, local, windows)
+            answers = np.ascontiguousarray(np.moveaxis(windows, -1, 0))
+            for inflow, of_discharge, of_whole in zip(inflows, of_discharges, of_wholes, strict=True):
+                column, row = cells_of(part, inflow)
+                answers[:, column, row] += np.outer(of_discharge, of_whole)
+            found[term][some, :, rows] = answers
+    return found
+
+
+def _cell_changes(part: Problem, state: Array, geometry: ChannelGeometry, term: Term) -> tuple[Single, list[Array]]:
+    """A term changed in each cell: dR/da at unchanged shares of the inflows, in every CELL_STRIDE-th cell at once
+    (nx, 3, ny, CELL_STRIDE^2), and d ln W/da of each inflow that shares by depth, (cell,) each.
+    """
+    (nx, ny), small = part.shape, SMALL_CHANGE[term]
+    member = np.arange(CELL_STRIDE**2)  # of each cell that is changed in it: every so many-th both ways
+    i, j = np.arange(nx)[:, None, None] % CELL_STRIDE, np.arange(ny)[None, :, None] % CELL_STRIDE
+    lattice = ((i == member // CELL_STRIDE) & (j == member % CELL_STRIDE)).astype(float)
+    states = np.repeat(state, CELL_STRIDE**2, axis=3)
+    many = with_changed_term(part, geometry, term, small * lattice)
+    before, after = cell_depths(part, state), cell_depths(many, states)
+    rates = residual(with_kept_shares(many, before, after), states)
+    # The depth of a cell changes in the one member only in which the cell itself is changed.
+    of_wholes = [changes_of_whole(part, one, before, after).sum(axis=1) / small for one in shared_inflows(part)]
+    return ((rates - residual(part, state)) / small).astype(np.float32), of_wholes
+
+
+@compiled
+def _sum_windows(sensitivity: Single, change: Single, found: Single) -> None:
+    """-l . dR of every cell (nx, ny, n), summed over the window of CELL_STRIDE cells around it, into found.
+
+    sensitivity l (nx, 3, ny, n), change dR (nx, 3, ny, CELL_STRIDE^2).
+    """
+    nx, equations, ny, n = sensitivity.shape
+    half = CELL_STRIDE // 2
+    for i in range(nx):
+        first, last = max(i - half, 0), min(i + half + 1, nx)
+        for j in range(ny):
+            member = (i % CELL_STRIDE) * CELL_STRIDE + j % CELL_STRIDE
+            lowest, highest = max(j - half, 0), min(j + half + 1, ny)
+            for a in range(first, last):
+                for b in range(lowest, highest):
+                    for k in range(equations):
+                        weight = change[a, k, b, member]
+                        if weight != 0.0:
+                            for station in range(n):
+                                found[i, j, station] -= sensitivity[a, k, b, station] * weight
+
+
+def with_own_factors(model: Model, point: Point) -> Point:
+    """See `Engine.relinearised`: with factors of a flow nearby responses to cells are off by some 5 %, with its own by
+    0.5 %.
+    """
+    flows = dict(point.flows)
+    for experiment, flow in point.flows.items():
+        if flow.moved > 0.0:
+            problem = crop(problem_at(model, experiment, point.z), *flow.band)
+            flows[experiment] = replace(flow, factors=factors(problem, flow.state), moved=0.0)
+    return replace(point, flows=flows)
+
+
+def with_coarse_correction(point: Point, before: Point, after: Point) -> Point:
+    """u + S dz + P (U_after - U_before - S_c dz): slopes of the point, and what they leave out on coarse cells.
+
+    u, U: states of the point and on cells of twice the size; S, S_c: their slopes; P: prolongation. See
+    `Engine.with_coarse_correction`.
+
+    References
+    ----------
+    Coarse-grid correction of the full approximation scheme: Brandt (1977), doi:10.1090/S0025-5718-1977-0431719-X; not
+    checked against it.
+    """
+    flows, step = dict(point.flows), _step_of_known(point.z, after.z)
+    for experiment in point.flows.keys() & before.flows.keys() & after.flows.keys():
+        flow, first, last = (one.flows[experiment] for one in (point, before, after))
+        left = widen(last.state, last.rows, last.band) - first.after(step)
+        fine = flow.after(step) + on_grid(left, (flow.state.shape[0], flow.rows))
+        state = rows_inside(fine, flow.band)
+        moved = flow.moved + float(np.abs(state - flow.state).max())
+        flows[experiment] = replace(flow, state=state, moved=moved)
+    return replace(point, z=after.z[: point.z.size], flows=flows)
+
+
+def centre_flow(model: Model, point: Point, experiment: str) -> CentreFlow:
+    """See `Engine.flow_at_centres`: velocities are the mean of those on both faces."""
+    flow = point.flows[experiment]
+    now = faces(problem_at(model, experiment, point.z), widen(flow.state, model.site.grid.y.size, flow.band))
+    u = 0.5 * (now.u[1:] + now.u[:-1])[..., 0]
+    v = 0.5 * (now.v[:, 1:] + now.v[:, :-1])[..., 0]
+    return CentreFlow(now.cell[..., 0], u, v)
 
 
 NEWTON = Engine(
     name="newton",
     linearise=linearised,
-    predict=partial(predict_members, predict_near),
+    predict=predict_members,
     responses=responses_by_tangents,
     responses_to_cells=responses_by_adjoints,
     flow_at_centres=centre_flow,
-    by_itself=with_own_factors,
+    relinearised=with_own_factors,
     with_coarse_correction=with_coarse_correction,
 )
