@@ -1,34 +1,39 @@
-"""Which probes are taken for dead, and which slow ones are not."""
+"""Which probes are dead, and which slow ones are not."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from vegglue.measurements.dead_probes import dead_probes
+from vegglue.measurements.adv_section import DeadProbe, dead_probes
 
-EDGES = (0.0, 8.0)
 Y = np.arange(1.0, 8.0)
-COUNT = np.full(7, 20)
-
-
-def judge(mean, deviation=0.07, plants=False, largest=None, count=COUNT):
-    mean = np.array(mean)
-    deviation, plants = np.broadcast_to(deviation, 7).astype(float), np.broadcast_to(plants, 7)
-    largest = np.abs(mean) + 0.004 if largest is None else np.array(largest)
-    return [reason != "" for reason in dead_probes(EDGES, Y, count, largest, mean, deviation, plants)]
-
-
 ONLY_FOURTH = [False, False, False, True, False, False, False]
 NONE = [False] * 7
 
 
-def test_dead_probe_is_flagged_with_its_numbers():
-    mean, deviation = np.array([0.2, 0.5, 0.5, 0.001, 0.5, 0.5, 0.2]), np.full(7, 0.07)
-    deviation[3] = 0.004
-    reason = dead_probes(EDGES, Y, COUNT, np.abs(mean) + 0.004, mean, deviation, np.zeros(7, bool))[3]
-    assert "all 20 heights" in reason
-    assert "0.005 m/s" in reason
-    assert "0.50 m/s" in reason
-    assert "0.004 against 0.070" in reason
+def found(mean, deviation=0.07, plants=False, largest=None, count=20) -> dict[float, DeadProbe]:
+    """Dead probes among verticals with these means and largest speeds [m/s] between edges at 0 and 8 m."""
+    mean = np.array(mean)
+    deviation, plants, count = (np.broadcast_to(one, 7) for one in (deviation, plants, count))
+    largest = np.copysign(np.abs(mean) + 0.004 if largest is None else largest, mean)
+    rows = [
+        {"y": y, "u": u, "u_std": float(deviation[k]), "plants": bool(plants[k])}
+        for k, y in enumerate(Y)
+        for u in (largest[k], 2.0 * mean[k] - largest[k]) * (count[k] // 2)
+    ]
+    return dead_probes((0.0, 8.0), pd.DataFrame(rows))
+
+
+def judge(mean, deviation=0.07, plants=False, largest=None, count=20) -> list[bool]:
+    dead = found(mean, deviation, plants, largest, count)
+    return [y in dead for y in Y]
+
+
+def test_a_dead_probe_is_found_with_its_numbers():
+    calm = np.where(Y == 4.0, 0.004, 0.07)
+    expected = DeadProbe(20, *(pytest.approx(one, abs=1e-9) for one in (0.005, 0.5, 0.004, 0.07)))
+    assert found([0.2, 0.5, 0.5, 0.001, 0.5, 0.5, 0.2], calm) == {4.0: expected}
+    assert found([0.2, 0.5, 0.5, 0.001, 0.5, 0.5, 0.2], np.nan)[4.0].deviation is None
 
 
 def test_slow_water_that_fluctuates_is_not_a_dead_probe():
@@ -47,7 +52,7 @@ def test_without_turbulence_in_the_file_the_mean_decides_outside_plants():
 def test_slow_vertical_at_the_bank_is_not_a_dead_probe():
     calm = [0.005, 0.07, 0.07, 0.07, 0.07, 0.07, 0.07]
     assert judge([-0.01, 0.1, 0.4, 0.5, 0.5, 0.4, 0.1], calm, largest=[0.03, 0.2, 0.6, 0.7, 0.7, 0.6, 0.2]) == NONE
-    few = np.array([2, 20, 20, 20, 20, 20, 20])
+    few = [2, 20, 20, 20, 20, 20, 20]
     assert judge([0.001, 0.5, 0.5, 0.5, 0.5, 0.5, 0.2], calm, count=few) == NONE
 
 

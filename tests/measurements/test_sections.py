@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from vegglue.measurements.sections import section_places
+from vegglue.measurements.observations import section_places
 
 
 def station(**columns: list[float] | list[str]) -> pd.DataFrame:

@@ -23,7 +23,7 @@ from vegglue.arrays import Array
 from vegglue.decision_constants import constants
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import kind_of, unstated_errors
-from vegglue.measurements.sections import section_places
+from vegglue.measurements.observations import section_places
 from vegglue.parallel import in_threads
 from vegglue.wording.sentences import sentence
 

@@ -36,8 +36,7 @@ from vegglue.decision_constants import constants
 from vegglue.diagnosis.field_scan import free_of_prior
 from vegglue.engine.interface import Model, Point, linearise, predict
 from vegglue.measurements.kinds import leading_velocities
-from vegglue.measurements.observations import station_table
-from vegglue.measurements.sections import section_places
+from vegglue.measurements.observations import section_places, station_table
 
 # How often errors alone exceed what is told of them; 5 % is usual.
 BY_CHANCE = 0.05

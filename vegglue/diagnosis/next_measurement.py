@@ -27,8 +27,7 @@ from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.schema import Case, Experiment
 from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
-from vegglue.measurements.observations import station_table
-from vegglue.measurements.sections import section_places
+from vegglue.measurements.observations import section_places, station_table
 from vegglue.wording.numbers import in_digits
 
 # Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.

@@ -15,7 +15,6 @@ from vegglue.case.schema import Case, Observation
 from vegglue.case.zones import cells_of_patch
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.csv_table import headings_of, read_table, refuse_repeated, refuse_rows
-from vegglue.measurements.dead_probes import dead_probes
 from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.measurements.section_discharge import (
     GRID_STEP,
@@ -36,17 +35,23 @@ from vegglue.measurements.vertical_profile import (
     linear_average,
     sampling_error,
 )
-from vegglue.wording.numbers import in_digits, so_many
+from vegglue.wording.numbers import in_digits, range_in_digits, so_many
+from vegglue.wording.sentences import sentence
 
 EDGE = 0.05  # m, a vertical closer to the edge of a patch stands beside the plants as much as in them
 SMALLEST_ERROR = 0.001  # m/s, resolution of an ADV; keeps one calm point from outweighing all others
-SLOWEST = 0.05  # m/s, below which the mean velocity of a vertical says nothing about its time scale
+SLOWEST = 0.05  # m/s, below which the mean velocity of a vertical does not give its time scale
 # Stand-ins for what a file leaves out, chosen so that errors come out too large rather than too small.
 TURBULENCE = 0.15  # u_std over the mean velocity of the vertical
 DURATION = 60.0  # s
 # Why a point is not used.
 BELOW_BED, ABOVE_SURFACE = "below the bed", "above the water surface"
 SECTIONS_OF_FLOOR = 50  # chosen, not measured: some in every pool and on every riffle of a reach
+# A probe is dead when all four hold. Chosen wide apart from what slow water shows, which still fluctuates.
+LARGEST_DEAD_SPEED = 0.05  # m/s, no point of a dead probe is above this
+SHARE_OF_SPEED = 0.1  # [-], at all heights it reads less than this share of the velocity between its neighbours
+SHARE_OF_TURBULENCE = 0.25  # [-], and its velocity fluctuates by less than this share of theirs
+FEWEST_HEIGHTS = 3  # with fewer points a slow vertical at the water's edge may look like a dead probe
 
 
 @dataclass(frozen=True)
@@ -60,14 +65,42 @@ class Section:
     canopy_height: CanopyHeight | None
 
 
+@dataclass(frozen=True)
+class DeadProbe:
+    """A probe that reads near zero at all heights; all but `heights` in m/s.
+
+    largest: largest |u|; expected: mean u between its neighbours; deviation, expected_deviation: median of u_std here
+    and between its neighbours, None if unknown.
+    """
+
+    heights: int
+    largest: float
+    expected: float
+    deviation: float | None
+    expected_deviation: float | None
+
+
 def read_section(case: Case, observation: Observation, gauges: pd.DataFrame) -> Section:
-    """What one observation of `kind: adv` says about its section: points, verticals, discharge, canopy height.
+    """Points, verticals, discharge and canopy height of the section of one observation of `kind: adv`.
 
     gauges: stations of measured levels. Errors: InputError, naming file and row, for what cannot be used as given.
     """
-    points = _read_points(observation)
-    section = _cross_section(case, observation, points["x"].iloc[0], gauges)
-    points = _without_dead_probes(_with_errors(_placed(case, observation, points, section.surface)), section)
+    points = _placed(case, observation, _read_points(observation), gauges)
+    # Standard error of every point: as stated, else its sampling error. The integral time scale, which no file gives,
+    # is taken as h / U of the vertical: eddies as long as the water is deep, carried past at the mean velocity.
+    mean = points["u"].abs().groupby(points["y"]).transform("mean").clip(lower=SLOWEST).to_numpy()
+    deviation = points["u_std"].to_numpy() if "u_std" in points else TURBULENCE * mean
+    duration = points["duration_s"].to_numpy() if "duration_s" in points else np.full(len(points), DURATION)
+    own = sampling_error(deviation, duration, points["depth"].clip(lower=0.0).to_numpy() / mean)
+    if "u_se" in points:
+        own = np.where(points["u_se"] > 0.0, points["u_se"], own)
+    points = points.assign(standard_error=np.maximum(own, SMALLEST_ERROR), u_std=points.get("u_std", np.nan))
+    x, y = points["x"].iloc[0], _across(case)
+    section = CrossSection(y, _bed(case, observation, x, y), _surface(case, observation, x, gauges))
+    wet = section.y[section.depth > 0.0]
+    dead = {at: sentence(one) for at, one in dead_probes((wet[0], wet[-1]), points[points["used"]]).items()}
+    reason = points["y"].map(lambda at: dead.get(at, ""))
+    points = points.assign(reason=points["reason"].mask(reason != "", reason), used=points["used"] & (reason == ""))
     profiles = pd.DataFrame([_profile(group) for _, group in points.groupby("y")])
     good = profiles[profiles["used"]]
     error = neighbour_error(good["y"].to_numpy(), good["fitted"].to_numpy())
@@ -75,6 +108,40 @@ def read_section(case: Case, observation: Observation, gauges: pd.DataFrame) -> 
     among = [column for column, plants in zip(columns, good["plants"], strict=True) if plants]
     canopy = fit_canopy_height(among) if among else None
     return Section(points, profiles, section_discharges(section, columns, good, error), error, canopy)
+
+
+def dead_probes(edges: tuple[float, float], points: pd.DataFrame) -> dict[float, DeadProbe]:
+    """Verticals of a section whose probe is dead, by their y [m]. Nothing is dropped here.
+
+    A dead probe reads near zero at every height, without turbulence, while its neighbours do not. In slow water a
+    working probe still sees fluctuations and a rise with height. Slow water is natural in plants, so that without u_std
+    a probe there is not dead. edges: y of the water's edges, where velocity and turbulence are zero [m]; points:
+    columns y, u, u_std (NaN when unknown) and plants, in the water.
+    """
+    by = points.assign(speed=points["u"].abs()).groupby("y", as_index=False).agg(
+        heights=("u", "size"), largest=("speed", "max"), mean=("u", "mean"), deviation=("u_std", "median"),
+        plants=("plants", "first"),
+    )  # fmt: skip
+    y, deviation = by["y"].to_numpy(), by["deviation"].to_numpy(float)
+    suspect = ((by["largest"] < LARGEST_DEAD_SPEED) & (by["heights"] >= FEWEST_HEIGHTS)).to_numpy()
+    if suspect.all():
+        return {}
+
+    def between_neighbours(value: Array) -> Array:
+        nodes = np.concatenate([[edges[0]], y[~suspect], [edges[1]]])
+        return np.interp(y, nodes, np.concatenate([[0.0], value[~suspect], [0.0]]))
+
+    expected, expected_deviation = between_neighbours(by["mean"].to_numpy()), between_neighbours(deviation)
+    unknown = np.isnan(deviation) | np.isnan(expected_deviation)
+    calm = np.where(unknown, ~by["plants"].to_numpy(bool), deviation < SHARE_OF_TURBULENCE * expected_deviation)
+    dead = suspect & calm & (by["largest"].to_numpy() < SHARE_OF_SPEED * expected)
+    return {
+        float(y[i]): DeadProbe(
+            int(by["heights"][i]), float(by["largest"][i]), float(expected[i]),
+            *((None, None) if unknown[i] else (float(deviation[i]), float(expected_deviation[i]))),
+        )
+        for i in np.flatnonzero(dead)
+    }  # fmt: skip
 
 
 def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]:
@@ -89,6 +156,31 @@ def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]
         return profiles["fitted"], profiles["fitted_error"]
     shape = (profiles["linear"] - profiles["fitted"]) / np.sqrt(3.0)
     return profiles["linear"], np.hypot(profiles["linear_error"], shape)
+
+
+def across_averages(points: pd.DataFrame) -> pd.DataFrame:
+    """Depth average of v in each vertical and its standard error, columns value and standard_error [m/s].
+
+    Linear between points, zero at the bed, constant above the highest: no law gives the spread of secondary flow. Few
+    points are averaged as along the channel, so that they keep their direction.
+    points: rows of Observations.points with a column v, of verticals in the order of `Section.profiles`.
+    """
+    found = []
+    for _, group in points.groupby("y"):
+        wet = group[group["height"].gt(0.0) & group["height"].le(group["depth"]) & group["v"].notna()]
+        if wet.empty:
+            found.append((np.nan, np.nan))
+            continue
+        column = _column(wet.assign(u=wet["v"]))
+        few = len(wet) < FEWEST_POINTS
+        found.append(few_points_average(column, bool(wet["plants"].iloc[0])) if few else linear_average(column))
+    return pd.DataFrame(found, columns=["value", "standard_error"])
+
+
+def upward_column(path: Path) -> str:
+    """The column of heights: `z`, a level, else `height` above the bed. Errors: as `headings_of`."""
+    there = headings_of(path)
+    return "height" if "height" in there and "z" not in there else "z"
 
 
 def _read_points(observation: Observation) -> pd.DataFrame:
@@ -113,34 +205,75 @@ def _read_points(observation: Observation) -> pd.DataFrame:
     return moved.drop(columns="case").sort_values(["y", upward]).reset_index(drop=True)
 
 
-def upward_column(path: Path) -> str:
-    """What says how high each point is: `z`, a level, else `height` above the bed. Errors: as `headings_of`."""
-    there = headings_of(path)
-    return "height" if "height" in there and "z" not in there else "z"
+def _placed(case: Case, observation: Observation, points: pd.DataFrame, gauges: pd.DataFrame) -> pd.DataFrame:
+    """Points with bed (datum of the file), depth, height above the bed and plants; `used` if they are in the water.
 
-
-def _across(case: Case) -> Array:
-    low, high = case.grid.y
-    return np.arange(low + GRID_STEP / 2.0, high, GRID_STEP)
-
-
-def across_averages(points: pd.DataFrame) -> pd.DataFrame:
-    """Depth average of v in each vertical and its standard error, columns value and standard_error [m/s].
-
-    Linear between points, zero at the bed, constant above the highest: no law says how secondary flow is spread. Of few
-    points as along the channel, so that they keep their direction.
-    points: rows of Observations.points with a column v, of verticals in the order of `Section.profiles`.
+    Of heights above the bed below each point, z is that of the bed of the case and the height.
     """
-    found = []
-    for _, group in points.groupby("y"):
-        wet = group[group["height"].gt(0.0) & group["height"].le(group["depth"]) & group["v"].notna()]
-        if wet.empty:
-            found.append((np.nan, np.nan))
-            continue
-        column = _column(wet.assign(u=wet["v"]))
-        few = len(wet) < FEWEST_POINTS
-        found.append(few_points_average(column, bool(wet["plants"].iloc[0])) if few else linear_average(column))
-    return pd.DataFrame(found, columns=["value", "standard_error"])
+    x, y = points["x"].iloc[0], points["y"].to_numpy()
+    surface, (low, high) = _surface(case, observation, x, gauges), case.grid.y
+    try:
+        bed = _bed(case, observation, x, y)
+    except InputError:
+        beside = np.unique(y[(y < low) | (y > high)])
+        if not beside.size:
+            raise
+        raise InputError(
+            f"{shown_path(observation.file)}: expected verticals of case {observation.case!r} over the surveyed bed, "
+            f"between y = {low:g} and {high:g} m, got {so_many(beside.size, 'vertical')} beside it, the first at y = "
+            f"{beside[0]:g} m; correct y (`flip` and `zero` of a file set its origin), or the grid."
+        ) from None
+    points = points if "z" in points else points.assign(z=bed + points["height"])
+    reason = np.select([points["z"] <= bed, points["z"] > surface], [BELOW_BED, ABOVE_SURFACE], "")
+    if (reason != "").all():
+        above, bounds = points["z"] - bed, [(float(np.min(one)), float(np.max(one))) for one in (points["y"], bed)]
+        exchanged = ((points["u"] > bed) & (points["u"] <= surface)).all()
+        raise InputError(
+            f"{shown_path(observation.file)}: expected points of case {observation.case!r} between the bed and the "
+            f"water surface at z = {in_digits(surface, 4)} m, got none: at x = {x:.4g} m, y = "
+            f"{range_in_digits(bounds[0])} m the bed lies at {range_in_digits(bounds[1])} m, the points "
+            f"{range_in_digits((above.min(), above.max()))} m above it; check unit and sign of heights, "
+            f"{'whether heights and `u` are exchanged, ' if exchanged else ''}x, y, the water levels, and `floor`, "
+            "`surface` and `offset` of the observation."
+        )
+    return points.assign(
+        experiment=observation.experiment,
+        section=observation.section,
+        bed=bed,
+        depth=surface - bed,
+        height=points["z"] - bed,
+        plants=_among_plants(case, observation, x, y),
+        used=reason == "",
+        reason=reason,
+    )
+
+
+def _surface(case: Case, observation: Observation, x: float, gauges: pd.DataFrame) -> float:
+    """Water level at x in z of the file [m]: as given, else of the gauges of the experiment, else as expected.
+
+    Between gauges z is linear; beyond them it falls as the floor does, z = z_gauge - S (x - x_gauge), S the slope of
+    the line through the lowest beds of the sections of the grid, at least 0: pools are no slope. As expected: parallel
+    to the floor, z = z_out + max(z_floor(x) - z_floor(L), 0), as in channel_geometry.expected_depth.
+    """
+    if observation.surface is not None:
+        return observation.surface
+    experiment, across = str(observation.experiment), _across(case)
+    own = gauges[(gauges["experiment"] == experiment) & (gauges["kind"] == WATER_LEVEL)]
+    if len(own):
+        along = own.groupby("x")["value"].mean()
+        at = along.index.to_numpy(float)
+        within = float(np.clip(x, at.min(), at.max()))
+        level = float(np.interp(within, at, along.to_numpy(float)))
+        if x != within:
+            places = np.linspace(*case.grid.x, SECTIONS_OF_FLOOR + 2)[1:-1]
+            grid = Grid(places, across, float(places[1] - places[0]), GRID_STEP, centreline_in(case))
+            slope = max(-float(np.polyfit(places, bed_levels(case, grid, experiment).min(axis=1), 1)[0]), 0.0)
+            level -= slope * (x - within)
+    else:
+        ends = (x, case.grid.x[1] - 0.5 * case.grid.cell[0])
+        here, outlet = (_local_bed(case, experiment, end, across).min() for end in ends)
+        level = middle_value(case, case.experiments[experiment].level) + max(float(here - outlet), 0.0)
+    return float(_in_the_file(case, observation, x, np.array(level)))
 
 
 def _bed(case: Case, observation: Observation, x: float, y: Array) -> Array:
@@ -155,46 +288,13 @@ def _in_the_file(case: Case, observation: Observation, x: float, level: Array) -
     return level - _local_bed(case, str(observation.experiment), x, _across(case)).min() + observation.floor
 
 
-def _surface(case: Case, observation: Observation, x: float, gauges: pd.DataFrame) -> float:
-    """Water level at x in z of the file [m]: as given, else of the gauges of the experiment, else as expected.
-
-    Between gauges z is linear; beyond them it falls as the floor does, z = z_gauge - S (x - x_gauge).
-    """
-    if observation.surface is not None:
-        return observation.surface
-    own = gauges[(gauges["experiment"] == observation.experiment) & (gauges["kind"] == WATER_LEVEL)]
-    if len(own):
-        along = own.groupby("x")["value"].mean()
-        at = along.index.to_numpy(float)
-        within = float(np.clip(x, at.min(), at.max()))
-        fall = _floor_slope(case, str(observation.experiment)) * (x - within) if x != within else 0.0
-        level = float(np.interp(within, at, along.to_numpy(float))) - fall
-    else:
-        level = _expected_level(case, str(observation.experiment), x)
-    return float(_in_the_file(case, observation, x, np.array(level)))
-
-
-def _floor_slope(case: Case, experiment: str) -> float:
-    """S = max(-dz/dx, 0) of the line through the lowest beds of the sections of the grid [-]: pools are no slope."""
-    x = np.linspace(*case.grid.x, SECTIONS_OF_FLOOR + 2)[1:-1]
-    grid = Grid(x, _across(case), float(x[1] - x[0]), GRID_STEP, centreline_in(case))
-    return max(-float(np.polyfit(x, bed_levels(case, grid, experiment).min(axis=1), 1)[0]), 0.0)
-
-
-def _expected_level(case: Case, experiment: str, x: float) -> float:
-    """z = z_out + max(z_floor(x) - z_floor(L), 0) [m]: parallel to the floor, as in channel_geometry.expected_depth."""
-    ends = (x, case.grid.x[1] - 0.5 * case.grid.cell[0])
-    here, outlet = (_local_bed(case, experiment, at, _across(case)).min() for at in ends)
-    return middle_value(case, case.experiments[experiment].level) + max(float(here - outlet), 0.0)
-
-
 def _local_bed(case: Case, experiment: str, x: float, y: Array) -> Array:
     return bed_levels(case, Grid(np.array([x]), y, GRID_STEP, GRID_STEP, centreline_in(case)), experiment)[0]
 
 
-def _cross_section(case: Case, observation: Observation, x: float, gauges: pd.DataFrame) -> CrossSection:
-    y = _across(case)
-    return CrossSection(y, _bed(case, observation, x, y), _surface(case, observation, x, gauges))
+def _across(case: Case) -> Array:
+    low, high = case.grid.y
+    return np.arange(low + GRID_STEP / 2.0, high, GRID_STEP)
 
 
 def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> NDArray[np.bool_]:
@@ -208,101 +308,6 @@ def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> N
         )
         result |= left & right
     return result
-
-
-def _placed(case: Case, observation: Observation, points: pd.DataFrame, surface: float) -> pd.DataFrame:
-    """Points with bed (datum of the file), depth, height above the bed and plants; `used` if they are in the water.
-
-    Of heights above the bed below each point, z is that of the bed of the case and the height.
-    """
-    x, y = points["x"].iloc[0], points["y"].to_numpy()
-    bed = _bed_below(case, observation, x, y)
-    points = points if "z" in points else points.assign(z=bed + points["height"])
-    reason = np.select([points["z"] <= bed, points["z"] > surface], [BELOW_BED, ABOVE_SURFACE], "")
-    if (reason != "").all():
-        raise _none_in_the_water(observation, points, bed, surface)
-    return points.assign(
-        experiment=observation.experiment,
-        section=observation.section,
-        bed=bed,
-        depth=surface - bed,
-        height=points["z"] - bed,
-        plants=_among_plants(case, observation, x, y),
-        used=reason == "",
-        reason=reason,
-    )
-
-
-def _bed_below(case: Case, observation: Observation, x: float, y: Array) -> Array:
-    """Bed level below verticals. Errors: InputError where there is none; beside the grid it is they that are told."""
-    try:
-        return _bed(case, observation, x, y)
-    except InputError:
-        low, high = case.grid.y
-        beside = np.unique(y[(y < low) | (y > high)])
-        if not beside.size:
-            raise
-    raise InputError(
-        f"{shown_path(observation.file)}: expected verticals of case {observation.case!r} over the surveyed bed, "
-        f"between y = {low:g} and {high:g} m, got {so_many(beside.size, 'vertical')} beside it, the first at y = "
-        f"{beside[0]:g} m; correct y (`flip` and `zero` of a file say from where it counts), or the grid."
-    )
-
-
-def _none_in_the_water(observation: Observation, points: pd.DataFrame, bed: Array, surface: float) -> InputError:
-    """The refusal of a section whose points all lie outside the water; bed: its level below each of them [m]."""
-    above = points["z"] - bed
-    fits = bool(((points["u"] > bed) & (points["u"] <= surface)).all())
-    exchanged = "whether they and `u`, whose numbers would lie in the water, are exchanged, " if fits else ""
-    return InputError(
-        f"{shown_path(observation.file)}: expected points of case {observation.case!r} between the bed and the water "
-        f"surface at z = {in_digits(surface, 4)} m, got none: at x = {points['x'].iloc[0]:.4g} m and y = "
-        f"{_span(points['y'])} m the bed lies at {_span(bed)} m, the points {_span(above)} m above it; check unit and "
-        "sign of their heights, "
-        f"{exchanged}their x and y, the levels of the water, and `floor`, `surface` and `offset` of the observation."
-    )
-
-
-def _span(values: Array) -> str:
-    """Lowest and highest of some values, or the one that they are."""
-    low, high = in_digits(float(np.min(values))), in_digits(float(np.max(values)))
-    return low if low == high else f"{low} to {high}"
-
-
-def _with_errors(points: pd.DataFrame) -> pd.DataFrame:
-    """Standard error of every point: as stated, else its sampling error.
-
-    The integral time scale, which no file gives, is taken as h / U of the vertical: that is eddies as long as the water
-    is deep, carried past at the mean velocity.
-    """
-    mean = points["u"].abs().groupby(points["y"]).transform("mean").clip(lower=SLOWEST).to_numpy()
-    deviation = points["u_std"].to_numpy() if "u_std" in points else TURBULENCE * mean
-    duration = points["duration_s"].to_numpy() if "duration_s" in points else np.full(len(points), DURATION)
-    error = sampling_error(deviation, duration, points["depth"].clip(lower=0.0).to_numpy() / mean)
-    if "u_se" in points:
-        error = np.where(points["u_se"] > 0.0, points["u_se"], error)
-    return points.assign(standard_error=np.maximum(error, SMALLEST_ERROR), u_std=points.get("u_std", np.nan))
-
-
-def _without_dead_probes(points: pd.DataFrame, section: CrossSection) -> pd.DataFrame:
-    """Points with `used` false and the reason given in every vertical where the probe was dead."""
-    verticals = (
-        points[points["used"]]
-        .assign(speed=points["u"].abs())
-        .groupby("y", as_index=False)
-        .agg(
-            points=("u", "size"),
-            largest=("speed", "max"),
-            mean=("u", "mean"),
-            deviation=("u_std", "median"),
-            plants=("plants", "first"),
-        )
-    )
-    wet = section.y[section.depth > 0.0]
-    names = ("y", "points", "largest", "mean", "deviation", "plants")
-    reasons = dead_probes((wet[0], wet[-1]), *(verticals[name].to_numpy() for name in names))
-    reason = points["y"].map(dict(zip(verticals["y"], reasons, strict=True))).fillna("")
-    return points.assign(reason=points["reason"].mask(reason != "", reason), used=points["used"] & (reason == ""))
 
 
 def _column(points: pd.DataFrame) -> Column:

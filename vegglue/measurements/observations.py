@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -47,20 +46,28 @@ Key = tuple[str, str]  # names of experiment and section
 class Observations:
     """All measurements of a case. x, y in the coordinates of the model grid [m]; SI throughout.
 
-    table: one row for each station, columns STATION_COLUMNS with their STATION_TYPES, see `station_table`: code that
-    reads it needs no conversion of types; value and standard_error in the unit of their kind (see
-    kinds.py), standard_error and depth NaN when unknown; a discharge has no y of its own, and is drawn at the one
-    given; a station with used = False is not calibrated to, says why in `reason`, and may have the value NaN.
-    points: every ADV point, POINT_TYPES: z and bed in the datum of the file, height above the bed, plants (inside a
-    patch), u_std NaN when unknown.
-    profiles: every vertical, PROFILE_TYPES: points (how many), linear and linear_error (the rule `paper`), fitted and
-    fitted_error (profile fit), law of the fit, within, slope, top and scatter (see vertical_profile.ProfileFit; NaN
-    without a fit).
-    discharge: by (experiment, section), then by rule, `paper` and `profile`.
-    neighbour_error: by (experiment, section), the error of one vertical estimated from its neighbours [m/s]. Where it
-    is larger than the error from the points of the vertical, it contains what these do not show (position, stems). It
-    is part of standard_error in table.
-    canopy_height: by (experiment, section), where verticals stand inside plants.
+    Attributes
+    ----------
+    table : DataFrame
+        One row for each station, columns STATION_COLUMNS with their STATION_TYPES, see `station_table`: code that reads
+        it converts no types. value and standard_error are in the unit of their kind (see kinds.py), standard_error and
+        depth NaN if unknown. A discharge has no y of its own, and is drawn at the one given. A station with
+        used = False is not calibrated to, has a `reason`, and may have the value NaN.
+    points : DataFrame
+        Every ADV point, POINT_TYPES: z and bed in the datum of the file, height above the bed, plants (inside a patch),
+        u_std NaN if unknown.
+    profiles : DataFrame
+        Every vertical, PROFILE_TYPES: points (how many), linear and linear_error (the rule `paper`), fitted and
+        fitted_error (profile fit), law of the fit, within, slope, top and scatter (see vertical_profile.ProfileFit; NaN
+        without a fit).
+    discharge : dict
+        By (experiment, section), then by rule, `paper` and `profile`.
+    neighbour_error : dict
+        By (experiment, section), the error of one vertical estimated from its neighbours [m/s]. If it is larger than
+        the error from the points of the vertical, it contains what these do not show (position, stems). It is part of
+        standard_error in table.
+    canopy_height : dict
+        By (experiment, section), if verticals stand inside plants.
     """
 
     table: pd.DataFrame
@@ -99,38 +106,84 @@ def _typed(parts: Sequence[pd.DataFrame], types: Mapping[str, type]) -> pd.DataF
     return pd.concat(parts, ignore_index=True).astype(types)
 
 
-def read_observations(case: Case) -> Observations:
-    """Read every file of measurements that the case names, judge their quality, and average verticals over the depth.
+def section_places(station: pd.DataFrame) -> pd.Series:
+    """The x of the section of each station [m]: the median of those of its name in its experiment, as a boat does not
+    keep its line.
 
-    A point or vertical that cannot be trusted stays, with used = False and the reason.
-    Errors: InputError, naming file and row, for what cannot be read, is missing, repeated or no number, and for an
-    unknown kind, experiment, section or device.
+    Stations without such a name, or that lie along the channel rather than across it, have their own x.
+    """
+    group = station.groupby(["experiment", "section"])
+    along = group["x"].transform("max") - group["x"].transform("min")
+    across = group["y"].transform("max") - group["y"].transform("min")
+    together = (station["section"] != "") & (along <= across)
+    return group["x"].transform("median").where(together, station["x"])
+
+
+def section_place(station: pd.DataFrame, experiment: str, section: str) -> float:
+    """The x of a section of one experiment [m]: the median of its stations; NaN without any."""
+    own = (station["experiment"] == experiment) & (station["section"] == section)
+    return float(station.loc[own, "x"].median())
+
+
+def read_observations(case: Case) -> Observations:
+    """Read every file of measurements that a case names, judge their quality, and average verticals over the depth.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    Observations
+        A point or vertical that cannot be trusted stays, with used = False and the reason.
+
+    Raises
+    ------
+    InputError
+        Naming file and row, for what cannot be read, is missing, repeated or no number, and for an unknown kind,
+        experiment, section or device.
     """
     sections: dict[Key, Section] = {}
     stations = []
     levels = [one for one in case.observations if one.kind == WATER_LEVEL]
     gauges = station_table(*(_read_stations(case, one, kind_of(WATER_LEVEL)) for one in levels))
-    for observation in case.observations:
-        if observation.kind == "adv":
-            key = (str(observation.experiment), str(observation.section))
+    for one in case.observations:
+        if one.kind == "adv":
+            key = (str(one.experiment), str(one.section))
             if key in sections:
                 raise InputError(
-                    f"{shown_path(observation.file)}: expected section {key[1]} of experiment {key[0]} once, got two "
+                    f"{shown_path(one.file)}: expected section {key[1]} of experiment {key[0]} once, got two "
                     f"observations of it; take one out of the case."
                 )
-            sections[key] = read_section(case, observation, gauges)
-            stations.append(_averaged(sections[key], observation))
-            if observation.across:
-                stations.append(_averaged_across(sections[key], observation))
+            sections[key] = read_section(case, one, gauges)
+            stations += _averaged(sections[key], one)
+        elif one.kind in KINDS:
+            stations.append(_read_stations(case, one, kind_of(one.kind)))
         else:
-            stations.append(_read_stations(case, observation, _kind_in(case, observation)))
+            raise InputError(
+                f"{shown_path(case.source)}: the observation in {one.file.name} expected a `kind` among adv, "
+                f"{', '.join(KINDS)}, got {one.kind!r}: {nearest(one.kind, ['adv', *KINDS])}"
+            )
     if (number := sum(map(len, stations))) > MOST_STATIONS:
         raise InputError(
             f"{shown_path(case.source)}: expected at most {MOST_STATIONS:,} stations, got {number:,}: average "
             "those that lie close together, or leave some out."
         )
-    table = _within_the_grid(case, station_table(*stations))
-    _refuse_measured_twice(case, table)
+    table = station_table(*stations)
+    # Outside the grid the model has no flow. A discharge has no y of its own.
+    at_point = np.array([kind_of(name).at_point for name in table["kind"]], dtype=bool)
+    inside = table["x"].between(*case.grid.x) & (table["y"].between(*case.grid.y) | ~at_point)
+    table = table.assign(used=table["used"] & inside, reason=table["reason"].mask(table["used"] & ~inside, OUTSIDE))
+    # Errors of two stations at one place of a section would count as one error.
+    correlated = np.array([kind_of(name).correlated for name in table["kind"]], dtype=bool)
+    twice = table.duplicated(["experiment", "section", "kind", "x", "y"]) & correlated
+    if twice.any():
+        one = table.loc[twice.idxmax()]
+        raise InputError(
+            f"{shown_path(case.source)}: `observations` expected each station once, got {kind_of(one['kind']).words} "
+            f"at x = {one['x']:g}, y = {one['y']:g} m of section {one['section']!r} of experiment {one['experiment']} "
+            "in two files: take one of the two out, or give it a section of its own."
+        )
     refuse_unknown_limits(case, table)
     return Observations(
         table=table,
@@ -140,28 +193,6 @@ def read_observations(case: Case) -> Observations:
         neighbour_error={key: section.neighbour_error for key, section in sections.items()},
         canopy_height={key: section.canopy_height for key, section in sections.items() if section.canopy_height},
     )
-
-
-def _within_the_grid(case: Case, table: pd.DataFrame) -> pd.DataFrame:
-    """Stations with those outside the grid not used: the model knows nothing there. A discharge has no y of its own."""
-    (west, east), (south, north) = case.grid.x, case.grid.y
-    at_point = np.array([kind_of(name).at_point for name in table["kind"]], dtype=bool)
-    inside = table["x"].between(west, east) & (table["y"].between(south, north) | ~at_point)
-    lost = table["used"] & ~inside
-    return table.assign(used=table["used"] & inside, reason=table["reason"].mask(lost, OUTSIDE))
-
-
-def _refuse_measured_twice(case: Case, table: pd.DataFrame) -> None:
-    """Errors: InputError for a station of one section that two files hold, whose errors would count as one error."""
-    correlated = np.array([kind_of(str(name)).correlated for name in table["kind"]], dtype=bool)
-    twice = table.duplicated(["experiment", "section", "kind", "x", "y"]) & correlated
-    if twice.any():
-        one = table.loc[twice.idxmax()]
-        raise InputError(
-            f"{shown_path(case.source)}: `observations` expected each station once, got {kind_of(one['kind']).words} "
-            f"at x = {one['x']:g}, y = {one['y']:g} m of section {one['section']!r} of experiment {one['experiment']} "
-            "in two files: take one of the two out, or give it a section of its own."
-        )
 
 
 def refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:
@@ -184,54 +215,37 @@ def fitted_curve(profile: "pd.Series[float]") -> ProfileFit | None:
     return ProfileFit(profile["within"], profile["slope"], profile["top"], np.full((3, 3), np.nan), profile["scatter"])
 
 
-def _averaged(section: Section, observation: Observation) -> pd.DataFrame:
-    """Stations from the verticals of a section, by the rule the case has chosen.
+def _averaged(section: Section, observation: Observation) -> list[pd.DataFrame]:
+    """Stations from the verticals of a section: along by the rule of the case, and across if it says so.
 
     standard_error^2 = own^2 + max(s^2 - mean(own^2), 0), own from the points of the vertical, s the `neighbour_error`:
     points cannot show that their vertical stands beside a stem, or 0.1 m off. An error given in the case replaces this.
+    Across none if no point of a vertical has v. Errors: InputError without a column v.
     """
-    profiles = section.profiles
+    profiles, stated = section.profiles, observation.standard_error
     value, own = average_of(profiles, str(observation.average))
     hidden = np.nan_to_num(section.neighbour_error**2 - (own[profiles["used"]] ** 2).mean())
-    error = np.hypot(own, np.sqrt(max(hidden, 0.0)))
-    if observation.standard_error is not None:
-        error = pd.Series(observation.standard_error, index=profiles.index)
-    return profiles.assign(kind=STREAMWISE, value=value, standard_error=error)[list(STATION_COLUMNS)]
-
-
-def _averaged_across(section: Section, observation: Observation) -> pd.DataFrame:
-    """Stations of velocity across from the points of the same verticals; none where no point of a vertical has v.
-
-    Errors: InputError without a column v.
-    """
+    error = np.hypot(own, np.sqrt(max(hidden, 0.0))) if stated is None else stated
+    along = profiles.assign(kind=STREAMWISE, value=value, standard_error=error)[list(STATION_COLUMNS)]
+    if not observation.across:
+        return [along]
     if "v" not in section.points:
         raise InputError(
             f"{shown_path(observation.file)}, row 1: expected a column v for `across`, got none; add it, or take "
             "`across` out of the observation."
         )
     averages = across_averages(section.points)
-    profiles = section.profiles.reset_index(drop=True).assign(kind=TRANSVERSE, value=averages["value"])
-    error = averages["standard_error"] if observation.standard_error is None else observation.standard_error
-    known = profiles["value"].notna() | ~profiles["used"]
-    return profiles.assign(standard_error=error).loc[known, list(STATION_COLUMNS)]
-
-
-def _kind_in(case: Case, observation: Observation) -> Kind:
-    """Errors: InputError naming config and file when the kind is unknown."""
-    if observation.kind not in KINDS:
-        raise InputError(
-            f"{shown_path(case.source)}: the observation in {observation.file.name} expected a `kind` among adv, "
-            f"{', '.join(KINDS)}, got {observation.kind!r}: {nearest(observation.kind, ['adv', *KINDS])}"
-        )
-    return kind_of(observation.kind)
+    error = averages["standard_error"] if stated is None else stated
+    across = profiles.reset_index(drop=True).assign(kind=TRANSVERSE, value=averages["value"], standard_error=error)
+    return [along, across.loc[across["value"].notna() | ~across["used"], list(STATION_COLUMNS)]]
 
 
 def _read_stations(case: Case, observation: Observation, kind: Kind) -> pd.DataFrame:
     """Stations from a file of x, y, the column of the kind and, if there is one, that of its standard errors.
 
     A standard error of 0 means unknown. A discharge needs no y: it is drawn in the middle of the grid. `experiment` and
-    `section` of the observation choose rows where the file has such a column, and else name all rows; only velocities
-    need a section.
+    `section` of the observation choose rows if the file has such a column, and else name all rows; only velocities
+    need a section. Places of the map become places of the grid if that follows a centreline.
     """
     path = observation.file
     given = {"experiment": observation.experiment, "section": observation.section}
@@ -242,7 +256,16 @@ def _read_stations(case: Case, observation: Observation, kind: Kind) -> pd.DataF
     labels = [name for name in given if name not in needed]
     rows = read_table(path, needed, (*place, kind.column), (kind.error_column, "y"), labels)
     for name, text in given.items():
-        rows = _chosen(path, rows, name, text)
+        if name not in rows:
+            rows = rows.assign(**{name: text})
+        elif text:
+            chosen = rows[rows[name] == text]
+            if chosen.empty:
+                raise InputError(
+                    f"{shown_path(path)}: expected rows with {name} {text!r}, got only "
+                    f"{', '.join(rows[name].unique())}; correct `{name}` in the observation."
+                )
+            rows = chosen
     unknown = ~rows["experiment"].isin(list(case.experiments))
     refuse_rows(path, unknown, f"expected an experiment of the case, one of {', '.join(case.experiments)}")
     refuse_repeated(path, rows, ("experiment", "section", *place))
@@ -264,28 +287,9 @@ def _read_stations(case: Case, observation: Observation, kind: Kind) -> pd.DataF
         reason="",
         depth=np.nan,
         device="",
-    )
-    return _onto_the_grid(case, stations[list(STATION_COLUMNS)]) if kind.at_point else stations[list(STATION_COLUMNS)]
-
-
-def _onto_the_grid(case: Case, stations: pd.DataFrame) -> pd.DataFrame:
-    """Stations of the map in the coordinates of the grid; as they are where the grid follows no centreline."""
-    line = centreline_in(case)
-    if line is None:
-        return stations
-    x, y = along_and_across(line, stations["x"].to_numpy(float), stations["y"].to_numpy(float))
-    return stations.assign(x=x, y=y)
-
-
-def _chosen(path: Path, rows: pd.DataFrame, name: str, text: str | None) -> pd.DataFrame:
-    if text is None or (text == "" and name in rows):
-        return rows
-    if name not in rows:
-        return rows.assign(**{name: text})
-    chosen = rows[rows[name] == text]
-    if chosen.empty:
-        raise InputError(
-            f"{shown_path(path)}: expected rows with {name} {text!r}, got only {', '.join(rows[name].unique())}; "
-            f"correct `{name}` in the observation."
-        )
-    return chosen
+    )[list(STATION_COLUMNS)]
+    line = centreline_in(case) if kind.at_point else None
+    if line is not None:
+        x, y = along_and_across(line, stations["x"].to_numpy(float), stations["y"].to_numpy(float))
+        stations = stations.assign(x=x, y=y)
+    return stations

@@ -96,7 +96,7 @@ def rigid_cylinder(
     upright [m]; C_d = 1. No foliage.
 
     Heights and diameters are lognormal with the surveyed means and standard deviations, so that 4 +- 4 mm stays
-    positive. `choice.spread` says which spread is taken: `plants` that between plants, as the +- of Berends et al.
+    positive. `choice.spread` selects the spread: `plants` that between plants, as the +- of Berends et al.
     (2020) must be, `mean` the error of the mean over the sampled plants. The density m_u was not surveyed: it is
     log-uniform between the two values of `choice.undergrowth_density` [1/m2], assumed by the user; without them there
     is no undergrowth.
@@ -104,8 +104,12 @@ def rigid_cylinder(
     Source: Berends et al. (2020), section 3.2; Baptist et al. (2007), doi 10.1080/00221686.2007.9521778;
     bending after Verschoren et al. (2016).
     """
-    generator = np.random.default_rng(seed)
-    drawn = {name: _draw(survey[name], choice.spread, draws, generator) for name in SURVEYED}
+    generator, drawn = np.random.default_rng(seed), {}
+    for name in SURVEYED:
+        one = survey[name]
+        error = one.standard_deviation / (math.sqrt(one.samples) if choice.spread == "mean" else 1.0)
+        variance = math.log1p((error / one.mean) ** 2)
+        drawn[name] = generator.lognormal(math.log(one.mean) - variance / 2.0, math.sqrt(variance), draws)
     height, stem_height = drawn["plant_height"], np.minimum(drawn["stem_height"], drawn["plant_height"])
     deflected = np.full(draws, choice.deflected_height or np.inf)
     bent = DRAG_COEFFICIENT * drawn["stems"] * np.minimum(deflected / height, 1.0)
@@ -122,10 +126,3 @@ def rigid_cylinder(
     return RigidCylinder(
         stems + branches + undergrowth, {name: float(part.mean()) for name, part in parts.items()}, assumption
     )
-
-
-def _draw(quantity: SurveyedQuantity, spread: str, draws: int, generator: np.random.Generator) -> Array:
-    """Lognormal draws with the mean and standard deviation of the quantity."""
-    error = quantity.standard_deviation / (math.sqrt(quantity.samples) if spread == "mean" else 1.0)
-    variance = math.log1p((error / quantity.mean) ** 2)
-    return generator.lognormal(math.log(quantity.mean) - variance / 2.0, math.sqrt(variance), draws)

@@ -323,8 +323,19 @@ def _judge_values(flow: PlausibleFlow, group: pd.DataFrame) -> list[Judgement]:
     column = [flow.column(x) for x in group["x"]]
     if instrument == "gauge":
         return [_judge_level(flow, at, level) for at, level in zip(column, value, strict=True)]
-    if instrument == "section":
-        return [_judge_discharge(flow.discharge, one) for one in value]
+    if instrument == "section":  # it may hold the water of one inflow only, or of all
+        least, most = flow.discharge
+        if least <= 0.0:
+            return [PLAUSIBLE] * len(value)
+        found = []
+        for ratio, one in zip(np.abs(value) / most, value, strict=True):
+            if ratio > FURTHEST_MEAN:
+                large = (Symptom.LARGE_DISCHARGE, float(ratio), _unit_of(ratio, DISCHARGE_UNITS))
+                found.append((Symptom.MISSING_MARK, 1.0, "") if is_mark(one) else large)
+            else:
+                small = FURTHEST_MEAN * abs(one) < least
+                found.append((Symptom.SMALL_DISCHARGE, float(abs(one) / least), "") if small else PLAUSIBLE)
+        return found
     # Marks and single values first, then the mean of what is left of the section.
     speed, fastest = np.abs(value), flow.fastest[column]
     beyond = speed > FASTEST_THREAD * fastest
@@ -364,18 +375,6 @@ def _judge_level(flow: PlausibleFlow, column: int, level: float) -> Judgement:
     if level < flow.floor[column]:
         return (Symptom.BELOW_BED, float(flow.floor[column]) - level, "")
     return (Symptom.HIGH if above > 0 else Symptom.LOW, abs(above), "")
-
-
-def _judge_discharge(stated: Bounds, value: float) -> Judgement:
-    """A section may hold the water of one inflow only, or of all."""
-    if stated[0] <= 0.0:
-        return PLAUSIBLE
-    ratio = abs(value) / stated[1]
-    if ratio > FURTHEST_MEAN:
-        mark = (Symptom.MISSING_MARK, 1.0, "")
-        return mark if is_mark(value) else (Symptom.LARGE_DISCHARGE, ratio, _unit_of(ratio, DISCHARGE_UNITS))
-    small = FURTHEST_MEAN * abs(value) < stated[0]
-    return (Symptom.SMALL_DISCHARGE, abs(value) / stated[0], "") if small else PLAUSIBLE
 
 
 def _judge_errors(flow: PlausibleFlow, group: pd.DataFrame) -> list[Judgement]:

@@ -128,31 +128,25 @@ def grid_weights(section: CrossSection, position: Array, columns: Sequence[Colum
     Points are interpolated linearly on a regular (y, z) grid of cells at most `step` high: upward in each vertical
     (zero at the bed, constant from the highest point to the surface), then across at each level between verticals,
     to zero where that level meets the bed or the bank. Q = sum of velocity x cell area.
-    Source: Berends et al. (2020), section 3.1, which does not say what was assumed at the surface and at the banks.
+    Source: Berends et al. (2020), section 3.1, which does not state the assumptions at the surface and at the banks.
     """
     lowest = float(section.bed.min())
     count = int(np.ceil((section.surface - lowest) / step))
     height = (section.surface - lowest) / count
     levels = lowest + height * (np.arange(count) + 0.5)
     bed = section.surface - np.array([column.depth for column in columns])
-    widths = np.array([_width_of_each(section, position, bed < level, level) for level in levels])
+    # Width [m] over which each vertical counts at a level: the area under its hat function.
+    widths = np.zeros((count, len(position)))
+    for width, level in zip(widths, levels, strict=True):
+        nodes = np.concatenate([position[bed < level], section.y[section.bed >= level]])
+        order, cells = np.argsort(nodes), section.y[section.bed < level]
+        for index in np.flatnonzero(bed < level):
+            hat = (nodes == position[index]).astype(float)
+            width[index] = section.width * np.interp(cells, nodes[order], hat[order]).sum()
     return [
         height * widths[:, index] @ (linear_weights(column.height, levels - bed[index]))
         for index, column in enumerate(columns)
     ]
-
-
-def _width_of_each(section: CrossSection, position: Array, wet: Array, level: float) -> Array:
-    """Width [m] over which each vertical (columns,) counts at this level: the area under its hat function."""
-    dry = section.y[section.bed >= level]
-    nodes = np.concatenate([position[wet], dry])
-    order = np.argsort(nodes)
-    result = np.zeros(len(position))
-    cells = section.y[section.bed < level]
-    for index in np.flatnonzero(wet):
-        hat = (nodes == position[index]).astype(float)
-        result[index] = section.width * np.interp(cells, nodes[order], hat[order]).sum()
-    return result
 
 
 def conveyance_weights(section: CrossSection, position: Array, depth: Array) -> Array:
@@ -184,15 +178,10 @@ def neighbour_error(position: Array, average: Array) -> float:
     squares = []
     for index in range(each_side, count - each_side):
         others = np.r_[index - each_side : index, index + 1 : index + each_side + 1]
-        weights = _lagrange(position[others], position[index])
+        gaps, eye = position[others][:, None] - position[others], np.eye(2 * each_side)
+        weights = np.prod(np.where(eye > 0.0, 1.0, position[index] - position[others]) / (gaps + eye), axis=1)
         squares.append((average[index] - weights @ average[others]) ** 2 / (1.0 + weights @ weights))
     return float(np.sqrt(np.mean(squares)))
-
-
-def _lagrange(nodes: Array, at: float) -> Array:
-    """Weights (nodes,) which give the polynomial through the nodes at one place."""
-    gaps = nodes[:, None] - nodes + np.eye(len(nodes))
-    return np.prod(np.where(np.eye(len(nodes), dtype=bool), 1.0, at - nodes) / gaps, axis=1)
 
 
 def combine(value: float, sampling: float, spacing: float, rule: float) -> Discharge:
@@ -209,8 +198,8 @@ def section_discharges(
 ) -> dict[str, Discharge]:
     """Q = sum_i w_i u_i [m3/s] by both rules, from the verticals that are used.
 
-    columns: their points; good: their profiles (rows of Observations.profiles); error: of one vertical, as its
-    neighbours tell it [m/s].
+    columns: their points; good: their profiles (rows of Observations.profiles); error: of one vertical, estimated
+    from its neighbours [m/s].
     """
     position, scatter = good["y"].to_numpy(), good["scatter"].fillna(1.0)
     grid = grid_weights(section, position, columns, GRID_STEP)
@@ -277,8 +266,8 @@ def _carried(
 ) -> CarriedDischarge | None:
     """None if fewer than FEWEST_VERTICALS stand in the water, or nothing passes them.
 
-    The level is that stated beside the verticals, else between gauges and outlet, else parallel to the floor, where it
-    may be as low as smooth walls and as high as the thickest growth make it.
+    The level is that stated beside the verticals, else between gauges and outlet, else parallel to the floor, and as
+    low as smooth walls or as high as the thickest growth make it.
     """
     x, setting = float(rows["x"].median()), case.experiments[experiment]
     column = int(np.abs(site.grid.x - x).argmin())
@@ -293,7 +282,14 @@ def _carried(
         flow = plausible_flow(case, site, setting)
         around = min(float(flow.smoothest[column]), level), max(float(flow.thickest[column]), level)
     else:
-        level, error = _level_between_gauges(site, column, gauges, middle_value(case, setting.level))
+        # Linear between gauges and outlet; upstream of the first gauge it rises as the floor does, give or take that.
+        measured, along, floor = gauges.groupby("x")["value"].mean(), site.grid.x, site.bed.min(axis=1)
+        at, z = np.array([*measured.index, along[-1]]), [*measured, middle_value(case, setting.level)]
+        rise = 0.0
+        if along[column] < at[0]:
+            rise = max(float(floor[column] - floor[int(np.abs(along - float(at[0])).argmin())]), 0.0)
+        level = float(np.interp(along[column], at, z)) + rise
+        error = rise + NORMAL95 * float(gauges["standard_error"].fillna(0.0).max())
         around = level - error, level + error
     whole = _velocity_area(site, column, rows, level)
     if whole is None or whole[0] <= 0.0:
@@ -314,18 +310,6 @@ def _carried(
         verticals=verticals,
         gauged=len(gauges) > 0 or surface_given,
     )
-
-
-def _level_between_gauges(site: Site, column: int, gauges: pd.DataFrame, outlet: float) -> tuple[float, float]:
-    """Water level at a column of cells and its 95 % error [m], linear between gauges and outlet; upstream of the first
-    gauge it rises as the floor does, give or take all of that.
-    """
-    at, along, floor = gauges.groupby("x")["value"].mean(), site.grid.x, site.bed.min(axis=1)
-    x, z = np.array([*at.index, along[-1]]), np.array([*at, outlet])
-    upstream = along[column] < x[0]
-    fall = max(float(floor[column] - floor[int(np.abs(along - float(x[0])).argmin())]), 0.0) if upstream else 0.0
-    error = fall + NORMAL95 * float(gauges["standard_error"].fillna(0.0).max())
-    return float(np.interp(along[column], x, z)) + fall, error
 
 
 def _velocity_area(site: Site, column: int, rows: pd.DataFrame, level: float) -> tuple[float, float, float, int] | None:

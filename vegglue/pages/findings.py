@@ -15,10 +15,9 @@ from vegglue.case.schema import Case
 from vegglue.flow.status import FAILED, STATUS_WORDS, members_with
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
-from vegglue.measurements.observations import Observations
+from vegglue.measurements.observations import Observations, section_place
 from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.measurements.section_discharge import changing_discharge
-from vegglue.measurements.sections import section_place
 from vegglue.pages.homogeneity_words import homogeneity_in_words, homogeneity_rejected
 from vegglue.pages.key_numbers import (
     MASS_LIMIT,
