@@ -111,32 +111,38 @@ def largest_error_between(base: Baseline) -> float:
     return float(np.sqrt(1.0 + np.quantile(squares, SHARE_BELOW)))
 
 
-def acts_elsewhere(before: Baseline, after: Baseline) -> str:
-    """Why something at a place is not to be believed where nobody measured, '' when it acts where was measured as well:
-    its largest change of the velocity halfway between sections, over that at the stations, is below mostly_elsewhere.
+@dataclass(frozen=True)
+class ActsElsewhere:
+    """Something at a place changes the velocity by `change` halfway between sections at x [m], and by `at_stations` at
+    most where it was measured [m/s].
+    """
+
+    change: float
+    x: float
+    at_stations: float
+
+
+def acts_elsewhere(before: Baseline, after: Baseline) -> ActsElsewhere | None:
+    """Whether something at a place acts mostly between the sections: its largest change of the velocity halfway there
+    is mostly_elsewhere times that at the stations; None when it acts at the stations as well.
     """
     station = before.model.station
     velocity = leading_velocities(station)
     there = halfway(station, before.model.case.grid.x[1])
-    was, now = (_read_at(there, one) for one in (before, after))
+
+    def read_there(base: Baseline) -> Array:
+        point = base.fitted.point
+        return np.asarray(predict(replace(base.model, station=there), [point], point.z[None])[0])
+
+    was, now = read_there(before), read_there(after)
     changed = np.abs(now - was)
     if not velocity.any() or not np.isfinite(changed).all():
-        return ""
+        return None
     most = int(np.argmax(changed))
     at_stations = float(np.abs(after.fitted.point.prediction - before.fitted.point.prediction)[velocity].max())
     if changed[most] < constants().mostly_elsewhere * at_stations:
-        return ""
-    return (
-        "it acts mostly where nobody measured, measure there first: it changes the velocity by "
-        f"{changed[most]:.2g} m/s around x = {there['x'].iloc[most]:.1f} m, by {at_stations:.2g} m/s at most where it "
-        "was measured"
-    )
-
-
-def _read_at(station: pd.DataFrame, base: Baseline) -> Array:
-    """What the flow of a calibrated model shows at other stations (n,), NaN where it is not found again."""
-    point = base.fitted.point
-    return np.asarray(predict(replace(base.model, station=station), [point], point.z[None])[0])
+        return None
+    return ActsElsewhere(float(changed[most]), float(there["x"].iloc[most]), at_stations)
 
 
 def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:

@@ -16,7 +16,7 @@ from vegglue.calibration.candidates import Candidate
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error
 from vegglue.diagnosis.comparison import By, held_out_rmse, improvement, model_score
-from vegglue.diagnosis.errors_elsewhere import acts_elsewhere
+from vegglue.diagnosis.errors_elsewhere import ActsElsewhere, acts_elsewhere
 from vegglue.diagnosis.refits import is_near_off
 from vegglue.results.causes import LocalAnomaly
 from vegglue.results.diagnosis import Diagnosis
@@ -41,23 +41,98 @@ class Nominee:
 
 
 Names = tuple[str, ...]
-# Why each of what is not in the model is not, by name.
-Reasons = dict[str, str]
 # Sections and experiments that do not judge.
-Untold = Mapping[By, set[str]]
+NotJudging = Mapping[By, set[str]]
 # The model with some of the nominees, in the order they were named; None where it finds no flow.
 ScoreWith = Callable[[Names], ModelScore | None]
 
 
 @dataclass(frozen=True)
+class NoFlowWithIt:
+    """The model finds no steady flow with what is tried."""
+
+
+@dataclass(frozen=True)
+class NothingToHoldOut:
+    """Held-out errors need velocities of more than one section and experiment; velocities: whether there are any."""
+
+    velocities: bool
+
+
+@dataclass(frozen=True)
+class HeldOutErrorsRose:
+    """Root mean square errors of held-out sections or experiments rose [m/s]."""
+
+    by: By
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class FallNotClear:
+    """The diagnosis is in doubt, and held-out errors fell by less than so many standard errors."""
+
+    by: By
+    least: float
+
+
+@dataclass(frozen=True)
+class HeldOutErrorsDidNotFall:
+    """Held-out errors did not fall either way."""
+
+
+@dataclass(frozen=True)
+class MisfitRose:
+    """The misfit with the calibrated measurements rose."""
+
+
+@dataclass(frozen=True)
+class AmplitudeNearOff:
+    """The amplitude is compatible with no effect."""
+
+
+@dataclass(frozen=True)
+class NotNeeded:
+    """Held-out errors are no higher without it."""
+
+
+@dataclass(frozen=True)
+class KnownInstead:
+    """Held-out errors are not clearly higher with a known effect instead."""
+
+    known: str
+
+
+Refusal = (
+    NoFlowWithIt
+    | NothingToHoldOut
+    | HeldOutErrorsRose
+    | FallNotClear
+    | HeldOutErrorsDidNotFall
+    | MisfitRose
+    | AmplitudeNearOff
+    | NotNeeded
+    | KnownInstead
+    | ActsElsewhere
+)
+
+
+@dataclass(frozen=True)
+class UnclearFall:
+    """Fall of held-out squares and its standard error [(m/s)^2], NaN for one section, by what was held out."""
+
+    falls: tuple[tuple[By, float, float], ...]
+
+
+@dataclass(frozen=True)
 class Choice:
     """stages: names in the model, from none to the last, each with all of those before; refused: why, by name; unclear:
-    by how much held-out errors fall with those of the last model whose fall cannot be told from none, in words.
+    by how much held-out errors fall with those of the last model whose fall is not clear.
     """
 
     stages: tuple[Names, ...]
-    refused: Reasons
-    unclear: Mapping[str, str] = field(default_factory=dict)
+    refused: dict[str, Refusal]
+    unclear: Mapping[str, UnclearFall] = field(default_factory=dict)
 
 
 def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = False) -> Choice:
@@ -67,71 +142,73 @@ def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = Fals
     """
     order = [one.name for one in named]
 
-    def better(kept: Names, more: Names) -> tuple[Names, str]:
+    def better(kept: Names, more: Names) -> tuple[Names, Refusal | None]:
         both = tuple(name for name in order if name in {*kept, *more})
         before = score_with(kept)
         assert before is not None
-        return both, why_not_kept(
-            before, score_with(both), clearly, _untold([one for one in named if one.name in more])
-        )
+        judging = _not_judging([one for one in named if one.name in more])
+        return both, why_not_kept(before, score_with(both), clearly, judging)
 
-    stages, refused = _together(*_one_by_one(order, better), better)
-    kept, refused = _needed_of({one.name: one for one in named}, stages[-1], refused, score_with)
-    kept, refused = _known_of(named, kept, refused, score_with)
-    earlier = [stage for stage in stages if set(stage) < set(kept)]
-    return Choice((*earlier, kept), refused, _unclear_of(named, kept, score_with))
-
-
-Better = Callable[[Names, Names], tuple[Names, str]]
-# Names in the model after each step, and why others are not.
-Stages = tuple[tuple[Names, ...], Reasons]
-
-
-def _one_by_one(order: Sequence[str], better: Better) -> Stages:
-    """What helps by itself, and why the others do not."""
     stages: tuple[Names, ...] = ((),)
-    refused: Reasons = {}
-    for name in order:
+    refused: dict[str, Refusal] = {}
+    for name in order:  # by itself
         both, why = better(stages[-1], (name,))
-        if why:
-            refused = {**refused, name: why}
-        else:
+        if why is None:
             stages = (*stages, both)
-    return stages, refused
-
-
-def _together(stages: tuple[Names, ...], refused: Reasons, better: Better) -> Stages:
-    """What helps with the next of those that do not by themselves, too; what is kept is no longer refused."""
+        else:
+            refused[name] = why
     group: Names = ()
-    for name in refused:
+    for name in list(refused):  # together with the next of those that do not help by themselves
         group = (*group, name)
         both, why = better(stages[-1], group)
-        if why:
-            refused = {**refused, name: why}
-        else:
-            refused = _without(refused, *group)
+        if why is None:
+            refused = {other: reason for other, reason in refused.items() if other not in group}
             stages, group = (*stages, both), ()
-    return stages, refused
-
-
-def _without(refused: Reasons, *names: str) -> Reasons:
-    """The reasons, but for those of some names."""
-    return {name: why for name, why in refused.items() if name not in names}
+        else:
+            refused[name] = why
+    kept, refused = _needed_of({one.name: one for one in named}, stages[-1], refused, score_with)
+    kept, refused = _known_of(named, kept, refused, score_with)
+    unclear: dict[str, UnclearFall] = {}
+    for one in (each for each in named if each.name in kept):
+        without, last = score_with(tuple(name for name in kept if name != one.name)), score_with(kept)
+        if without is None or last is None:
+            continue
+        gains = _gains(without, last, _not_judging([one]))
+        if not any(gain > CLEAR * error for gain, error in gains.values()):
+            unclear[one.name] = UnclearFall(tuple((by, *gain) for by, gain in gains.items()))
+    earlier = [stage for stage in stages if set(stage) < set(kept)]
+    return Choice((*earlier, kept), refused, unclear)
 
 
 def _needed_of(
-    named: dict[str, Nominee], kept: Names, refused: Reasons, score_with: ScoreWith
-) -> tuple[Names, Reasons]:
-    """What is left when all that the model does not need is dropped, and why each of the others is not in it."""
+    named: dict[str, Nominee], kept: Names, refused: dict[str, Refusal], score_with: ScoreWith
+) -> tuple[Names, dict[str, Refusal]]:
+    """What is left once all that the model does not need is dropped, and why each of the others is not in it; nothing
+    is dropped if the model would be worse than its parent without it.
+    """
     for name in kept:
         fewer = tuple(one for one in kept if one != name)
-        if why := _why_dropped(named[name], score_with(()), score_with(fewer), score_with(kept)):
-            return _needed_of(named, fewer, {**refused, name: why}, score_with)
+        parent, without, last, judging = (
+            score_with(()),
+            score_with(fewer),
+            score_with(kept),
+            _not_judging([named[name]]),
+        )
+        if parent is None or without is None or last is None:
+            continue
+        if without is not parent and any(gain < 0.0 for gain, _ in _gains(parent, without, judging).values()):
+            continue
+        if is_off(named[name], last):
+            return _needed_of(named, fewer, {**refused, name: AmplitudeNearOff()}, score_with)
+        if not any(gain > 0.0 for gain, _ in _gains(without, last, judging).values()):
+            return _needed_of(named, fewer, {**refused, name: NotNeeded()}, score_with)
     return kept, refused
 
 
-def _known_of(named: Sequence[Nominee], kept: Names, refused: Reasons, score_with: ScoreWith) -> tuple[Names, Reasons]:
-    """What is left when what is vaguer makes room for what is known and helps hardly less, and why not the others."""
+def _known_of(
+    named: Sequence[Nominee], kept: Names, refused: dict[str, Refusal], score_with: ScoreWith
+) -> tuple[Names, dict[str, Refusal]]:
+    """What is left once what is vaguer makes room for what is known and helps hardly less, and why not the others."""
     for one in named:
         known = one.instead_of
         if one.name not in kept or not known or known in kept:
@@ -141,89 +218,53 @@ def _known_of(named: Sequence[Nominee], kept: Names, refused: Reasons, score_wit
         without, with_known, vaguer = score_with(fewer), score_with(both), score_with(kept)
         assert without is not None
         assert vaguer is not None
-        untold = _untold([each for each in named if each.name in (known, one.name)])
-        if with_known is None or why_not_kept(without, with_known, False, untold):
+        judging = _not_judging([each for each in named if each.name in (known, one.name)])
+        if with_known is None or why_not_kept(without, with_known, False, judging):
             continue
-        if not all(gain > CLEAR * error for gain, error in _gains(with_known, vaguer, untold).values()):
-            why = f"with {known}, which is known, held-out errors are not clearly higher"
-            kept, refused = both, {**_without(refused, known), one.name: why}
+        if not all(gain > CLEAR * error for gain, error in _gains(with_known, vaguer, judging).values()):
+            others = {name: why for name, why in refused.items() if name != known}
+            kept, refused = both, {**others, one.name: KnownInstead(known)}
     return kept, refused
 
 
-def _unclear_of(named: Sequence[Nominee], kept: Names, score_with: ScoreWith) -> Reasons:
-    """By how much held-out errors fall with each that is kept, in words, where neither way that is CLEAR.
-
-    Not of what the model finds no flow without.
-    """
-    falls: Reasons = {}
-    for one in (each for each in named if each.name in kept):
-        without, last = score_with(tuple(name for name in kept if name != one.name)), score_with(kept)
-        if without is None or last is None:
-            continue
-        gains = _gains(without, last, _untold([one]))
-        if not any(gain > CLEAR * error for gain, error in gains.values()):
-            falls[one.name] = ", ".join(f"{_fall_in_words(*gain)} by {by}" for by, gain in gains.items())
-    return falls
-
-
-def _fall_in_words(gain: float, error: float) -> str:
-    """`20 ± 400`, of squares in (mm/s)^2; without an error where one section alone was held out."""
-    fall = f"{1e6 * gain:.2g}"
-    return f"{fall} ± {1e6 * error:.1g}" if np.isfinite(error) else fall
-
-
-def _why_dropped(one: Nominee, parent: ModelScore | None, without: ModelScore | None, last: ModelScore | None) -> str:
-    """Why a model does not need an effect, '' when it does, or when it would be worse than its parent without."""
-    if parent is None or without is None or last is None:
-        return ""
-    untold = _untold([one])
-    if without is not parent and any(gain < 0.0 for gain, _ in _gains(parent, without, untold).values()):
-        return ""
-    if is_off(one, last):
-        return "its amplitude is compatible with none"
-    gains = _gains(without, last, untold)
-    return "" if any(gain > 0.0 for gain, _ in gains.values()) else "held-out errors are no higher without it"
-
-
 def is_off(one: Nominee, score: ModelScore) -> bool:
-    """Whether the amplitude lies within NEEDED standard errors of the value that does nothing."""
+    """Whether the amplitude lies within needed_errors standard errors of the value that does nothing."""
     return is_near_off(score.values[one.parameter], one.off)
 
 
-def why_not_kept(before: ModelScore, after: ModelScore | None, clearly: bool, untold: Untold) -> str:
-    """Why a model is not better than one before it, '' when it is: held-out errors fall by sections or by experiments
-    and rise by neither, but for those that do not judge, and the misfit with all that was seen falls. They may rise one
-    way where that is not clear, and less than they fall the other.
+def why_not_kept(
+    before: ModelScore, after: ModelScore | None, clearly: bool, not_judging: NotJudging
+) -> Refusal | None:
+    """Why a model is not better than one before it, None when it is: held-out errors fall by sections or by experiments
+    and rise by neither, and the misfit with all that was calibrated falls. They may rise one way if that is not clear,
+    and less than they fall the other.
     """
     if after is None:
-        return "the model finds no steady flow with it"
-    gains = _gains(before, after, untold)
+        return NoFlowWithIt()
+    gains = _gains(before, after, not_judging)
     if not gains:
-        where = "one section in one experiment" if after.held_out.velocity.any() else "no velocity"
-        return f"there is nothing to hold out: {where}"
+        return NothingToHoldOut(bool(after.held_out.velocity.any()))
     together = sum(gain for gain, _ in gains.values())
     for by, (gain, error) in gains.items():
         if gain < 0.0 and not (together > 0.0 and gain >= -CLEAR * error):
-            was, now = (held_out_rmse(one, by, untold.get(by, ())) for one in (before, after))
-            return f"errors of held-out {by} rose from {was:.4f} to {now:.4f} m/s"
+            was, now = (held_out_rmse(one, by, not_judging.get(by, ())) for one in (before, after))
+            return HeldOutErrorsRose(by, was, now)
         if clearly and not gain > CLEAR * error:
-            return (
-                f"the diagnosis is in doubt, and errors of held-out {by} fell by less than {CLEAR:.0f} standard errors"
-            )
+            return FallNotClear(by, CLEAR)
     if not any(gain > 0.0 for gain, _ in gains.values()):
-        return "held-out errors did not fall"
+        return HeldOutErrorsDidNotFall()
     # Held-out errors are those of a linear step: where the misfit with everything seen rises, it led astray.
-    return "" if after.in_sample.chi2 < before.in_sample.chi2 else "the misfit with what was seen rose"
+    return None if after.in_sample.chi2 < before.in_sample.chi2 else MisfitRose()
 
 
-def _untold(tried: Sequence[Nominee]) -> Untold:
+def _not_judging(tried: Sequence[Nominee]) -> NotJudging:
     """Experiments and sections without which something that is tried is not known."""
     return {by: {one.only_in[by] for one in tried if by in one.only_in} for by in WAYS}
 
 
-def _gains(before: ModelScore, after: ModelScore, untold: Untold) -> dict[By, tuple[float, float]]:
+def _gains(before: ModelScore, after: ModelScore, not_judging: NotJudging) -> dict[By, tuple[float, float]]:
     """Fall of the held-out squares and its standard error, where anything can be held out."""
-    gains = {by: improvement(before, after, by, untold.get(by, ())) for by in WAYS}
+    gains = {by: improvement(before, after, by, not_judging.get(by, ())) for by in WAYS}
     return {by: one for by, one in gains.items() if np.isfinite(one[0])}
 
 
@@ -260,7 +301,7 @@ def tried_additions(case: Case, found: Diagnosis) -> list[Addition]:
 
 
 def choice_among(case: Case, found: Diagnosis, base_with: Callable[[Names], Baseline | None]) -> Choice:
-    """Which of what is tried a model keeps, see `stepwise_choice`; no place that acts mostly where nobody measured.
+    """Which of what is tried a model keeps, see above; no place that acts mostly away from the measurements.
 
     base_with: the calibrated model with some of what is tried, by name; None where it finds no flow.
     """
@@ -272,37 +313,26 @@ def choice_among(case: Case, found: Diagnosis, base_with: Callable[[Names], Base
             scores[names] = None if base is None else model_score(base)
         return scores[names]
 
-    tried = nominees(case, found)
-    elsewhere = _acting_elsewhere(case, found, [one.name for one in tried], base_with)
+    tried, parent = nominees(case, found), base_with(())
+    at_places = {candidate_at(case, place).name for place in places_tried(found)}
+    elsewhere: dict[str, Refusal] = {}
+    for one in tried:
+        alone = base_with((one.name,)) if one.name in at_places else None
+        if parent is not None and alone is not None and (why := acts_elsewhere(parent, alone)):
+            elsewhere[one.name] = why
     choice = chosen([one for one in tried if one.name not in elsewhere], score_with, in_doubt(found))
     return replace(choice, refused=elsewhere | choice.refused)
-
-
-def _acting_elsewhere(
-    case: Case, found: Diagnosis, tried: Sequence[str], base_with: Callable[[Names], Baseline | None]
-) -> dict[str, str]:
-    """Why a place is not added, by its name, for it acts mostly where nobody measured."""
-    parent, places = base_with(()), {candidate_at(case, place).name for place in places_tried(found)}
-    alone = {name: base_with((name,)) for name in tried if name in places}
-    told = {
-        name: acts_elsewhere(parent, base) for name, base in alone.items() if parent is not None and base is not None
-    }
-    return {name: why for name, why in told.items() if why}
 
 
 def nominees(case: Case, found: Diagnosis) -> list[Nominee]:
     """What is tried, as it is chosen from."""
     known = {candidate_at(case, place).name: name for name, place in _likelier_places(found).items()}
-    return [
-        Nominee(one.name, one.parameter, one.amplitude.off, known.get(one.name, ""), _only_in(one))
-        for one, _ in tried_additions(case, found)
-    ]
-
-
-def _only_in(one: Candidate) -> dict[By, str]:
-    """The one experiment or section in which an effect acts, if it acts in one only."""
-    groups: dict[By, tuple[str, ...]] = {"experiments": one.experiments, "sections": one.sections}
-    return {by: names[0] for by, names in groups.items() if len(names) == 1}
+    named = []
+    for one, _ in tried_additions(case, found):
+        groups: dict[By, tuple[str, ...]] = {"experiments": one.experiments, "sections": one.sections}
+        only_in = {by: names[0] for by, names in groups.items() if len(names) == 1}
+        named.append(Nominee(one.name, one.parameter, one.amplitude.off, known.get(one.name, ""), only_in))
+    return named
 
 
 def places_tried(found: Diagnosis) -> list[LocalAnomaly]:

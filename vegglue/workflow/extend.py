@@ -34,6 +34,7 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import comparison_that_fits, write_model_score
 from vegglue.results.result_files import diagnosis_that_fits
 from vegglue.wording.numbers import in_digits, in_short
+from vegglue.wording.sentences import sentence
 from vegglue.workflow.case_run import (
     CaseRun,
     best_parameters,
@@ -212,8 +213,8 @@ def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
         for name, one in spread
         if name in kept
     ]
-    said += [_unclear_in_words(name, fall) for name, fall in choice.unclear.items()]
-    return " ".join([first, *said, *(f"{name} was not kept: {why}." for name, why in choice.refused.items())])
+    said += [_unclear_in_words(name, sentence(fall)) for name, fall in choice.unclear.items()]
+    return " ".join([first, *said, *(f"{name} was not kept: {sentence(why)}." for name, why in choice.refused.items())])
 
 
 def _unclear_in_words(name: str, fall: str) -> str:
