@@ -2,7 +2,6 @@
 
 import errno
 import os
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -26,20 +25,20 @@ def lock(handle: int, shared: bool = False) -> None:
 
     Raises BlockingIOError if another process holds the lock, and OSError if the file system has none.
     """
-    if sys.platform == "win32":
+    try:
+        import fcntl
+    except ImportError:  # Windows
         import msvcrt
 
         os.lseek(handle, LOCKED_BYTE, os.SEEK_SET)
         try:
-            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
         except OSError as error:
             raise BlockingIOError(*error.args) from None
         finally:
             os.lseek(handle, 0, os.SEEK_SET)
-    else:
-        import fcntl
-
-        fcntl.flock(handle, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        return
+    fcntl.flock(handle, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
 
 
 @contextmanager
@@ -58,9 +57,9 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-            if sys.platform != "win32":
+            if os.name != "nt":
                 os.replace(new, path)
-        if sys.platform == "win32":  # which renames closed files only
+        if os.name == "nt":  # Windows renames closed files only
             os.replace(new, path)
     except BaseException:
         file.close()

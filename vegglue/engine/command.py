@@ -250,7 +250,7 @@ def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) 
 
 def _end_all(process: "subprocess.Popen[bytes]") -> None:
     """End the command, if it still runs, and whatever it has started and left behind."""
-    if sys.platform == "win32":
+    if not hasattr(os, "killpg"):  # Windows
         with suppress(psutil.Error):
             for one in psutil.Process(process.pid).children(recursive=True):
                 one.kill()

@@ -1,0 +1,65 @@
+"""Systems without what only POSIX has: modules hidden, processes spawned, a console of code page 1252."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from kills import WITH_ERRORS
+from reach import COARSE, write_reach
+
+from vegglue.parallel import no_ctrl_c_for_children
+
+# Hides what Windows lacks, before anything is imported, and gives the one function of its own that is used.
+HIDING = """
+import multiprocessing, multiprocessing.popen_spawn_posix, os, subprocess, sys, types  # which look for msvcrt
+import joblib, psutil  # whose code for this system is another than for Windows
+from importlib.abc import MetaPathFinder
+
+class Hidden(MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name in ("fcntl", "resource", "pwd", "grp", "termios"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+for name in ("fcntl", "resource", "pwd", "grp", "termios"):
+    sys.modules.pop(name, None)
+sys.meta_path.insert(0, Hidden())
+windows = types.ModuleType("msvcrt")
+windows.LK_NBLCK = 2
+windows.locking = lambda handle, mode, size: None
+sys.modules["msvcrt"] = windows
+del os.killpg, os.fork
+multiprocessing.set_start_method("spawn", force=True)
+"""
+
+
+def run_hidden(folder: Path, *words: str) -> subprocess.CompletedProcess[bytes]:
+    """A command of the package in a Python that hides what only POSIX has."""
+    (folder / "hidden").mkdir(exist_ok=True)
+    (folder / "hidden" / "sitecustomize.py").write_text(HIDING, encoding="utf-8")
+    paths = os.pathsep.join([str(folder / "hidden"), str(Path(__file__).parents[1])])
+    environment = os.environ | {"PYTHONPATH": paths, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+    environment.pop("PYTHONSAFEPATH", None)
+    return subprocess.run(
+        [sys.executable, "-m", "vegglue", *words], cwd=folder, env=environment, capture_output=True, check=False
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words", [("check",), ("simulate", "--members", "8", "--jobs", "2"), ("infer",), ("diagnose", "--jobs", "1")]
+)
+def test_commands_need_nothing_that_only_posix_has(tmp_path: Path, words: tuple[str, ...]) -> None:
+    write_reach(tmp_path, COARSE, WITH_ERRORS)
+    verb, *options = words
+    done = run_hidden(tmp_path, verb, "brook.yaml", *options)
+    assert done.returncode == 0, done.stderr.decode("cp1252")
+    assert done.stdout.decode("cp1252")
+
+
+def test_processes_start_without_signal_masks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """joblib itself asks for the mask where it is not Windows: the mask is missing for this function alone."""
+    monkeypatch.delattr("signal.pthread_sigmask")
+    with no_ctrl_c_for_children():
+        assert os.environ["PYTHONSAFEPATH"] == "1"
