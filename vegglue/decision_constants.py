@@ -98,7 +98,7 @@ class DecisionConstants:
     )  # fmt: skip
     set_chance: float = _constant(0.95, "-", CHOSEN, "chance that a set holds; before the blind study", True)
     rival_share: float = _constant(
-        0.05, "-", CHOSEN, "chance of a rival over the best one's below which it is told apart: odds of 20, strong "
+        0.05, "-", CHOSEN, "chance of a rival over the best one's below which it is excluded: odds of 20, strong "
         "evidence of Kass and Raftery (1995)",
     )  # fmt: skip
     alike_cosine: float = _constant(
@@ -139,7 +139,7 @@ class DecisionConstants:
     testable_share: float = _constant(
         0.25, "-", CHOSEN, "share of effects that must be testable before nothing is found missing",
     )  # fmt: skip
-    most_groups: float = _constant(3.0, "-", CHOSEN, "groups of effects above which a set says nothing")
+    most_groups: float = _constant(3.0, "-", CHOSEN, "groups of effects above which a set is too wide to be stated")
     poor_fit_chance: float = _constant(
         1e-3, "-", CHOSEN, "chance of the last misfit under errors alone below which something is still missing",
     )  # fmt: skip

@@ -117,7 +117,7 @@ def at_work(case: Case, candidate: Candidate) -> bool:
 
 
 def acting_in(effect: Effect, kind: str, names: tuple[str, ...]) -> Candidate:
-    """An effect in some experiments, sections or devices, as `kind` says."""
+    """An effect in some experiments, sections or devices, by `kind`."""
     where = {f"{one}s": names if one == kind else () for one in ("experiment", "section", "device")}
     return Candidate(effect, where["experiments"], where["sections"], where["devices"])
 

@@ -7,7 +7,7 @@ section shows in it too. Of these the references and the range of validity are q
 
     d prediction_n / d a = sum_cells  d prediction_n / d ln k  g share,   the same with ln nu and ln h U U
 
-Terms of the grammar are multiplied by exp(a g), and g at the flow of the point says how much in each cell: one product
+Terms of the grammar are multiplied by exp(a g), and g at the flow of the point gives how much in each cell: one product
 for a law, and no flow. So a form may be tried at many references for nothing.
 """
 
@@ -31,7 +31,7 @@ from vegglue.measurements.kinds import velocity_rows
 
 # Quantiles between which a law counts as seen, and the fewest cells that show what a term sees. Chosen, not measured.
 SEEN, FEWEST_SEEN = (0.05, 0.95), 10
-# Fewest values of a quantity: of the stems of two patches a law says no more than that one of them is denser.
+# Fewest values of a quantity: of the stems of two patches a law means no more than that one of them is denser.
 FEWEST_VALUES = 3
 # Relative spread of a quantity, from the 5 to the 95 % quantile over the median, below which no law of it differs
 # from a constant: a factor exp(a g) of plausible size then changes its term by less than 5 %, an error of friction.

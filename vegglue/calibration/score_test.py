@@ -5,7 +5,7 @@ of each hypothesis, and the alarm that any of them stands out.
     ln B = -1/2 ln(1 + a^2) + 1/2 T^2 a^2 / (1 + a^2),   a = s |S_perp|
 
 Everything here is whitened: errors are independent and standard normal. Rows of the prior stand below those of the
-data, so that a calibrated parameter is as free as its prior says.
+data, so that a calibrated parameter is as free as under its prior.
 
 B is the Bayes factor of a hypothesis of size N(0, s^2) against nothing, T its score and |S_perp| the length of its
 fingerprint per unit of size, both in standard errors: the width of its prior is charged (Occam's factor). Groups of

@@ -1,6 +1,6 @@
 """config -> ensemble, each member a run of the command of its `engine`; appended as they end.
 
-A case with effects adds what they change in the built-in solver, which knows them and the command does not.
+Of a case with effects what these change in the built-in solver is added: the command has none of them.
 """
 
 from contextlib import closing

@@ -25,7 +25,7 @@ from vegglue.progress import silent
 # Degrees of freedom of every component: tails heavy enough for a posterior that is not normal.
 FREEDOM = 5.0
 # The numbers below are chosen, not measured: they trade time for effective draws, and no weight depends on them.
-# Effective draws that a fit of the mixture asks for; with fewer the weights are tempered, w^t with t < 1.
+# Effective draws that a fit of the mixture needs; with fewer the weights are tempered, w^t with t < 1.
 EFFECTIVE_TO_FIT = 200
 # Rounds of adaptation, draws in each (of an emulator, which cost little); components at most, and added in a round.
 ADAPTATION_ROUNDS, EMULATED_DRAWS, MOST_COMPONENTS, COMPONENTS_ADDED = 8, 4096, 12, 3
@@ -142,21 +142,21 @@ def tempered(weights: Array, wanted: float) -> Array:
     return np.asarray(np.exp(low * logs) / np.exp(low * logs).sum())
 
 
-def _expectation_maximisation(mixture: Mixture, z: Array, worth: float) -> Mixture:
+def _expectation_maximisation(mixture: Mixture, z: Array, effective: float) -> Mixture:
     """One step of expectation and maximisation for a mixture of t's (Cappé et al. 2008, doi:10.1007/s11222-008-9059-x).
 
-    z (m, p): draws of equal weight; worth: their effective number. A component that few of them belong to keeps most
-    of its shape.
+    z (m, p): draws of equal weight; effective: their effective number. A component that few of them belong to keeps
+    most of its shape.
     """
     logs, away = _parts(mixture, z)
     belongs = np.exp(logs - logsumexp(logs, axis=1, keepdims=True)) / len(z)
     share, p = belongs.sum(axis=0), z.shape[1]
     gain = belongs * (FREEDOM + p) / (FREEDOM + away)
     centre, lower = mixture.centre.copy(), mixture.lower.copy()
-    for k in np.flatnonzero(share * worth > 1.0):
+    for k in np.flatnonzero(share * effective > 1.0):
         centre[k] = gain[:, k] @ z / gain[:, k].sum()
         scatter = (z - centre[k]).T @ ((z - centre[k]) * gain[:, k, None])
-        kept = 2.0 * p / worth
+        kept = 2.0 * p / effective
         lower[k] = np.linalg.cholesky((scatter + kept * lower[k] @ lower[k].T) / (share[k] + kept))
     share = (share + SHARED_EVENLY / share.size) / (1.0 + SHARED_EVENLY)
     return replace(mixture, share=share, centre=centre, lower=lower)
@@ -171,7 +171,7 @@ RIDGE = 1e-6
 # Fall of the log density below the best run [per parameter] at which the root of a run's weight is a half. Chosen, not
 # measured: a smaller one fits the mode more closely and the tails less.
 HALF_WEIGHT_DROP = 5.0
-# Parts into which runs are cut to tell which degree predicts those that it has not seen. Chosen, not measured.
+# Parts into which runs are cut, to find the degree that predicts those held out. Chosen, not measured.
 HELD_OUT_PARTS = 4
 # Fall of the log density below the best run [per parameter] beyond which how far it falls does not matter: chosen. With
 # two parameters a draw of a normal posterior falls so far with a chance of 2e-9, with more less often.

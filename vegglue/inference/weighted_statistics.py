@@ -165,7 +165,7 @@ def _tail(count: int) -> int:
 
 
 def _generalised_pareto(excess: Array) -> tuple[float, float]:
-    """Shape k and scale: posterior mean over a grid of b = -k/scale; k has a weak prior of 0.5 worth 10 values."""
+    """Shape k and scale: posterior mean over a grid of b = -k/scale; k has a weak prior of 0.5, as of 10 values."""
     count = len(excess)
     grid = 30 + int(np.sqrt(count))
     quartile = excess[int(count / 4 + 0.5) - 1]
