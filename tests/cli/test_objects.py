@@ -6,13 +6,13 @@ from diagnoses import NOTHING, a_diagnosis
 from linear_baseline import CASE_OF_TWINS
 
 from vegglue.cli.objects import run_object
-from vegglue.results.open_questions import Question
+from vegglue.results.open_questions import Question, RivalEffects
 
 
 def test_a_child_does_not_take_the_place_of_its_parent() -> None:
     """The verdict on the case that was given was replaced by that on its last child, which lacks nothing."""
     child = CASE_OF_TWINS.model_copy(update={"name": "twin-eddies"})
-    asked = [Question("eddies from wind", ())]
+    asked = [Question(RivalEffects(("eddies", "wind")), ())]
     found = run_object(
         Path("runs"),
         [

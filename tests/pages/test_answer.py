@@ -33,7 +33,7 @@ from vegglue.pages.tables import station_rows
 from vegglue.results.causes import Rival, Step
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.model_comparison import ComparedModel, ModelComparison
-from vegglue.results.open_questions import ProposedMeasurement, Question
+from vegglue.results.open_questions import HiddenEffect, ProposedMeasurement, Question, RivalEffects
 from vegglue.results.verdict import (
     EffectsStillSignificant,
     ErrorsStillLarger,
@@ -188,7 +188,7 @@ def test_the_ladder_is_of_what_was_added_and_not_of_what_is_left(toy: Run) -> No
 
 
 def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> None:
-    question, page = Question("eddies from <wind>", (GAUGE,)), {"toy-eddies": "../toy-eddies/report.html"}
+    question, page = Question(RivalEffects(("eddies", "<wind>")), (GAUGE,)), {"toy-eddies": "../toy-eddies/report.html"}
     loop = LoopResults(ladder=LADDER, questions=(question,), pages=page)
     better, measure, *_ = next_steps(replace(toy, diagnosis=a_diagnosis(), loop=loop))
     assert '<a href="../toy-eddies/report.html">' in better
@@ -205,7 +205,7 @@ def test_what_to_do_next_names_the_other_model_and_the_measurement(toy: Run) -> 
 def test_no_field_work_is_proposed_before_wrong_measurements_are_mended(toy: Run) -> None:
     """Of velocities in cm/s read as m/s the page said to measure another section for six hours."""
     doubted = a_diagnosis((), (), verdict={"kind": "cannot-tell", "reasons": (IMPLAUSIBLE,)})
-    question = Question("eddies from a change of k_s", (GAUGE,))
+    question = Question(HiddenEffect("eddies", "k_s"), (GAUGE,))
     steps = [
         plain(step) for step in next_steps(replace(toy, diagnosis=doubted, loop=LoopResults(questions=(question,))))
     ]
@@ -251,22 +251,22 @@ def test_where_a_law_stands_out_discover_is_named(toy: Run) -> None:
 
 
 def test_a_measurement_that_would_not_do_is_not_proposed(toy: Run) -> None:
-    hidden = Question("eddies from a change of k_s", (replace(GAUGE, then=3.0),))
-    unknown = Question("eddies from wind", ())
+    hidden = Question(HiddenEffect("eddies", "k_s"), (replace(GAUGE, then=3.0),))
+    unknown = Question(RivalEffects(("eddies", "wind")), ())
     steps = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(hidden, unknown))))
     said = "to test eddies, which a change of k_s hides; nor to tell eddies from wind."
     assert list(map(plain, steps)) == [f"No single measurement would do {said}"]
 
 
 def test_no_field_work_is_proposed_for_what_is_answered(toy: Run) -> None:
-    answered = Question("eddies from a change of k_s", (replace(GAUGE, now=30.0, then=60.0),), 25.0)
+    answered = Question(HiddenEffect("eddies", "k_s"), (replace(GAUGE, now=30.0, then=60.0),), 25.0)
     steps = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(answered,))))
     assert list(map(plain, steps)) == ["No further measurement is needed."]
 
 
 def test_the_page_of_a_parent_does_not_speak_for_its_child(toy: Run) -> None:
     """All was answered of the parent, and its page said that no measurement is needed; the child lacked something."""
-    answered = Question("eddies from a change of k_s", (replace(GAUGE, now=30.0, then=60.0),), 25.0)
+    answered = Question(HiddenEffect("eddies", "k_s"), (replace(GAUGE, now=30.0, then=60.0),), 25.0)
     for questions in ((answered,), ()):
         parent = replace(toy, diagnosis=a_diagnosis(), loop=LoopResults(ladder=LADDER, questions=questions))
         said = " ".join(map(plain, next_steps(parent)))
@@ -277,10 +277,10 @@ def test_the_page_of_a_parent_does_not_speak_for_its_child(toy: Run) -> None:
 
 
 def test_a_measurement_says_what_it_is_for_in_plain_words(toy: Run) -> None:
-    hidden = Question("steep_bank from a change of k_s", (GAUGE,))
+    hidden = Question(HiddenEffect("steep_bank", "k_s"), (GAUGE,))
     (step,) = next_steps(replace(toy, diagnosis=NOTHING, loop=LoopResults(questions=(hidden,))))
     assert "to test “Steep banks touch more water than their width says” (steep_bank), which a change" in plain(step)
-    both = LoopResults(questions=(hidden, Question("eddies from a change of phi", (GAUGE,))))
+    both = LoopResults(questions=(hidden, Question(HiddenEffect("eddies", "phi"), (GAUGE,))))
     (step,) = next_steps(replace(toy, diagnosis=NOTHING, loop=both))
     assert "which a change of k_s hides, and to test eddies, which a change of phi hides: 1 station" in plain(step)
 

@@ -21,14 +21,14 @@ from vegglue.results.json_store import (
     write_questions,
 )
 from vegglue.results.model_comparison import ComparedModel, ModelComparison
-from vegglue.results.open_questions import ProposedMeasurement, Question
+from vegglue.results.open_questions import HiddenEffect, ProposedMeasurement, Question, RivalEffects
 
 HASH, OTHER = "a" * 64, "b" * 64
 STEP = ComparedModel("brook", "brook.yaml", HASH, ("Größe",), 4, 0.011, 0.02, 0.03, 0.04, 0.012)
 LADDER = ModelComparison((STEP,), 2, "Added: eddies.", "Missing: eddies.", ("eddies",))
 ASIDE = [("June", "velocity", "Größe", 1.0, 0.1 + 0.2, 0.5)]
 GAUGE = (ProposedMeasurement("a gauge", "June", 5.0, 1, 0.5, 0.2, 9.0),)
-QUESTIONS = (Question("eddies from wind", GAUGE), Question("eddies from a change of n_b", GAUGE, 25.0))
+QUESTIONS = (Question(RivalEffects(("eddies", "wind")), GAUGE), Question(HiddenEffect("eddies", "n_b"), GAUGE, 25.0))
 
 
 def test_what_is_kept_is_read_back(tmp_path: Path) -> None:

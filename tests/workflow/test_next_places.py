@@ -23,7 +23,7 @@ from vegglue.errors import InputError
 from vegglue.results.causes import Step
 from vegglue.results.diagnosis import ParameterEstimates
 from vegglue.results.json_store import write_questions
-from vegglue.results.open_questions import ProposedMeasurement, Question
+from vegglue.results.open_questions import ProposedMeasurement, Question, RivalEffects
 from vegglue.workflow import next_measurement as verb
 from vegglue.workflow.case_run import folder_of
 from vegglue.workflow.next_measurement import next_measurement
@@ -87,7 +87,9 @@ def test_what_hides_beside_a_place_is_asked_of_the_model_that_has_it(monkeypatch
 def test_what_to_measure_is_asked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """For a case as it is; what somebody asks for is asked anew."""
     case = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")
-    kept = (Question("eddies from wind", (ProposedMeasurement("a gauge", "June", 5.0, 1, 0.5, 0.2, 9.0),)),)
+    kept = (
+        Question(RivalEffects(("eddies", "wind")), (ProposedMeasurement("a gauge", "June", 5.0, 1, 0.5, 0.2, 9.0),)),
+    )
     write_questions(folder_of(tmp_path, case), kept, case_hash(case))
     monkeypatch.setattr(verb, "diagnose", lambda *given, **more: a_diagnosis())
     assert tuple(next_measurement(case, runs=tmp_path)) == kept

@@ -9,6 +9,7 @@ import pytest
 from diagnoses import IMPLAUSIBLE, a_diagnosis
 
 from vegglue.diagnosis.next_measurement import MeasurementWorth, _least
+from vegglue.results.open_questions import OneOfRivals, RivalEffects
 from vegglue.workflow.next_measurement import _answers, _questions
 
 
@@ -32,15 +33,16 @@ def test_nothing_is_asked_of_data_that_are_in_doubt() -> None:
 
 
 def test_what_tells_one_rival_from_all_others_is_proposed_for_it() -> None:
-    whole, *single = _answers("all", THREE, [SHALLOW, FAR])
-    assert (whole.tells_apart, whole.useful) == ("all", ())
-    assert [one.tells_apart for one in single] == ["depth from even or trend", "trend from depth or even"]
+    whole, *single = _answers(RivalEffects(("depth", "even", "trend")), THREE, [SHALLOW, FAR])
+    assert whole.useful == ()
+    others = [OneOfRivals("depth", ("even", "trend")), OneOfRivals("trend", ("depth", "even"))]
+    assert [one.about for one in single] == others
     assert [one.useful[0].name for one in single] == ["a lower discharge", "a section far off"]
     assert single[1].measurements[0].per_hour == pytest.approx(8.9 / 2.0)
 
 
 def test_a_question_that_is_answered_is_one_and_so_is_one_of_two_rivals() -> None:
-    (answered,) = _answers("all", THREE, [worth("everything", [4.0, 5.0, 6.0])])
+    (answered,) = _answers(RivalEffects(("depth", "even", "trend")), THREE, [worth("everything", [4.0, 5.0, 6.0])])
     assert answered.useful[0].then == 4.0
     assert len(_answers("both", THREE[:2], [worth("little", [1.0, 1.0])])) == 1
 

@@ -103,7 +103,7 @@ class KnownInstead:
     known: str
 
 
-Refusal = (
+NotKept = (
     NoFlowWithIt
     | NothingToHoldOut
     | HeldOutErrorsRose
@@ -131,7 +131,7 @@ class Choice:
     """
 
     stages: tuple[Names, ...]
-    refused: dict[str, Refusal]
+    refused: dict[str, NotKept]
     unclear: Mapping[str, UnclearFall] = field(default_factory=dict)
 
 
@@ -142,7 +142,7 @@ def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = Fals
     """
     order = [one.name for one in named]
 
-    def better(kept: Names, more: Names) -> tuple[Names, Refusal | None]:
+    def better(kept: Names, more: Names) -> tuple[Names, NotKept | None]:
         both = tuple(name for name in order if name in {*kept, *more})
         before = score_with(kept)
         assert before is not None
@@ -150,7 +150,7 @@ def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = Fals
         return both, why_not_kept(before, score_with(both), clearly, judging)
 
     stages: tuple[Names, ...] = ((),)
-    refused: dict[str, Refusal] = {}
+    refused: dict[str, NotKept] = {}
     for name in order:  # by itself
         both, why = better(stages[-1], (name,))
         if why is None:
@@ -181,8 +181,8 @@ def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = Fals
 
 
 def _needed_of(
-    named: dict[str, Nominee], kept: Names, refused: dict[str, Refusal], score_with: ScoreWith
-) -> tuple[Names, dict[str, Refusal]]:
+    named: dict[str, Nominee], kept: Names, refused: dict[str, NotKept], score_with: ScoreWith
+) -> tuple[Names, dict[str, NotKept]]:
     """What is left once all that the model does not need is dropped, and why each of the others is not in it; nothing
     is dropped if the model would be worse than its parent without it.
     """
@@ -206,8 +206,8 @@ def _needed_of(
 
 
 def _known_of(
-    named: Sequence[Nominee], kept: Names, refused: dict[str, Refusal], score_with: ScoreWith
-) -> tuple[Names, dict[str, Refusal]]:
+    named: Sequence[Nominee], kept: Names, refused: dict[str, NotKept], score_with: ScoreWith
+) -> tuple[Names, dict[str, NotKept]]:
     """What is left once what is vaguer makes room for what is known and helps hardly less, and why not the others."""
     for one in named:
         known = one.instead_of
@@ -234,7 +234,7 @@ def is_off(one: Nominee, score: ModelScore) -> bool:
 
 def why_not_kept(
     before: ModelScore, after: ModelScore | None, clearly: bool, not_judging: NotJudging
-) -> Refusal | None:
+) -> NotKept | None:
     """Why a model is not better than one before it, None when it is: held-out errors fall by sections or by experiments
     and rise by neither, and the misfit with all that was calibrated falls. They may rise one way if that is not clear,
     and less than they fall the other.
@@ -315,7 +315,7 @@ def choice_among(case: Case, found: Diagnosis, base_with: Callable[[Names], Base
 
     tried, parent = nominees(case, found), base_with(())
     at_places = {candidate_at(case, place).name for place in places_tried(found)}
-    elsewhere: dict[str, Refusal] = {}
+    elsewhere: dict[str, NotKept] = {}
     for one in tried:
         alone = base_with((one.name,)) if one.name in at_places else None
         if parent is not None and alone is not None and (why := acts_elsewhere(parent, alone)):

@@ -10,7 +10,7 @@ from vegglue.pages.run import Run, command_about
 from vegglue.pages.typography import NARROW, short
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.model_comparison import ComparedModel
-from vegglue.results.open_questions import HIDDEN_BEHIND, Question
+from vegglue.results.open_questions import HiddenEffect, Question
 from vegglue.wording.numbers import so_many
 
 # Measurements named beside the answer: more are a list that nobody acts on.
@@ -102,9 +102,9 @@ def _nothing_to_measure(run: Run) -> str:
 
 def _to_see(question: Question) -> str:
     """What a question asks, as a purpose."""
-    one, hidden, other = question.tells_apart.partition(HIDDEN_BEHIND)
-    if hidden:
-        return f"to test {_told(one)}, which a change of <code>{html.escape(other)}</code> hides"
+    about = question.about
+    if isinstance(about, HiddenEffect):
+        return f"to test {_told(about.name)}, which a change of <code>{html.escape(about.parameter)}</code> hides"
     return f"to tell {html.escape(question.tells_apart)}"
 
 

@@ -15,8 +15,9 @@ from vegglue.plain_json import plain
 from vegglue.results.model_comparison import ModelComparison, ModelScore, comparison_from, model_score_from
 from vegglue.results.open_questions import Question, questions_from
 from vegglue.whole_files import MAKE_ROOM
+from vegglue.wording.sentences import tagged
 
-SCORE_FORMAT, COMPARISON_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 3", "vegglue questions 3"
+SCORE_FORMAT, COMPARISON_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 3", "vegglue questions 4"
 SCORE_FILE, COMPARISON_FILE, QUESTIONS_FILE = "rung.json", "comparison.json", "questions.json"
 Kept = TypeVar("Kept")
 # A measurement that is left out: where it stands, and its value.
@@ -50,7 +51,7 @@ def comparison_that_fits(folder: Path, config_hash: str) -> ModelComparison | No
 
 def write_questions(folder: Path, questions: Sequence[Question], config_hash: str) -> None:
     """Keep what to measure next, which may be nothing. Errors: StorageError."""
-    _write(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, [*map(asdict, questions)])
+    _write(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, tagged(tuple(questions)))
 
 
 def questions_that_fit(folder: Path, config_hash: str) -> tuple[Question, ...] | None:

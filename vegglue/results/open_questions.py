@@ -1,20 +1,57 @@
-"""What is still to be told apart, and the measurements that could: as `vegglue next` tells it, and keeps it."""
+"""What is still to be told apart, and the measurements that could, as `vegglue next` reports and stores it.
+
+The words stand in wording/templates/questions.j2.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
-from vegglue.wording.numbers import in_digits, so_many
+from pydantic import TypeAdapter
 
-# What stands in a question between an effect that calibration hides and the parameter that hides it.
-HIDDEN_BEHIND = " from a change of "
+from vegglue.wording.sentences import phrase, sentence, tag_of
+
 # Below this D^2 a measurement does not separate anything.
 SEPARATES = 4.0
-# Measurements shown of each question: more than these nobody plans in one season.
+# Measurements shown of each question: more than these cannot be planned in one season.
 SHOWN = 4
-# A measurement that raises D^2 by less than a tenth is said to add nothing.
+# A measurement that raises D^2 by less than a tenth adds nothing.
 ADDS = 1.1
+
+
+@dataclass(frozen=True)
+class RivalEffects:
+    """Effects, laws or places to be told from each other."""
+
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class OneOfRivals:
+    """One of several rivals to be told from all others."""
+
+    name: str
+    others: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class HiddenEffect:
+    """An effect to be told from a change of the parameter that leaves its trace."""
+
+    name: str
+    parameter: str
+
+
+@dataclass(frozen=True)
+class HiddenLaw:
+    """A law to be told from what calibration makes of it."""
+
+    name: str
+
+
+Subject = RivalEffects | OneOfRivals | HiddenEffect | HiddenLaw
+SUBJECTS: Mapping[str, type] = {tag_of(one): one for one in get_args(Subject)}
 
 
 @dataclass(frozen=True)
@@ -39,18 +76,18 @@ class ProposedMeasurement:
 
 @dataclass(frozen=True)
 class Question:
-    """What is to be told apart, in words, and the measurements that could, by what they add in an hour; seen_from: D^2
-    from which on a diagnosis sees what is asked for 19 times of 20 [-], infinite where that is no matter of size.
+    """What is to be told apart, and the measurements that could, by what they add in an hour; seen_from: D^2 from which
+    on a diagnosis sees it 19 times of 20 [-], infinite if that is no matter of size.
     """
 
-    tells_apart: str
+    about: Subject
     measurements: tuple[ProposedMeasurement, ...]
     seen_from: float = math.inf
 
     @property
-    def of_one(self) -> bool:
-        """Whether one effect is asked for, that calibration hides, and not which of several it is."""
-        return HIDDEN_BEHIND in self.tells_apart
+    def tells_apart(self) -> str:
+        """What is to be told apart, in words."""
+        return sentence(self.about)
 
     @property
     def answered(self) -> bool:
@@ -59,75 +96,31 @@ class Question:
 
     @property
     def useful(self) -> tuple[ProposedMeasurement, ...]:
-        """Those that would tell it apart by themselves, the few that are worth a thought; none where it is answered."""
+        """Those that would tell it apart by themselves, the few that are worth a thought; none if it is answered."""
         if self.answered:
             return ()
         enough = (one for one in self.measurements if one.then >= SEPARATES and one.then > ADDS * one.now)
         return tuple(enough)[:SHOWN]
 
     @property
-    def nearest(self) -> tuple[ProposedMeasurement, ...]:
-        """The one that comes nearest to it, where there is any."""
-        return tuple(sorted(self.measurements, key=lambda one: -one.then)[:1])
+    def nearest(self) -> ProposedMeasurement | None:
+        """The measurement that comes nearest to it, if there is any."""
+        return max(self.measurements, key=lambda one: one.then, default=None)
 
     def __repr__(self) -> str:
-        if not self.useful:
-            return f"To tell {self.tells_apart}: {self._why_none()}."
-        heading = f"To tell {self.tells_apart} (D2 now {self._now_in_words(self.useful[0].now)}):"
-        return "\n".join([heading, *(f"- {_in_short(one)}" for one in self.useful)])
-
-    def _now_in_words(self, now: float) -> str:
-        """What the data at hand say, and why that is no answer yet where it is much."""
-        told = f"{in_digits(now, 2)} squared standard errors"
-        if math.isfinite(self.seen_from):
-            return f"{told}; a diagnosis sees it from {in_digits(self.seen_from, 2)} on"
-        return f"{told}: the data at hand should tell, what is listed makes it surer" if now >= SEPARATES else told
-
-    def _why_none(self) -> str:
-        """Why no measurement is proposed: they add little to what is known, or are not enough."""
-        if self.answered:
-            now = max(one.now for one in self.measurements)
-            seen = in_digits(self.seen_from, 2)
-            return f"answered, as D2 is {in_digits(now, 2)} already, and from {seen} on a diagnosis sees it"
-        if not self.nearest:
-            return "no measurement would by itself"
-        would, adds = self._none_of_them()
-        best, enough = self.nearest[0], f"{SEPARATES:g} tells two apart"
-        most = f"D2 at most {in_digits(best.then, 2)}: {best.name}"
-        if best.then >= SEPARATES:
-            return f"D2 is {in_digits(best.now, 2)} already, where {enough}, and {adds} a tenth to it ({most})"
-        return f"{would} by itself, where {enough} ({most})"
-
-    def _none_of_them(self) -> tuple[str, str]:
-        """`none of 3 measurements would` and `.. adds`; of a single one, that it would not."""
-        if len(self.measurements) == 1:
-            return "the one measurement would not", "the one measurement does not add"
-        many = f"none of {len(self.measurements)} measurements"
-        return f"{many} would", f"{many} adds"
+        return "\n".join([sentence(self), *(f"- {phrase('proposed_measurement', one)}" for one in self.useful)])
 
 
 def questions_from(tree: Sequence[Mapping[str, Any]]) -> tuple[Question, ...]:
-    """The questions of a list of JSON. Errors: KeyError, TypeError or ValueError where it is none."""
-    return tuple(map(_question_from, tree))
+    """The questions of a list of JSON, null for a size that is never seen.
 
-
-def _question_from(tree: Mapping[str, Any]) -> Question:
-    """null for no number: a size that is never seen."""
-    seen_from = math.inf if tree["seen_from"] is None else float(tree["seen_from"])
-    return Question(str(tree["tells_apart"]), tuple(map(_proposed_from, tree["measurements"])), seen_from)
-
-
-def _proposed_from(tree: Mapping[str, Any]) -> ProposedMeasurement:
-    return ProposedMeasurement(
-        name=str(tree["name"]),
-        experiment=str(tree["experiment"]),
-        x=float(tree["x"]),
-        stations=int(tree["stations"]),
-        hours=float(tree["hours"]),
-        now=float(tree["now"]),
-        then=float(tree["then"]),
+    Errors: KeyError, TypeError or ValueError where it is none.
+    """
+    return tuple(
+        Question(
+            about=TypeAdapter(SUBJECTS[one["about"]["kind"]]).validate_python(one["about"]),
+            measurements=TypeAdapter(tuple[ProposedMeasurement, ...]).validate_python(one["measurements"]),
+            seen_from=math.inf if one["seen_from"] is None else float(one["seen_from"]),
+        )
+        for one in tree
     )
-
-
-def _in_short(one: ProposedMeasurement) -> str:
-    return f"{one.name}: {in_digits(one.then, 2)}, {so_many(one.stations, 'station')}, {one.hours:.1f} h"

@@ -1,5 +1,6 @@
 """Values as sentences: each class of findings has one macro of its own name in `templates/`."""
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
@@ -114,6 +115,7 @@ def macros() -> dict[str, Callable[..., str]]:
         "section_at": section_in_words,
         "place_at": place_in_digits,
         "tag_of": tag_of,
+        "infinity": math.inf,
     }
     found: dict[str, Callable[..., str]] = {}
     for name in environment.list_templates():

@@ -22,7 +22,15 @@ from vegglue.progress import Progress, Watch, silent
 from vegglue.results.causes import CandidateEffect, CandidateLaw, CandidateLaws, Step
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import questions_that_fit, write_questions
-from vegglue.results.open_questions import HIDDEN_BEHIND, ProposedMeasurement, Question
+from vegglue.results.open_questions import (
+    HiddenEffect,
+    HiddenLaw,
+    OneOfRivals,
+    ProposedMeasurement,
+    Question,
+    RivalEffects,
+    Subject,
+)
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run
 from vegglue.workflow.diagnose import diagnose
 
@@ -70,8 +78,9 @@ def next_measurement(
             run.watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
         answered = zip(asked, worths, strict=True)
-        questions = [one for (what, rivals), worth in answered for one in _answers(what, rivals, worth)]
-        questions = [replace(one, seen_from=_seen_from(found)) if one.of_one else one for one in questions]
+        questions = [one for (about, rivals), worth in answered for one in _answers(about, rivals, worth)]
+        seen = _seen_from(found)
+        questions = [replace(one, seen_from=seen) if isinstance(one.about, HiddenEffect) else one for one in questions]
     if not between:
         write_questions(run.folder, questions, wanted)
     return questions
@@ -95,17 +104,17 @@ def with_places(base: Baseline, found: Diagnosis) -> Baseline:
     return for_prediction(baseline(replace(base.model, case=child), known))
 
 
-def _answers(what: str, rivals: Sequence[Explanation], worths: Sequence[MeasurementWorth]) -> list[Question]:
+def _answers(about: Subject, rivals: Sequence[Explanation], worths: Sequence[MeasurementWorth]) -> list[Question]:
     """A question with what could be measured for it. Where nothing answers it and there are more than two rivals, those
     that something tells from all others follow.
     """
-    whole = Question(what, _ranked(_proposed(one, one.now.min(), one.then.min()) for one in worths))
+    whole = Question(about, _ranked(_proposed(one, one.now.min(), one.then.min()) for one in worths))
     if whole.useful or len(rivals) < FEWEST_PARTED:
         return [whole]
     names = [candidate.name for candidate, _, _ in rivals]
     single = [
         Question(
-            f"{name} from {' or '.join(other for other in names if other != name)}",
+            OneOfRivals(name, tuple(other for other in names if other != name)),
             _ranked(_proposed(one, one.now[i], one.then[i]) for one in worths),
         )
         for i, name in enumerate(names)
@@ -122,8 +131,8 @@ def _proposed(one: MeasurementWorth, now: float, then: float) -> ProposedMeasure
     return ProposedMeasurement(plan.name, plan.experiment, plan.x, plan.rows.size, plan.hours, float(now), float(then))
 
 
-def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Explanation]]]:
-    """What the diagnosis leaves open, in words, and the rivals of each question; nothing of data that it doubts."""
+def _questions(case: Case, found: Diagnosis) -> list[tuple[Subject, list[Explanation]]]:
+    """What the diagnosis leaves open, and the rivals of each question; nothing of data that it doubts."""
     if found.verdict.doubts_the_data:
         return []
     if found.steps:
@@ -140,7 +149,7 @@ def _questions(case: Case, found: Diagnosis) -> list[tuple[str, list[Explanation
     return [question for one in strongest for question in _asked(case, found, [one.name])]
 
 
-def _between_rivals(case: Case, found: Diagnosis, step: Step) -> tuple[str, list[Explanation]]:
+def _between_rivals(case: Case, found: Diagnosis, step: Step) -> tuple[Subject, list[Explanation]]:
     """The question of a step: to tell its effects from each other, and from a place that is likelier than they are."""
     names, rivals = [*step.rivals], rivals_of(case, found, step.rivals)
     if step.likelier_place:
@@ -148,17 +157,17 @@ def _between_rivals(case: Case, found: Diagnosis, step: Step) -> tuple[str, list
         unlisted = candidate_at(case, place)
         names.append(unlisted.name)
         rivals.append((unlisted, place.shapes, unlisted.effect.amplitude.gain(place.amplitude)))
-    return " from ".join(names), rivals
+    return RivalEffects(tuple(names)), rivals
 
 
-def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[str, list[Explanation]]]:
+def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[Subject, list[Explanation]]]:
     """One question: to tell effects from each other, or one of a plausible size from what calibration makes of it."""
     if len(names) > 1:
-        return [(" from ".join(names), rivals_of(case, found, names))]
+        return [(RivalEffects(tuple(names)), rivals_of(case, found, names))]
     if names[0] in _laws_by_name(found):
-        return [(f"{names[0]} from what calibration makes of it", rivals_of(case, found, names))]
+        return [(HiddenLaw(names[0]), rivals_of(case, found, names))]
     single = next(one for one in found.candidate_effects if one.name == names[0])
-    return [(_what_hides(single), rivals_of(case, found, names, plausible=True))]
+    return [(HiddenEffect(single.name, single.detectability.confounder), rivals_of(case, found, names, plausible=True))]
 
 
 def laws_to_tell_apart(laws: CandidateLaws | None) -> list[str]:
@@ -173,10 +182,6 @@ def laws_to_tell_apart(laws: CandidateLaws | None) -> list[str]:
 
 def _laws_by_name(found: Diagnosis) -> dict[str, CandidateLaw]:
     return {} if found.laws is None else {one.name: one for one in found.laws.laws}
-
-
-def _what_hides(candidate_effect: CandidateEffect) -> str:
-    return f"{candidate_effect.name}{HIDDEN_BEHIND}{candidate_effect.detectability.confounder}"
 
 
 def _raw_trace(case: Case, found: Diagnosis, candidate_effect: CandidateEffect) -> float:
