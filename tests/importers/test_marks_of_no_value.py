@@ -67,7 +67,7 @@ def test_lost_bottom_track_costs_its_ensemble_only(tmp_path: Path) -> None:
     assert "151 ensembles" in a.notes[0], "the last one, too"
     assert "148 ensembles, 1 without velocities left out, 2 without a place left out" in b.notes[0]
     for role in ("x", "y", "east_velocity", "north_velocity"):
-        assert b.numbers[role] == pytest.approx(a.numbers[role], abs=0.02), role
+        assert b.numbers[role] == pytest.approx(a.numbers[role], abs=0.05 if role in "xy" else 0.005), role
 
 
 @MANY
