@@ -1,8 +1,17 @@
-"""The folder of a field team that tests of importers share."""
+"""Folders of field teams that tests of importers share: made, imported, or refused."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import pandas as pd
+import pytest
+
+import vegglue
+from vegglue.case.schema import Case
+from vegglue.errors import InputError
+from vegglue.measurements.observations import read_observations
 
 SITE: dict[str, Any] = {
     "channel": {"length_m": 40.0, "bottom_width_m": 3.0, "bank_slope_v_per_h": 0.6667, "bed_slope": 0.001},
@@ -29,8 +38,48 @@ def field_folder(folder: Path, **changes: Any) -> Path:
 
 def folder_of(path: Path, site: str, **files: str) -> Path:
     """A folder of measurements; names of files with __ for the point."""
-    path.mkdir()
+    path.mkdir(parents=True)
     (path / "site.yaml").write_text(site, encoding="utf-8")
     for name, text in files.items():
         (path / name.replace("__", ".")).write_text(text, encoding="utf-8")
     return path
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A case, its stations, and what was taken from each file, by its name."""
+
+    case: Case
+    table: pd.DataFrame
+    taken: dict[str, str]
+
+    def values(self, kind: str = "velocity") -> list[float]:
+        """Of one kind, in their order."""
+        return self.table.loc[self.table["kind"] == kind, "value"].tolist()
+
+
+def imported(folder: Path) -> Imported:
+    """A folder as a case beside it."""
+    case = vegglue.import_folder(folder, folder.parent / f"{folder.name}.yaml")
+    return Imported(case, read_observations(case).table, {one.name: one.taken for one in case.imported or ()})
+
+
+def import_of(tmp_path: Path, site: str = CHANNEL + JUNE, **files: str) -> Imported:
+    """A site file and tables as a case."""
+    return imported(folder_of(tmp_path / f"brook{len(list(tmp_path.iterdir()))}", site, **files))
+
+
+def refusal_of(tmp_path: Path, site: str = CHANNEL + JUNE, **files: str) -> str:
+    """Why a site file and tables are refused: one line, and nothing is written."""
+    folder = folder_of(tmp_path / f"brook{len(list(tmp_path.iterdir()))}", site, **files)
+    return refusal(folder)
+
+
+def refusal(folder: Path) -> str:
+    """Why a folder is refused: one line, and nothing is written."""
+    target = folder.parent / "made" / "brook.yaml"
+    with pytest.raises(InputError) as refused:
+        vegglue.import_folder(folder, target)
+    assert len(str(refused.value).splitlines()) == 1
+    assert not target.parent.exists()
+    return str(refused.value)

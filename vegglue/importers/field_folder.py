@@ -53,7 +53,12 @@ from vegglue.importers.terrain import (
     surveyed_ground,
     with_banks,
 )
-from vegglue.importers.vector_files import drawn_centreline, planted_polygons, summary_of_plants
+from vegglue.importers.vector_files import (
+    drawn_centreline,
+    planted_polygons,
+    refuse_crossing,
+    summary_of_plants,
+)
 from vegglue.measurements.plausibility import DEEPEST_CHANNEL, STANDING_WATER
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
@@ -196,8 +201,9 @@ def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -
     """The patches of a site file, and those of the files of polygons that it names, with what was taken from these."""
     found: list[PlantedPatch] = []
     imported: list[Tree] = []
-    for one in given:
+    for number, one in enumerate(given):
         if one.file is None:
+            refuse_crossing(f"{shown_path(site_file(folder))}: `patches[{number}]`", one.polygon or ())
             found.append(one)
             continue
         if not (folder / one.file).is_file():

@@ -333,7 +333,9 @@ def shapes_and_records(path: Path, kind: str, frame: Frame | None) -> Iterator[l
         try:
             with shapefile.Reader(str(path), encoding=encoding) as reader:
                 found = list(reader.shapeRecords())
-        except UnicodeDecodeError:
+        except (UnicodeDecodeError, shapefile.ShapefileException) as error:
+            if "decode" not in str(error):
+                raise
             with shapefile.Reader(str(path), encoding="cp1252", encodingErrors="replace") as reader:
                 found = list(reader.shapeRecords())
         yield [one for one in found if one.shape.shapeTypeName.startswith(kind)]
