@@ -1,0 +1,37 @@
+"""The study of constants: what is still to be run, how a constant is varied, and which verdicts count as others."""
+
+import pytest
+import sensitivity
+
+from vegglue.decision_constants import described
+
+BY_NAME = {one.name: one for one in described()}
+
+
+def record(constant: str, factor: float, kind: str = "identified", effects: tuple[str, ...] = ("wind",)) -> dict:
+    return {"case": "open-b", "constant": constant, "factor": factor, "kind": kind, "set": list(effects), "places": [],
+            "instruments": []}  # fmt: skip
+
+
+def test_what_is_recorded_is_not_run_again() -> None:
+    made = [record(sensitivity.AS_IS, 1.0), record("field_odds", 0.5)]
+    left = list(sensitivity.missing(["open-b", "open-c"], ["field_odds"], made))
+    assert left == [("open-c", sensitivity.AS_IS, 1.0), ("open-c", "field_odds", 0.5), ("open-b", "field_odds", 2.0),
+                    ("open-c", "field_odds", 2.0)]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "half", "twice"),
+    [("field_odds", 50.0, 200.0), ("set_chance", 0.975, 0.9), ("grid_error_correlation", 0.25, 0.99)],
+)
+def test_a_constant_near_one_is_varied_by_its_distance_from_it(name: str, half: float, twice: float) -> None:
+    assert [sensitivity.varied(BY_NAME[name], factor) for factor in (0.5, 2.0)] == pytest.approx([half, twice])
+
+
+def test_a_verdict_is_another_by_kind_or_set() -> None:
+    made = [record(sensitivity.AS_IS, 1.0), record("field_odds", 0.5, effects=("bend",)), record("field_odds", 2.0),
+            record("set_chance", 0.5, "one-of")]  # fmt: skip
+    rows = {line.split("`")[1]: line.split("|")[-3:-1] for line in sensitivity.table(made).splitlines()[2:]}
+    assert set(rows) == set(BY_NAME)
+    assert [cell.strip()[:6] for cell in rows["field_odds"]] == ["1 of 1", "0 of 1"]
+    assert "identified → one-of" in rows["set_chance"][0]
