@@ -39,50 +39,43 @@ def test_a_good_run_gives_its_predictions_in_the_order_of_the_stations(tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("program", "reason"),
+    ("program", "facts"),
     [
-        ("import sys; print('no grid'); sys.exit(3)", "the command ended with exit code 3, and said: no grid"),
-        ("import sys; sys.exit(4)", "the command ended with exit code 4, and said nothing; see command.log"),
-        ("1 / 0", "the command ended with exit code 1, and said: ZeroDivisionError: division by zero"),
-        ("import os; os.kill(os.getpid(), 9)", "the command ended with signal 9, and said nothing; see command.log"),
-        ("pass", "the command ended well and left no predictions.csv"),
+        ("import sys; print('no grid'); sys.exit(3)", ("exit code 3", "no grid")),
+        ("import sys; sys.exit(4)", ("exit code 4", "command.log")),
+        ("1 / 0", ("exit code 1", "ZeroDivisionError")),
+        ("import os; os.kill(os.getpid(), 9)", ("signal 9", "command.log")),
+        ("pass", ("predictions.csv",)),
     ],
 )
-def test_a_run_that_ends_badly_says_why(tmp_path: Path, program: str, reason: str) -> None:
+def test_a_run_that_ends_badly_has_a_reason(tmp_path: Path, program: str, facts: tuple[str, ...]) -> None:
     end = ended(tmp_path, program)
     assert end.prediction is None
-    assert end.reason == reason
+    assert all(fact in end.reason for fact in facts), end.reason
 
 
 @pytest.mark.parametrize(
-    ("text", "reason"),
+    ("content", "facts"),
     [
-        ("", "row 1: expected station,prediction, got ''"),
-        ("station,u\n0,1\n", "row 1: expected station,prediction, got 'station,u'"),
-        ("station,prediction\n0,1\n", "no prediction of station 1"),
-        ("station,prediction\n", "no prediction of station 0 and 1 more"),
-        ("station,prediction\n0,1\n1,nan\n", "row 3: expected a station and a finite number, got '1,nan'"),
-        ("station,prediction\n0,1\n1,inf\n", "row 3: expected a station and a finite number, got '1,inf'"),
-        ("station,prediction\n0,1\n1,-1e300\n", "row 3: expected a prediction of at most 1e+09, got -1e+300"),
-        ("station,prediction\n0,1\n1,wet\n", "row 3: expected a station and a finite number, got '1,wet'"),
-        ("station,prediction\n0,1\n1,\n", "row 3: expected a station and a finite number, got '1,'"),
-        ("station,prediction\n0,1\n1\n", "row 3: expected a station and a finite number, got '1'"),
-        ("station,prediction\n0,1\n1,2,3\n", "row 3: expected a station and a finite number, got '1,2,3'"),
-        ("station,prediction\n0,1\n2,1\n", "row 3: expected a station from 0 to 1, got 2"),
-        ("station,prediction\n0,1\n0,1\n", "row 3: station 0 stands there twice"),
+        (b"", "row 1|station,prediction"),
+        (b"station,u\n0,1\n", "row 1|'station,u'"),
+        (b"station,prediction\n0,1\n", "station 1"),
+        (b"station,prediction\n", "station 0|1 more"),
+        *(
+            (b"station,prediction\n0,1\n" + line + b"\n", f"row 3|{line.decode()!r}")
+            for line in (b"1,nan", b"1,inf", b"1,wet", b"1,", b"1", b"1,2,3")
+        ),
+        (b"station,prediction\n0,1\n1,-1e300\n", "row 3|-1e+300|1e+09"),
+        (b"station,prediction\n0,1\n2,1\n", "row 3|got 2"),
+        (b"station,prediction\n0,1\n0,1\n", "row 3|station 0"),
+        (b"\xff\xfe\x00", "predictions.csv|UTF-8"),
     ],
 )
-def test_bad_predictions_are_told_by_row(tmp_path: Path, text: str, reason: str) -> None:
-    (tmp_path / "predictions.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(BadPredictionsError) as told:
+def test_bad_predictions_are_refused_by_row(tmp_path: Path, content: bytes, facts: str) -> None:
+    (tmp_path / "predictions.csv").write_bytes(content)
+    with pytest.raises(BadPredictionsError) as refused:
         read_predictions(tmp_path / "predictions.csv", 2)
-    assert reason in str(told.value)
-
-
-def test_predictions_that_are_no_text_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "predictions.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(BadPredictionsError, match="not text in UTF-8"):
-        read_predictions(tmp_path / "predictions.csv", 2)
+    assert all(fact in str(refused.value) for fact in facts.split("|")), refused.value
 
 
 def is_alive(process: int) -> bool:
@@ -100,7 +93,7 @@ def test_a_run_that_takes_too_long_is_ended_with_all_it_has_started(tmp_path: Pa
         "open('child', 'w').write(str(child.pid)); time.sleep(60)\n"
     )
     end = ended(tmp_path, program, timeout=1.0)
-    assert end.reason == "the command did not end within 1 s and was stopped"
+    assert "within 1 s" in end.reason
     child = int((tmp_path / "run" / "child").read_text())
     until = time.monotonic() + 5.0
     while is_alive(child) and time.monotonic() < until:
@@ -111,20 +104,21 @@ def test_a_run_that_takes_too_long_is_ended_with_all_it_has_started(tmp_path: Pa
 def test_a_run_that_prints_without_end_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command, "LONGEST_LOG", 10_000_000)
     end = ended(tmp_path, "while True: print('no end', flush=True)")
-    assert end.reason == "the command printed more than 0.01 GB and was stopped"
+    assert "0.01 GB" in end.reason
     assert not (tmp_path / "run" / "command.log").exists()
 
 
-def test_a_run_that_nobody_waits_for_any_more_is_ended(tmp_path: Path) -> None:
+def test_a_run_that_is_stopped_ends(tmp_path: Path) -> None:
     stop = Event()
     Timer(0.3, stop.set).start()
-    assert ended(tmp_path, "import time; time.sleep(60)", stop=stop).reason == "the command was stopped"
+    end = ended(tmp_path, "import time; time.sleep(60)", stop=stop)
+    assert (end.prediction, "stopped" in end.reason, end.seconds < 30.0) == (None, True, True)
 
 
 def test_what_an_earlier_run_has_left_is_taken_away(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "predictions.csv").write_text("station,prediction\n0,1\n1,1\n", encoding="utf-8")
-    assert ended(tmp_path, "pass").reason == "the command ended well and left no predictions.csv"
+    assert ended(tmp_path, "pass").prediction is None
 
 
 def test_one_that_was_left_behind_and_writes_on_is_no_obstacle(tmp_path: Path) -> None:

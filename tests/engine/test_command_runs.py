@@ -1,4 +1,4 @@
-"""Many runs of a command: side by side, kept and not run again, ended with whoever waits for them."""
+"""Many runs of a command: side by side, kept and not run again, ended with their iterator."""
 
 import json
 import time
@@ -49,13 +49,13 @@ def test_what_has_run_is_not_run_again(tmp_path: Path) -> None:
     assert sorted(path.suffix for path in visible(runs)) == [".json"] * 3, "folders of good runs are gone"
 
 
-def test_a_model_that_is_edited_while_it_runs_is_told_and_not_kept(tmp_path: Path) -> None:
+def test_a_model_that_is_edited_while_it_runs_is_refused_and_not_kept(tmp_path: Path) -> None:
     """What ran before is kept as that of the model that it was then."""
     case, runs, _ = counting(tmp_path)
     command_predictions(runs, case, table_of(case), THETAS[:1])
     model = tmp_path / "model.py"
     model.write_text(model.read_text(encoding="utf-8") + "# edited\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"expected `model` \(.*model\.py\) to stay while vegglue runs"):
+    with pytest.raises(InputError, match=r"`model` \(.*model\.py\)"):
         command_predictions(runs, case, table_of(case), THETAS)
     command_predictions(command_runs(case, tmp_path / "runs"), case, table_of(case), THETAS)
     assert sorted(path.suffix for path in visible(runs)).count(".json") == 1 + len(THETAS)
@@ -93,7 +93,7 @@ def test_failures_have_reasons_their_folders_stay_and_they_are_tried_again(tmp_p
     picky = f"import json\nif {PHI} > 3.5: raise SystemExit('dry')\n"
     case, runs, marks = counting(tmp_path, picky)
     found, reasons = command_predictions(runs, case, table_of(case), THETAS)
-    assert reasons == ["", "", "the command ended with exit code 1, and said: dry"]
+    assert (reasons[:2], reasons[2].endswith("dry")) == (["", ""], True)
     assert np.isnan(found[2]).all()
     assert np.isfinite(found[:2]).all()
     (folder,) = [path for path in runs.folder.iterdir() if path.is_dir()]
@@ -129,7 +129,7 @@ def test_so_many_run_at_once_as_jobs_allow(tmp_path: Path) -> None:
     assert most["three"] > 1
 
 
-def test_whoever_leaves_early_ends_what_is_under_way(tmp_path: Path) -> None:
+def test_runs_under_way_end_with_their_iterator(tmp_path: Path) -> None:
     slow = f"import json, time\nif {PHI} > 2.5: time.sleep(60)\n"
     case, runs, marks = counting(tmp_path, slow)
     began = time.monotonic()
@@ -144,12 +144,12 @@ def test_whoever_leaves_early_ends_what_is_under_way(tmp_path: Path) -> None:
 def test_two_at_once_do_not_share_a_folder(tmp_path: Path) -> None:
     case, runs, _ = counting(tmp_path)
     runs.folder.mkdir(parents=True)
-    with hold_lock(runs.folder), pytest.raises(StorageError, match="engine is in use by process"):
+    with hold_lock(runs.folder), pytest.raises(StorageError, match="engine"):
         command_predictions(runs, case, table_of(case), THETAS[:1])
 
 
 @pytest.mark.parametrize("program", ["no_such_code", "./code", "bin/code"])
-def test_a_program_that_is_not_there_is_told_before_anything_runs(
+def test_a_program_that_does_not_exist_is_refused_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: str
 ) -> None:
     """Nor is one found from where the user stands: a run stands elsewhere."""
@@ -161,14 +161,14 @@ def test_a_program_that_is_not_there_is_told_before_anything_runs(
     case = commanded(tmp_path)
     assert case.engine is not None
     missing = case.model_copy(update={"engine": case.engine.model_copy(update={"command": f"{program} run"})})
-    with pytest.raises(InputError, match=f"`engine.command` expected a program that can be run, got '{program}'"):
+    with pytest.raises(InputError, match=f"`engine.command`.*'{program}'"):
         command_runs(missing, tmp_path / "runs")
 
 
 def test_a_cluster_is_refused(tmp_path: Path) -> None:
     case = commanded(tmp_path)
     nowhere = task_backend(lambda work, tasks: iter(()))
-    with nowhere, pytest.raises(InputError, match=r"--cluster: .* on this machine only"):
+    with nowhere, pytest.raises(InputError, match="--cluster"):
         command_runs(case, tmp_path / "runs")
 
 
@@ -192,5 +192,5 @@ def test_a_command_that_is_given_no_parameter_is_refused(tmp_path: Path) -> None
         ("parameters:  ", effect),
     )
     assert own_parameters(case) == ()
-    with pytest.raises(InputError, match=r"`engine` expected a parameter that the command is given, got none"):
+    with pytest.raises(InputError, match="`engine`"):
         command_runs(case, tmp_path / "runs")

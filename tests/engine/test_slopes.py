@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,19 +11,24 @@ from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
-from vegglue.engine.interface import linearise
+from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser, model_of
-from vegglue.engine.newton import predict_near
+from vegglue.engine.newton import SteadyFlow, predict_near
+from vegglue.flow.jacobian import Factors
 from vegglue.measurements.observations import read_observations
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
+CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
+
+
+def twin() -> Model:
+    case = load_case(CONFIG)
+    return model_of(case, read_observations(case))
 
 
 def test_slopes_are_those_of_solved_members() -> None:
-    case = load_case(ROOT / "configs" / "twin.yaml")
-    model = model_of(case, read_observations(case))
+    model = twin()
     z = np.array([0.3, -0.2, 0.5, 0.1])
     point = linearise(model, z)
     assert point is not None
@@ -32,8 +38,7 @@ def test_slopes_are_those_of_solved_members() -> None:
 
 
 def test_a_point_leads_to_one_on_narrower_cells() -> None:
-    case = load_case(ROOT / "configs" / "twin.yaml")
-    model = model_of(case, read_observations(case))
+    model = twin()
     coarse = coarser(model)
     assert coarse is not None
     assert coarse.site.bed.shape == (model.site.bed.shape[0], model.site.bed.shape[1] // 2), "long cells become wider"
@@ -46,24 +51,30 @@ def test_a_point_leads_to_one_on_narrower_cells() -> None:
     assert warm.prediction == pytest.approx(cold.prediction, abs=1e-6)
 
 
-def test_a_flow_borrows_the_factors_of_one_nearby_and_makes_its_own_further_away() -> None:
-    case = load_case(ROOT / "configs" / "twin.yaml")
-    model = model_of(case, read_observations(case))
+def test_a_start_follows_the_slopes_of_the_parameters_that_they_are_of() -> None:
+    slopes, no_factors = np.random.default_rng(1).standard_normal((4, 3, 5, 2)), cast(Factors, None)
+    slopes[:, 1, 0] = 0.0  # nothing flows through the first side
+    flow = SteadyFlow(np.ones((4, 3, 5, 1)), (0, 5), 5, no_factors, slopes, 0.0)
+    assert flow.after(np.array([0.1, -0.2])) == pytest.approx(1.0 + slopes @ np.array([[0.1], [-0.2]]))
+    assert flow.after(np.array([0.1])) == pytest.approx(1.0 + 0.1 * slopes[..., :1])
+
+
+def test_a_flow_reuses_the_factors_of_one_nearby_and_makes_its_own_further_away() -> None:
+    model = twin()
     first = linearise(model, np.zeros(4))
     assert first is not None
-    for far, borrowed in ((0.003, True), (0.2, False)):
+    for far, reused in ((0.003, True), (0.2, False)):
         z = np.full(4, far)
         near, alone = linearise(model, z, first), linearise(model, z)
         assert near is not None
         assert alone is not None
         assert near.prediction == pytest.approx(alone.prediction, abs=1e-6)
         assert near.slope == pytest.approx(alone.slope, abs=1e-5)
-        assert all((near.flows[name].factors is flow.factors) == borrowed for name, flow in first.flows.items())
+        assert all((near.flows[name].factors is flow.factors) == reused for name, flow in first.flows.items())
 
 
 def test_factors_are_renewed_after_many_small_moves() -> None:
-    case = load_case(ROOT / "configs" / "twin.yaml")
-    model = model_of(case, read_observations(case))
+    model = twin()
     point = first = linearise(model, np.zeros(4))
     for k in range(1, 40):
         assert point is not None
@@ -74,8 +85,7 @@ def test_factors_are_renewed_after_many_small_moves() -> None:
 
 
 def test_a_fit_finds_the_place_the_measurements_were_made_at() -> None:
-    case = load_case(ROOT / "configs" / "twin.yaml")
-    model = model_of(case, read_observations(case))
+    model = twin()
     truth = linearise(model, np.array([0.4, -0.3, 0.2, -0.5]))
     assert truth is not None
     exact = model.station.assign(value=truth.prediction)
@@ -86,4 +96,4 @@ def test_a_fit_finds_the_place_the_measurements_were_made_at() -> None:
     # The prior pulls towards zero, by less than its share of what is known.
     assert np.abs(fitted.point.z - truth.z).max() < 3.0 * np.sqrt(np.diag(fitted.covariance)).max()
     assert fitted.chi2 < 1.0
-    assert theta_at(case, fitted.point.z)["n_b"] == pytest.approx(theta_at(case, truth.z)["n_b"], rel=0.02)
+    assert theta_at(model.case, fitted.point.z)["n_b"] == pytest.approx(theta_at(model.case, truth.z)["n_b"], rel=0.02)

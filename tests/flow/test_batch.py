@@ -1,4 +1,4 @@
-"""Members solved together: how they are cut into chunks, that company changes none, and how a failure is told."""
+"""Members solved together: how they are cut into chunks, that others change none, and what a failure leaves."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -161,7 +161,7 @@ def test_a_member_solved_from_far_away_is_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_member_without_steady_state_is_told_and_leaves_the_others_alone(tmp_path: Path) -> None:
+def test_a_member_without_steady_state_fails_and_leaves_the_others_alone(tmp_path: Path) -> None:
     case, site, observations = reach_at(tmp_path, *OUTLET)
     column = list(case.parameters).index("outlet")
     points = points_of(case, 6)
@@ -171,14 +171,14 @@ def test_a_member_without_steady_state_is_told_and_leaves_the_others_alone(tmp_p
     failed = np.arange(6) == 2
     np.testing.assert_array_equal(rows["status"] == FAILED, failed)
     np.testing.assert_array_equal(np.isnan(rows["prediction"]).all(axis=1), failed)
-    assert rows["reason"][2].startswith("June: no steady state: ")
+    assert rows["reason"][2].startswith("June")
     assert (rows["reason"][~failed] == "").all()
     assert rows["mass_error"][~failed].max() < 1e-5
     without = solve_chunk(case, site, observations, sample_at(case, points[~failed]))
     np.testing.assert_allclose(rows["prediction"][~failed], without["prediction"], atol=1e-5, rtol=0)
 
 
-def test_a_case_says_how_long_to_march(tmp_path: Path) -> None:
+def test_a_case_states_how_long_to_march(tmp_path: Path) -> None:
     """Step and span reach the march, and a case that sets neither keeps its hash."""
     case, site, observations = reach_at(tmp_path, *OUTLET)
     assert not {"march_step", "march_span"} & case.numerics.model_dump(exclude_none=True).keys()
@@ -188,7 +188,7 @@ def test_a_case_says_how_long_to_march(tmp_path: Path) -> None:
     points[:, list(case.parameters).index("outlet")] = EMPTIED
     rows = solve_chunk(case, site, observations, sample_at(case, points))
     assert rows["status"][0] == FAILED
-    assert rows["reason"][0].endswith(("after 0.08 s", "of marching"))
+    assert "0.08 s" in rows["reason"][0]
 
 
 @pytest.mark.slow
@@ -202,7 +202,7 @@ def test_a_failed_member_stays_in_the_ensemble_and_weighs_nothing(tmp_path: Path
     failed = ensemble.status == FAILED
     assert 0 < failed.sum() < 8
     assert heard[-1].failed == failed.sum()
-    assert all(reason.startswith("June: no steady state: ") for reason in ensemble.reason[failed])
+    assert all(reason.startswith("June") for reason in ensemble.reason[failed])
     np.testing.assert_array_equal(ensemble.parameters["outlet"], sample_prior(case.parameters, 8, 7)["outlet"])
     posterior = glue(ensemble, case, observations)
     assert posterior.sample.failed == failed.sum()
@@ -211,7 +211,7 @@ def test_a_failed_member_stays_in_the_ensemble_and_weighs_nothing(tmp_path: Path
     np.testing.assert_array_equal(parameters_at(case, points_of(case, 8))["outlet"], ensemble.parameters["outlet"])
 
 
-def test_nobody_solved_is_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_solved_member_is_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor the central member of the next cluster, which comes with this one, when stragglers become references."""
     done: set[int] = set()
 
@@ -257,7 +257,7 @@ def test_a_singular_jacobian_fails_its_own_member_only(tmp_path: Path) -> None:
     sample = sample_at(case, np.array([[0.5, EMPTIED, 0.5], [0.5, FILLED, 0.5]]))
     rows = solve_chunk(case, site, observations, sample)
     assert rows["status"].tolist() == [FAILED, SOLVED_BY_NEWTON]
-    assert "no steady state" in rows["reason"][0]
+    assert rows["reason"][0]
     assert np.isnan(rows["prediction"][0]).all()
     assert np.isfinite(rows["prediction"][1]).all()
 
@@ -268,7 +268,7 @@ def test_a_matrix_without_an_inverse_leads_nowhere() -> None:
     assert np.isnan(columns).all()
 
 
-def test_a_lane_without_numbers_is_mixed_by_itself() -> None:
+def test_a_slot_without_finite_numbers_is_mixed_on_its_own() -> None:
     gram, right = np.ones((1, 1, 3)), np.array([[1.0, np.nan, 1.0]])
     gram[..., 2] = np.inf
     assert minimise(gram, right).tolist() == [[pytest.approx(1.0), 0.0, 0.0]]

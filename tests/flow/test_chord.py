@@ -1,4 +1,6 @@
-"""Members that pass through a few lanes: who ends how, and that company does not matter."""
+"""Members that pass through batch slots: how each ends, and that others do not change it."""
+
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -11,61 +13,68 @@ from vegglue.flow.problem import Problem, take
 
 
 def neighbours(seed: int, members: int) -> tuple[Problem, np.ndarray, Factors]:
-    """Members at random places, the state of the first, and its factors."""
+    """Members at random places, their starts at the state of the first, and its factors."""
     batch = family(np.random.default_rng(seed).random((members, 2)))
     first = take(batch, np.array([0]))
     centre = solved(first)
-    return batch, centre, factors(first, centre)
+    return batch, np.repeat(centre, members, axis=3), factors(first, centre)
 
 
-def test_members_pass_through_few_lanes_as_they_would_all_at_once():
-    batch, centre, shared = neighbours(8, 11)
-    together = chord(batch, np.repeat(centre, 11, axis=3), shared, 1e-9)
-    found: dict[int, tuple[bool, np.ndarray]] = {}
-    entered: list[int] = []
+@dataclass
+class Streamed:
+    """How members passed through: entered, how many at a time and after how many had ended; how each ended."""
 
-    def starts_of(members: np.ndarray) -> np.ndarray:
-        entered.append(members.size)
-        return np.repeat(centre, members.size, axis=3)
+    entered: list[tuple[int, int]] = field(default_factory=list)
+    ends: dict[int, tuple[bool, int, float]] = field(default_factory=dict)
+    states: dict[int, np.ndarray] = field(default_factory=dict)
+
+
+def streamed(
+    given: tuple[Problem, np.ndarray, Factors], width: int, limits: IterationLimits, tolerance: float = 1e-9
+) -> Streamed:
+    """All members through so many slots, the last first."""
+    batch, start, shared = given
+    found = Streamed()
+
+    def starts_of(some: np.ndarray) -> np.ndarray:
+        found.entered.append((some.size, len(found.ends)))
+        return start[..., some]
 
     def note(members: np.ndarray, ended: ChordSolution) -> None:
-        for lane, member in enumerate(members):
-            assert member not in found
-            found[int(member)] = bool(ended.converged[lane]), ended.state[..., lane]
+        assert not found.ends.keys() & set(members.tolist())
+        for slot, member in enumerate(members.tolist()):
+            how = bool(ended.converged[slot]), int(ended.iterations[slot]), float(ended.correction[slot])
+            found.ends[member], found.states[member] = how, ended.state[..., slot]
 
-    stream(batch, np.arange(11)[::-1], starts_of, shared, 1e-9, IterationLimits(25), 4, note)
-    assert sorted(found) == list(range(11))
-    assert sum(entered) == 11
-    assert max(entered) <= 4
+    stream(batch, np.arange(batch.members)[::-1], starts_of, shared, tolerance, limits, width, note)
+    assert sorted(found.ends) == list(range(batch.members))
+    return found
+
+
+@pytest.mark.parametrize("width", [1, 4])
+def test_members_pass_through_few_slots_as_they_would_all_at_once(width: int) -> None:
+    given = neighbours(8, 11)
+    together = chord(*given, 1e-9)
+    found = streamed(given, width, IterationLimits(40))
+    assert sum(some for some, _ in found.entered) == 11
+    assert max(some for some, _ in found.entered) <= width
     assert together.converged.all()
-    for member, (converged, state) in found.items():
+    for member, (converged, _, _) in found.ends.items():
         assert converged
-        assert np.abs(state - together.state[..., member]).max() < 1e-7
+        assert np.abs(found.states[member] - together.state[..., member]).max() < 1e-7
 
 
-def test_a_member_that_strays_ends_and_spoils_no_other():
-    batch, centre, shared = neighbours(9, 4)
-    start = np.repeat(centre, 4, axis=3)
-    start[..., 2] = np.nan
-    end = chord(batch, start, shared, 1e-8)
-    assert end.converged.tolist() == [True, True, False, True]
-    assert np.isfinite(end.state[..., [0, 1, 3]]).all()
+@pytest.mark.parametrize(("astray", "width"), [([2], 4), ([4, 5], 3)])
+def test_a_member_that_strays_ends_and_spoils_no_other(astray: list[int], width: int) -> None:
+    """Nor one that enters its slot."""
+    batch, start, shared = neighbours(10, 6)
+    start[..., astray] = np.nan
+    found = streamed((batch, start, shared), width, IterationLimits(25), 1e-8)
+    assert [member for member, (there, _, _) in sorted(found.ends.items()) if not there] == astray
+    assert all(np.isfinite(state).all() for member, state in found.states.items() if member not in astray)
 
 
-def test_who_enters_the_lane_of_one_that_strayed_is_not_spoilt():
-    batch, centre, shared = neighbours(10, 6)
-    start = np.repeat(centre, 6, axis=3)
-    start[..., :2] = np.nan
-    found: dict[int, bool] = {}
-
-    def note(members: np.ndarray, ended: ChordSolution) -> None:
-        found.update(zip(members.tolist(), ended.converged.tolist(), strict=True))
-
-    stream(batch, np.arange(6), lambda some: start[..., some], shared, 1e-8, IterationLimits(25), 3, note)
-    assert found == {0: False, 1: False, 2: True, 3: True, 4: True, 5: True}
-
-
-def test_one_that_strayed_is_not_taken_up_again():
+def test_one_that_strayed_is_not_taken_up_again() -> None:
     """Its state may be anything: no factors are made there, and its correction says so."""
     problem = river()
     near = solved(problem)
@@ -78,111 +87,48 @@ def test_one_that_strayed_is_not_taken_up_again():
     assert kept is None
 
 
-def test_who_ends_a_step_early_is_as_near_as_asked_for():
+def test_a_member_that_ends_a_step_early_is_within_the_tolerance() -> None:
     """Some end with a correction above the tolerance, and are within it after the step all the same."""
-    batch, centre, shared = neighbours(13, 16)
-    exact = chord(batch, np.repeat(centre, 16, axis=3), shared, 1e-11)
-    early = chord(batch, np.repeat(centre, 16, axis=3), shared, 1e-5)
+    given = neighbours(13, 16)
+    exact, early = chord(*given, 1e-11), chord(*given, 1e-5)
     assert early.converged.all()
     assert (early.correction > 1e-5).any()
     assert np.abs(early.state - exact.state)[:-1].max() < 1e-5
 
 
-def test_one_lane_serves_all():
-    batch, centre, shared = neighbours(11, 3)
-    ends: list[int] = []
-    stream(
-        batch,
-        np.arange(3),
-        lambda some: np.repeat(centre, len(some), axis=3),
-        shared,
-        1e-8,
-        IterationLimits(40),
-        1,
-        lambda members, end: ends.extend(members[end.converged]),
-    )
-    assert ends == [0, 1, 2]
+def test_a_single_member_enters_while_others_are_at_work() -> None:
+    """Two of four slots are free at once, and one member waits: it does not wait for all."""
+    given = neighbours(12, 5)
+    assert len(set(chord(*given, 1e-9).iterations)) > 1, "else all end at once"
+    _, (entering, ended) = streamed(given, 4, IterationLimits(60)).entered
+    assert entering == 1
+    assert ended < 4
 
 
-def test_who_waits_alone_enters_while_others_are_at_work():
-    """Two of four lanes are free at once, and a single member waits: it does not wait for all."""
-    batch, centre, shared = neighbours(12, 5)
-    together = chord(batch, np.repeat(centre, 5, axis=3), shared, 1e-9)
-    asked: list[tuple[int, int]] = []
-    done: list[int] = []
-
-    def starts_of(some: np.ndarray) -> np.ndarray:
-        asked.append((len(some), len(done)))
-        return np.repeat(centre, len(some), axis=3)
-
-    stream(
-        batch, np.arange(5), starts_of, shared, 1e-9, IterationLimits(60), 4, lambda members, end: done.extend(members)
-    )
-    assert len(set(together.iterations)) > 1, "else all end at once"
-    assert asked[1][0] == 1
-    assert asked[1][1] < 4
-
-
-def test_who_falls_behind_is_not_waited_for():
-    """It ends where it is, before the most steps, and other members get there as without it."""
-    batch, centre, shared = neighbours(8, 11)
-    ends: dict[float, dict[int, tuple[bool, int, float]]] = {}
-    for pace in (1.0, 0.12):
-        found = ends.setdefault(pace, {})
-
-        def note(members: np.ndarray, ended: ChordSolution, found: dict[int, tuple[bool, int, float]] = found) -> None:
-            told = zip(ended.converged.tolist(), ended.iterations.tolist(), ended.correction.tolist(), strict=True)
-            found.update(zip(members.tolist(), told, strict=True))
-
-        start = np.repeat(centre, 11, axis=3)
-        stream(
-            batch,
-            np.arange(11),
-            lambda some, start=start: start[..., some],
-            shared,
-            1e-9,
-            IterationLimits(60, pace),
-            4,
-            note,
-        )
-    behind = [member for member, (there, _, _) in ends[0.12].items() if not there]
-    assert all(there for there, _, _ in ends[1.0].values())
+def test_a_member_that_falls_behind_ends_early() -> None:
+    """It ends where it is, before the most steps, and other members converge as without it."""
+    given = neighbours(8, 11)
+    patient, strict = (streamed(given, 4, IterationLimits(60, pace)).ends for pace in (1.0, 0.12))
+    behind = [member for member, (there, _, _) in strict.items() if not there]
+    assert all(there for there, _, _ in patient.values())
     assert 0 < len(behind) < 11
     for member in behind:
-        _, steps, correction = ends[0.12][member]
-        assert steps < ends[1.0][member][1]
+        _, steps, correction = strict[member]
+        assert steps < patient[member][1]
         assert np.isfinite(correction)
-        assert correction >= 4.0 * LONGEST_CORRECTION * 0.12 ** ends[1.0][member][1]
+        assert correction >= 4.0 * LONGEST_CORRECTION * 0.12 ** patient[member][1]
 
 
-def test_the_last_ones_wait_with_others_for_another_reference():
-    """Half as many as `few` did not get there: the others at work end where they are; without them they go on."""
-    batch, centre, shared = neighbours(8, 11)
-    start = np.repeat(centre, 11, axis=3)
-    for astray, given_up in ((2, True), (1, False)):
-        begin = start.copy()
-        begin[..., :astray] = np.nan
-        ends: dict[int, tuple[bool, int]] = {}
-
-        def note(members: np.ndarray, ended: ChordSolution, ends: dict[int, tuple[bool, int]] = ends) -> None:
-            assert np.isfinite(ended.state).all()
-            told = zip(ended.converged.tolist(), ended.iterations.tolist(), strict=True)
-            ends.update(zip(members.tolist(), told, strict=True))
-
-        stream(
-            batch,
-            np.arange(11),
-            lambda some, begin=begin: begin[..., some],
-            shared,
-            1e-9,
-            IterationLimits(60, few=4),
-            11,
-            note,
-        )
-        assert sorted(ends) == list(range(11))
-        left = [member for member, (there, _) in ends.items() if not there and member >= astray]
-        assert (0 < len(left) <= 4) == given_up
-        assert all(ends[member][1] == max(steps for _, steps in ends.values()) for member in left)
+@pytest.mark.parametrize(("astray", "given_up"), [(2, True), (1, False)])
+def test_the_last_ones_end_with_others_that_need_another_reference(astray: int, given_up: bool) -> None:
+    """Half as many as `few` did not converge: the others at work end where they are; without them they go on."""
+    batch, start, shared = neighbours(8, 11)
+    start[..., :astray] = np.nan
+    found = streamed((batch, start, shared), 11, IterationLimits(60, few=4))
+    assert all(np.isfinite(state).all() for state in found.states.values())
+    left = [member for member, (there, _, _) in found.ends.items() if not there and member >= astray]
+    assert (0 < len(left) <= 4) == given_up
+    assert all(found.ends[member][1] == max(steps for _, steps, _ in found.ends.values()) for member in left)
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,7 @@ def test_at_rest_a_speed_answers_to_nothing(flowing) -> None:
 
 def test_an_unknown_kind_is_refused_and_not_read_as_a_level(flowing) -> None:
     for reading in (read_sensors, reading_weights):
-        with pytest.raises(InputError, match=r"expected a kind among .*, got 'temperature'"):
+        with pytest.raises(InputError, match="temperature"):
             reading(*flowing, stations("temperature"), *([()] if reading is read_sensors else []))
 
 

@@ -3,7 +3,7 @@ every array is the member.
 
 Logarithm and cube root are written in plain arithmetic, which the compiler spreads over SIMD lanes as it cannot a
 library's: six times as fast (1 and 2 ns instead of 6 and 13), within four units in the last place
-(tests/effects/test_elementary.py), for positive normal numbers only.
+(tests/effects/test_resistance_laws.py), for positive normal numbers only.
 """
 
 import math

@@ -13,7 +13,6 @@ checked against it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -87,40 +86,32 @@ def corrected(correction: Correction, runs: CommandRuns, watch: Watch) -> Engine
     watch
         Called with the progress of these.
     """
-    return replace(
-        NEWTON,
-        name="command",
-        linearise=partial(_linearised, correction),
-        predict=partial(_predicted, runs, watch),
-        responses=partial(_responses, correction),
-    )
 
+    def linearise_corrected(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
+        value, slope = correction.at(model, z)
+        point = NEWTON.linearise(model, z, near, lambda prediction: wanted(prediction + value))
+        if point is None:
+            return None
+        return replace(point, prediction=point.prediction + value, slope=point.slope + slope)
 
-def _linearised(correction: Correction, model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
-    value, slope = correction.at(model, z)
-    point = NEWTON.linearise(model, z, near, lambda prediction: wanted(prediction + value))
-    if point is None:
-        return None
-    return replace(point, prediction=point.prediction + value, slope=point.slope + slope)
+    def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
+        """Runs of the command, and what the effects of the case change in the built-in engine."""
+        bare = without_effects(model)
+        z_own = _own(model, z, bare.names)
+        found, _ = _run(runs, model, bare, z_own, watch)
+        if not model.case.effects:
+            return found
+        near = [linearise(bare, _own(model, point.z[None], bare.names)[0]) for point in points]
+        known = [point for point in near if point is not None]
+        if not known:
+            return np.full_like(found, np.nan)
+        return found + NEWTON.predict(model, points, z) - NEWTON.predict(bare, known, z_own)
 
+    def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
+        value, _ = correction.at(model, point.z)
+        return NEWTON.responses(model, replace(point, prediction=point.prediction - value), causes)
 
-def _predicted(runs: CommandRuns, watch: Watch, model: Model, points: Sequence[Point], z: Array) -> Array:
-    """Runs of the command, and what the effects of the case change in the built-in engine."""
-    bare = without_effects(model)
-    z_own = _own(model, z, bare.names)
-    found, _ = _run(runs, model, bare, z_own, watch)
-    if not model.case.effects:
-        return found
-    near = [linearise(bare, _own(model, point.z[None], bare.names)[0]) for point in points]
-    known = [point for point in near if point is not None]
-    if not known:
-        return np.full_like(found, np.nan)
-    return found + NEWTON.predict(model, points, z) - NEWTON.predict(bare, known, z_own)
-
-
-def _responses(correction: Correction, model: Model, point: Point, causes: Sequence[Cause]) -> Array:
-    value, _ = correction.at(model, point.z)
-    return NEWTON.responses(model, replace(point, prediction=point.prediction - value), causes)
+    return replace(NEWTON, name="command", linearise=linearise_corrected, predict=predict, responses=responses)
 
 
 def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slopes: bool = True) -> Correction:

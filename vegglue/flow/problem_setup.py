@@ -112,7 +112,14 @@ def _under_effects(case: Case, site: Site, experiment: str, theta: Theta) -> dic
     if geometry is not None:
         bed_rise, entering = _site_changes(effects, geometry, values.lateral)
         if entering.size:
-            entering = _into_water(entering, share_under_water(case, site, setting), geometry.stretch)
+            # What would enter over land enters the water beside it: each member's sum stays. What enters and what
+            # leaves may cancel.
+            under_water, stretch, parts = share_under_water(case, site, setting)[..., None], geometry.stretch, []
+            for part in (np.maximum(entering, 0.0), np.minimum(entering, 0.0)):
+                wet = part * under_water
+                left = (wet * stretch).sum(axis=(0, 1))
+                parts.append(wet * ((part * stretch).sum(axis=(0, 1)) / np.where(left == 0.0, 1.0, left)))
+            entering = np.ascontiguousarray(sum(parts))
     inflows = tuple(
         InflowSegment(
             side=inflow.side,
@@ -170,18 +177,6 @@ def share_under_water(case: Case, site: Site, setting: Experiment) -> Array:
     WHERE_WATER_ENTERS, 0 on land, over which it would have no steady way down.
     """
     return np.clip(expected_depth(case, site, setting) / WHERE_WATER_ENTERS, 0.0, 1.0)
-
-
-def _into_water(entering: Array, under_water: Array, stretch: Array) -> Array:
-    """What would enter over land enters the water beside it, (nx, ny, m) [m/s]: each member's sum stays."""
-
-    def moved(part: Array) -> Array:
-        wet = part * under_water[..., None]
-        left = (wet * stretch).sum(axis=(0, 1))
-        return np.asarray(wet * ((part * stretch).sum(axis=(0, 1)) / np.where(left == 0.0, 1.0, left)))
-
-    # What enters and what leaves may cancel.
-    return np.ascontiguousarray(sum(moved(part) for part in (np.maximum(entering, 0.0), np.minimum(entering, 0.0))))
 
 
 def bend_of(grid: Grid) -> Bend | None:

@@ -223,8 +223,7 @@ def correction(step, state, thin, bed, rise, half_range, film, thick):
 def eased(problem: Problem, state: Array, slope: Array, at_outlet: NDArray[np.bool_]) -> Array:
     """R(state), (nx, 3, ny, m), its rows of momentum of thin water written as slope (u - u*); zero when R is.
 
-    slope (nx, 3, ny, 1): `slope_of_friction` of the reference member; at_outlet (ny,): rows whose outlet face, too, is
-    written so.
+    slope (nx, 3, ny, 1): `slope_of_friction` of the reference member; at_outlet (ny,): rows eased at the outlet, too.
     """
     depth = cell_depths(problem, state)
     closed, sides = closures(problem, state, depth), side_fluxes(problem, depth)

@@ -1,4 +1,4 @@
-"""Rough walls of a case: where they stand, that members, tangents and both engines know them."""
+"""Cases with rough walls and in a bend: where walls stand, that members, tangents and both engines know either."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,11 +17,15 @@ from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.problem_setup import build_problem
 
+N_B = {"n_b": {"distribution": "loguniform", "low": 0.01, "high": 0.03, "unit": "s m^(-1/3)"}}
+N_W = {"n_w": {"distribution": "loguniform", "low": 0.005, "high": 0.03, "unit": "s m^(-1/3)"}}
+BED = {"classes": {"bed": {"law": "manning", "n": "n_b"}}, "default": "bed"}
 TREE = {
     "source": Path("flume"),
     "name": "flume",
     "grid": {"x": (0.0, 6.0), "y": (0.0, 0.9), "cell": (0.25, 0.075)},
     "bed": [{"trapezoid": {"axis": 0.45, "bottom_width": 2.0, "bank_slope": 1.0, "bed_slope": 0.002, "level": 0.0}}],
+    "friction": BED,
     "inflows": {
         "main": {"side": "west"},
         "side": {"side": "south", "range": (2.0, 2.5), "spread": "uniform"},
@@ -29,28 +33,36 @@ TREE = {
     "experiments": {"one": {"discharge": {"main": 0.04, "side": 0.004}, "level": 0.1}},
     "eddy_viscosity": 0.002,
     "numerics": {"film_depth": 0.002},
+    "parameters": N_B,
 }
-PRIORS = {
-    "n_b": {"distribution": "loguniform", "low": 0.01, "high": 0.03, "unit": "s m^(-1/3)"},
-    "n_w": {"distribution": "loguniform", "low": 0.005, "high": 0.03, "unit": "s m^(-1/3)"},
-}
-BED = {"classes": {"bed": {"law": "manning", "n": "n_b"}}, "default": "bed"}
+ROUGH = TREE | {"friction": BED | {"walls": {"law": "manning", "n": "n_w"}}, "parameters": N_B | N_W}
 ROUND = {"parts": [{"length": 2.0}, {"radius": 2.0, "angle": 90.0}]}
+LINE = {"parts": [{"length": 1.5}, {"radius": 2.0, "angle": 90.0}, {"length": 1.5}]}
+# With helical flow, plants and water from the side.
+BENT = TREE | {
+    "name": "bend",
+    "grid": {"x": (0.0, 6.0), "y": (-0.45, 0.45), "cell": (0.25, 0.075), "centreline": LINE},
+    "bed": [{"trapezoid": {"axis": 0.0, "bottom_width": 2.0, "bank_slope": 1.0, "bed_slope": 0.002, "level": 0.0}}],
+    "plants": {
+        "stands": {"reed": {"phi": 0.3, "canopy_height": 0.08}},
+        "patches": [{"name": "p", "stand": "reed", "x": (2.5, 3.5), "y": (0.1, 0.3)}],
+    },
+    "effects": {"helical_flow": {"values": {"share": "s"}}},
+    "parameters": N_B | {"s": {"distribution": "uniform", "low": 0.2, "high": 1.2, "unit": "-"}},
+}
 Z = np.array([0.1, 0.2])
 
 
 def flume(rough: bool = True) -> Case:
-    friction = BED | ({"walls": {"law": "manning", "n": "n_w"}} if rough else {})
-    priors = PRIORS if rough else {"n_b": PRIORS["n_b"]}
-    return Case.model_validate(TREE | {"friction": friction, "parameters": priors})
+    return Case.model_validate(ROUGH if rough else TREE)
 
 
-def stations() -> pd.DataFrame:
+def stations(x: tuple[float, ...] = (1.3, 3.0, 4.9), y: tuple[float, ...] = (0.05, 0.3, 0.8)) -> pd.DataFrame:
     rows = [
-        {"experiment": "one", "kind": kind, "section": f"{kind} {x:g}", "x": x, "y": y}
+        {"experiment": "one", "kind": kind, "section": f"{kind} {at:g}", "x": at, "y": across}
         for kind in ("velocity", "velocity_across", "level")
-        for x in (1.3, 3.0, 4.9)
-        for y in (0.05, 0.3, 0.8)
+        for at in x
+        for across in y
     ]
     given = {"value": 0.0, "standard_error": 0.01, "used": True, "reason": "", "depth": np.nan, "device": ""}
     return pd.DataFrame(rows).assign(**given)
@@ -59,6 +71,47 @@ def stations() -> pd.DataFrame:
 @pytest.fixture(scope="module")
 def model() -> Model:
     return Model(flume(), build_site(flume()), stations(), NEWTON)
+
+
+@pytest.fixture(scope="module")
+def bend() -> Model:
+    case = Case.model_validate(BENT)
+    return Model(case, build_site(case), stations((1.7, 3.1, 4.6), (-0.35, 0.0, 0.35)), NEWTON)
+
+
+@pytest.fixture(params=["model", "bend"])
+def either(request: pytest.FixtureRequest) -> Model:
+    found: Model = request.getfixturevalue(request.param)
+    return found
+
+
+def test_slopes_are_those_of_members_solved_by_chord_steps(either: Model) -> None:
+    point = linearise(either, Z)
+    assert point is not None
+    step = 0.05 * np.eye(2)
+    found = predict(either, [point], np.concatenate([Z + step, Z - step]))
+    slope = (found[:2] - found[2:]).T / 0.1
+    for parameter in range(2):
+        largest = np.abs(slope[:, parameter]).max()
+        assert largest > 1e-3
+        assert point.slope[:, parameter] == pytest.approx(slope[:, parameter], abs=0.01 * largest)
+
+
+@pytest.mark.slow
+def test_both_engines_agree(either: Model) -> None:
+    exact, marched = linearise(either, Z), linearise(replace(either, engine=marching()), Z)
+    assert exact is not None
+    assert marched is not None
+    assert marched.prediction == pytest.approx(exact.prediction, abs=1e-5)
+    assert marched.slope == pytest.approx(exact.slope, abs=5e-3 * np.abs(exact.slope).max())
+
+
+def test_water_stands_higher_outside(bend: Model) -> None:
+    """Of the order of B u^2 / (g R): 0.7 m times 0.45^2 m2/s2 over 9.81 m/s2 times 2 m, some 7 mm, in a short bend."""
+    point = linearise(bend, Z)
+    assert point is not None
+    south, _, north = point.prediction.reshape(3, 3, 3)[2, 1]
+    assert 0.003 < south - north < 0.012
 
 
 def test_walls_stand_where_no_water_enters() -> None:
@@ -96,16 +149,6 @@ def test_walls_hold_the_water_beside_them_and_raise_it(model: Model) -> None:
     assert (change[2, 0] > 1e-4).all()
 
 
-def test_slopes_are_those_of_members_solved_by_chord_steps(model: Model) -> None:
-    point = linearise(model, Z)
-    assert point is not None
-    step = 0.05 * np.eye(2)
-    found = predict(model, [point], np.concatenate([Z + step, Z - step]))
-    slope = (found[:2] - found[2:]).T / 0.1
-    assert np.abs(point.slope[:, 1]).max() > 0.01
-    assert point.slope == pytest.approx(slope, abs=0.01 * np.abs(slope[:, 1]).max())
-
-
 def test_members_far_away_are_those_newton_finds(model: Model) -> None:
     point = linearise(model, Z)
     assert point is not None
@@ -117,19 +160,10 @@ def test_members_far_away_are_those_newton_finds(model: Model) -> None:
         assert prediction == pytest.approx(alone.prediction, abs=1e-5)
 
 
-@pytest.mark.slow
-def test_both_engines_know_walls(model: Model) -> None:
-    exact, marched = linearise(model, Z), linearise(replace(model, engine=marching()), Z)
-    assert exact is not None
-    assert marched is not None
-    assert marched.prediction == pytest.approx(exact.prediction, abs=1e-5)
-    assert marched.slope == pytest.approx(exact.slope, abs=5e-3 * np.abs(exact.slope).max())
-
-
 def test_answers_to_cells_of_a_flume_add_up_to_the_slope() -> None:
     """Where the rows beside the sides are wet an inflow shared out by depth couples them all: 3 % were lost."""
     case = Case.model_validate(TREE | {
-        "friction": BED, "parameters": {"n_b": PRIORS["n_b"]}, "inflows": {"main": {"side": "west"}},
+        "inflows": {"main": {"side": "west"}},
         "experiments": {"one": {"discharge": {"main": 0.04}, "level": 0.1}},
     })  # fmt: skip
     seen = stations()
