@@ -16,13 +16,7 @@ from vegglue.effects.grammar import Law, signed
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 from vegglue.wording.numbers import in_short
-
-MOST_ALIKE = 4  # told by name
-
-
-def chance_told(chance: float) -> str:
-    """A chance as it is told: never 100 %."""
-    return "over 99 %" if chance > 0.99 else f"{100 * chance:.0f} %"
+from vegglue.wording.sentences import phrase, sentence
 
 
 @dataclass(frozen=True)
@@ -72,24 +66,13 @@ class LawFound:
     @property
     def range_seen(self) -> str:
         """From where to where the data have seen its quantity."""
-        low, high = self.seen
-        return f"{self.law.quantity.symbol} from {low:.2g} to {high:.2g}{self.unit}"
+        return phrase("range_of_law", self)
 
     @property
     def lines(self) -> list[str]:
         """The law in words, as an equation, and how far to trust it."""
-        low, high = self.interval95
-        same = f" It is the listed effect {self.same_as}." if self.same_as else ""
-        letter, where = (
-            ("a", "there it") if self.law.times is None else ("c", "there the term, where the first g is 1,")
-        )
-        told = [
-            f"{self.law.title} (chance {chance_told(self.chance)}).{same}",
-            f"{self.equation}, {letter} = {self.strength:.2f} (95 %: {low:.2f} to {high:.2f})",
-            f"seen for {self.range_seen}: {where} changes by a factor of {self.factor:.2g}; elsewhere it is a guess",
-        ]
-        more = f" and {len(self.alike) - MOST_ALIKE} more" if len(self.alike) > MOST_ALIKE else ""
-        return [*told, f"the same trace: {', '.join(self.alike[:MOST_ALIKE])}{more}"] if self.alike else told
+        parts = (phrase(f"{part}_of_law", self) for part in ("title", "strength", "reach", "rivals"))
+        return [line for line in parts if line]
 
 
 @dataclass(frozen=True)
@@ -105,8 +88,8 @@ class ProductFound:
     @property
     def lines(self) -> list[str]:
         """As those of a law."""
-        first, equation, *further = self.found.lines
-        return [first, f"{equation}, beside a = {self.strength_of_law:.2f}", *further]
+        first, _, *further = self.found.lines
+        return [first, phrase("strength_of_product", self), *further]
 
 
 @dataclass(frozen=True)
@@ -135,23 +118,19 @@ class Discovery:
         return self.laws[0]
 
     @property
+    def enough_for_errors(self) -> bool:
+        """Whether errors alone leave as much as rarely as an alarm asks."""
+        return self.p <= constants().false_alarm_rate
+
+    @property
+    def likeliest_other(self) -> tuple[str, float] | None:
+        """The likeliest other cause with its chance, if there is one."""
+        return max(self.others.items(), key=lambda pair: pair[1], default=None)
+
+    @property
     def sentence(self) -> str:
         """What was found, in one sentence."""
-        best = self.best
-        if best is not None and best.same_as:
-            return f"The law that explains most is the listed effect {best.same_as}; add it by that name."
-        if best is not None:
-            more = "" if self.product is None else f" {self.product.found.law.title}."
-            return f"{best.law.title}: a law explains the misfit, with a chance of {chance_told(best.chance)}.{more}"
-        if self.others:
-            name, chance = max(self.others.items(), key=lambda pair: pair[1])
-            return f"No law is needed: {name} explains as much, with a chance of {chance_told(chance)}."
-        if self.tried == 0:
-            return "No law is tried: these data have seen too little of every quantity."
-        if self.p <= constants().false_alarm_rate:
-            rarely = f"errors alone leave as much in {100 * max(self.p, 0.001):.1g} % of cases"
-            return f"No law is found: {rarely}, but no law or known effect explains enough of it."
-        return f"No law is found: errors alone leave as much in {100 * self.p:.0f} % of cases, {self.tried} laws tried."
+        return sentence(self)
 
     def __repr__(self) -> str:
         return in_short(f"Discovery: {self.sentence}", self.lines)
@@ -167,10 +146,9 @@ class Discovery:
     @property
     def ranked(self) -> list[list[str]]:
         """Lines of every law and other cause, the likeliest first; those of the product after its law."""
-        told = [(law.chance, law.lines) for law in self.laws]
-        told += [(chance, [f"{name} (chance {chance_told(chance)})"]) for name, chance in self.others.items()]
-        told.sort(key=lambda pair: -pair[0])
-        ranked = [lines for _, lines in told]
+        pairs = [(law.chance, law.lines) for law in self.laws]
+        pairs += [(chance, [phrase("other_cause", name, chance)]) for name, chance in self.others.items()]
+        ranked = [lines for _, lines in sorted(pairs, key=lambda pair: -pair[0])]
         if self.product is not None:
             ranked.insert(1, self.product.lines)
         return ranked
@@ -206,37 +184,33 @@ def effect_name(found: LawFound) -> str:
 
 
 def effect_text(laws: Sequence[LawFound], own: Path | None) -> str:
-    """The file of a law, and of its product where it has one; own: that of the case, whose effects are kept.
+    """The file of a law, and of its product if it has one; own: that of the case, whose effects are kept.
 
-    Errors: InputError where it has one of these names already.
+    Errors: InputError if it has one of these names already.
     """
     known = library(own)
     for name in map(effect_name, laws):
         if name in known:
             raise InputError(f"{own}: the effect `{name}` exists already; rename it there, then run discover again.")
     before = IMPORTS if own is None else own.read_text(encoding="utf-8").rstrip() + "\n\n\n" + IMPORTS
-    parts = [_parts(found) for found in laws]
+    parts = []
+    for found in laws:
+        law = found.law
+        g = _written(law, found.reference)
+        if law.times is not None:
+            g = f"({_written(law.times, found.first)}) * ({g})"
+        parts.append({
+            "name": effect_name(found), "equation": found.equation, "seen": found.range_seen, "g": g,
+            "change": law.term.change.format(factor=f"np.exp(strength * g{law.term.written})"),
+            "stage": law.term.stage, "title": law.title, "scale": found.scale, "low": -law.form.strongest,
+            "high": law.form.strongest, "symbol": law.quantity.symbol, "unit": law.quantity.unit,
+            "quantity": law.quantity.written, "letter": "a" if law.times is None else "c",
+            "least": found.seen[0], "most": found.seen[1],
+        })  # fmt: skip
     functions = "".join(FUNCTION.format(**part) for part in parts)
     before += OF_FLUXES if "dispersion(" in functions else ""
     effects = ", ".join([*(["*EFFECTS"] if own is not None else []), *(EFFECT.format(**part) for part in parts)])
     return f"{before}{functions}\n\nEFFECTS = ({effects},)\n"
-
-
-def _parts(found: LawFound) -> dict[str, object]:
-    """What stands in the templates for a law."""
-    law = found.law
-    factor = f"np.exp(strength * g{law.term.written})"
-    change = law.term.change.format(factor=factor)
-    g = _written(law, found.reference)
-    if law.times is not None:
-        g = f"({_written(law.times, found.first)}) * ({g})"
-    return {
-        "name": effect_name(found), "equation": found.equation, "seen": found.range_seen, "g": g, "change": change,
-        "stage": law.term.stage, "title": law.title, "scale": found.scale, "low": -law.form.strongest,
-        "high": law.form.strongest, "symbol": law.quantity.symbol, "unit": law.quantity.unit,
-        "quantity": law.quantity.written, "letter": "a" if law.times is None else "c",
-        "least": found.seen[0], "most": found.seen[1],
-    }  # fmt: skip
 
 
 def _written(law: Law, reference: float | None) -> str:

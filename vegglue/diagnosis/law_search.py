@@ -11,7 +11,7 @@ else the best of them are calibrated, and one is reported if it is likelier than
 left.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,7 +32,7 @@ from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import REACH, Hypothesis, chances_in_set, hypotheses_of, tempering
 from vegglue.diagnosis.discovered import Discovery, LawFound, ProductFound
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
-from vegglue.effects.grammar import SAME_AS, Law
+from vegglue.effects.grammar import SAME_AS
 from vegglue.engine.interface import Model
 from vegglue.engine.model import with_compilation
 from vegglue.progress import Progress, Watch
@@ -117,95 +117,96 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
     if not traces.laws:
         return Discovery(1.0, 0, (), {})
     screening = screen_laws(base, traces)
+    nothing = Discovery(screening.p, len(screening.laws), (), {})
     if screening.p > constants().false_alarm_rate:
-        return Discovery(screening.p, len(screening.laws), (), {})
-    known = _as_vague(screening, hypotheses_of(screening.listed, watch, screening.kind.total))
-    laws = _laws(screening, max((one.log_evidence for one in known), default=-np.inf), watch)
-    found = _discovery(screening, sorted([*known, *laws], key=lambda one: -one.log_evidence))
-    return replace(found, product=_product(screening, found, watch))
-
-
-def _as_vague(screening: LawScreening, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """What is at a place, of no kind that others have seen in nature, as likely before as laws; all else as it is."""
-    places = {one.term for one in screening.listed.fingerprints.places}
-    less = np.log(constants().listed_over_laws)
-    return [replace(one, log_evidence=one.log_evidence - less) if one.kind in places else one for one in found]
-
-
-def _laws(screening: LawScreening, known: float, watch: Watch) -> list[Hypothesis]:
-    """The most promising quantities, each with the best of its laws that were calibrated and the evidence of all its
-    laws; known: ln evidence of the best of all else.
-    """
-    evidence = screening.kind.log_evidence
-    columns = {said: _columns(screening, laws) for said, laws in screening.subjects.items()}
-    promised = {said: float(np.logaddexp.reduce(evidence[some])) for said, some in columns.items()}
-    ranked = sorted(promised, key=lambda said: -promised[said])[:MOST_QUANTITIES]
-    top = max(promised[ranked[0]], known)
-    ranked = [said for said in ranked if (top - promised[said]) / tempering(np.array(top)) < REACH]
-    tried = [(said, law) for rank, said in enumerate(ranked) for law in _forms(screening, said, rank)]
-    refits = refits_of(screening.listed.search, [_trial(screening, law) for _, law in tried], watch)
-    found = []
-    for said in ranked:
-        kept = {law: refit for (of, law), refit in zip(tried, refits, strict=True) if of == said and refit is not None}
-        if kept:
-            found.append(_hypothesis(screening, columns[said], kept))
-    return found
-
-
-def _columns(screening: LawScreening, laws: Sequence[int]) -> np.ndarray:
-    return np.concatenate([screening.columns[law] for law in laws])
-
-
-def _forms(screening: LawScreening, said: tuple[str, str], rank: int) -> list[int]:
-    """The laws of a quantity that are calibrated, the most promising first: more than one of the first quantities."""
-    evidence, laws = screening.kind.log_evidence, screening.subjects[said]
-    ranked = sorted(laws, key=lambda law: -evidence[screening.best_column(law)])
-    return ranked[: FORMS_REFITTED if rank < SEVERAL_FORMS else 1]
-
-
-def _trial(screening: LawScreening, law: int) -> RefitTrial:
-    """A law at its best reference, from the best place and the size of its score."""
-    search, one, shapes = screening.listed.search, screening.laws[law].candidate, screening.settings_of(law)
-    start = start_with(search.model.case, one, shapes, search.point.z, screening.gain(law))
-    return RefitTrial(one, shapes, (start,))
-
-
-def _hypothesis(screening: LawScreening, columns: np.ndarray, kept: Mapping[int, Refit]) -> Hypothesis:
-    """The best of the calibrated laws of a quantity, with the evidence of all its columns: as kept where calibrated,
-    elsewhere to first order, corrected as that of the best one.
-    """
-    first, prior = screening.kind.log_evidence, screening.kind.log_prior
-    ends = {screening.best_column(law): refit for law, refit in kept.items()}
-    best = max(ends, key=lambda column: ends[column].log_factor + prior[column])
-    evidence = first + (ends[best].log_factor + prior[best] - first[best])
-    for column, refit in ends.items():
-        evidence[column] = refit.log_factor + prior[column]
-    return Hypothesis("law", ends[best].candidate.name, float(np.logaddexp.reduce(evidence[columns])), best, ends[best])
-
-
-def _discovery(screening: LawScreening, ranked: Sequence[Hypothesis]) -> Discovery:
-    """The causes that hold HELD of the chance together; none where all of them together say too little."""
+        return nothing
+    # What is at a place, of no kind that others have seen in nature, is as likely before as laws.
+    places, less = {one.term for one in screening.listed.fingerprints.places}, np.log(constants().listed_over_laws)
+    known = [
+        replace(one, log_evidence=one.log_evidence - less) if one.kind in places else one
+        for one in hypotheses_of(screening.listed, watch, screening.kind.total)
+    ]
+    laws = _refitted_laws(screening, max((one.log_evidence for one in known), default=-np.inf), watch)
+    ranked = sorted([*known, *laws], key=lambda one: -one.log_evidence)
     evidence = np.array([one.log_evidence for one in ranked])
     if np.logaddexp.reduce(evidence) < 0.0:
-        return Discovery(screening.p, len(screening.laws), (), {})
+        return nothing
     chances = chances_in_set(evidence)
     count = int(np.searchsorted(np.cumsum(chances), HELD)) + 1
     pairs = list(zip(ranked, chances, strict=True))[:count]
-    laws = tuple(_law_found(screening, one, float(p)) for one, p in pairs if one.kind == "law")
-    return Discovery(
+    found = Discovery(
         p=screening.p,
         tried=len(screening.laws),
-        laws=laws,
+        laws=tuple(_law_found(screening, one, float(p)) for one, p in pairs if one.kind == "law"),
         others={one.name: float(p) for one, p in pairs if one.kind != "law"},
         compared={one.name: one.log_evidence for one in ranked},
         likeliest=ranked[0].what if isinstance(ranked[0].what, Refit) else None,
     )
+    best, refit = found.best, found.likeliest
+    if best is None or best.same_as or refit is None:
+        return found
+    of_law = next(one for one in screening.laws if one.law.name == best.law.name)
+    listed = screening.listed
+    return replace(found, product=product_beside(listed.search, listed.fingerprints, of_law, refit, watch))
+
+
+def _refitted_laws(screening: LawScreening, known: float, watch: Watch) -> list[Hypothesis]:
+    """The most promising quantities, each with the best of its laws that were calibrated and the evidence of all its
+    columns: as kept if calibrated, else to first order, corrected as that of the best one; known: ln evidence of the
+    best of all else.
+    """
+    evidence, prior, search = screening.kind.log_evidence, screening.kind.log_prior, screening.listed.search
+    columns = {
+        subject: np.concatenate([screening.columns[law] for law in laws])
+        for subject, laws in screening.subjects.items()
+    }
+    promised = {subject: float(np.logaddexp.reduce(evidence[some])) for subject, some in columns.items()}
+    ranked = sorted(promised, key=lambda subject: -promised[subject])[:MOST_QUANTITIES]
+    top = max(promised[ranked[0]], known)
+    ranked = [subject for subject in ranked if (top - promised[subject]) / tempering(np.array(top)) < REACH]
+    tried = []
+    for rank, subject in enumerate(ranked):  # more than one form of the first quantities
+        forms = sorted(screening.subjects[subject], key=lambda law: -evidence[screening.best_column(law)])
+        tried += [(subject, law) for law in forms[: FORMS_REFITTED if rank < SEVERAL_FORMS else 1]]
+    trials = []
+    for _, law in tried:
+        one, shapes = screening.laws[law].candidate, screening.settings_of(law)
+        start = start_with(search.model.case, one, shapes, search.point.z, screening.gain(law))
+        trials.append(RefitTrial(one, shapes, (start,)))
+    refits = refits_of(search, trials, watch)
+    found = []
+    for subject in ranked:
+        ends = {
+            screening.best_column(law): refit
+            for (of, law), refit in zip(tried, refits, strict=True)
+            if of == subject and refit is not None
+        }
+        if not ends:
+            continue
+        best = max(ends, key=lambda column: ends[column].log_factor + prior[column])
+        corrected = evidence + (ends[best].log_factor + prior[best] - evidence[best])
+        for column, refit in ends.items():
+            corrected[column] = refit.log_factor + prior[column]
+        total = float(np.logaddexp.reduce(corrected[columns[subject]]))
+        found.append(Hypothesis("law", ends[best].candidate.name, total, best, ends[best]))
+    return found
 
 
 def _law_found(screening: LawScreening, one: Hypothesis, chance: float) -> LawFound:
+    """A law with what leaves the same trace, the most alike first: listed effects, and the nearest law of any other
+    quantity.
+    """
     refit = one.what
     assert isinstance(refit, Refit)
     of_law = next(law for law in screening.laws if law.candidate.name == one.name)
+    row, listed = np.abs(screening.cosine[screening.of_listed + one.column]), screening.listed.fingerprints
+    near = {of.name: float(row[some].max()) for of, some in zip(listed.candidates, listed.columns, strict=True)}
+    for subject, laws in screening.subjects.items():
+        if subject != of_law.law.subject:
+            cosine = {law: float(row[screening.of_listed + screening.columns[law]].max()) for law in laws}
+            nearest = max(laws, key=lambda law: cosine[law])
+            near[screening.laws[nearest].candidate.name] = cosine[nearest]
+    ranked = sorted(near, key=lambda name: -near[name])
     return LawFound(
         law=of_law.law,
         same_as=SAME_AS.get(of_law.law.name, ""),
@@ -216,29 +217,5 @@ def _law_found(screening: LawScreening, one: Hypothesis, chance: float) -> LawFo
         chance=chance,
         log_evidence=one.log_evidence,
         seen=of_law.seen,
-        alike=_alike(screening, one, of_law.law),
+        alike=tuple(name for name in ranked if near[name] > constants().alike_cosine),
     )
-
-
-def _product(screening: LawScreening, found: Discovery, watch: Watch) -> ProductFound | None:
-    """Of the best law with another quantity, where that law leaves a misfit."""
-    best, refit = found.best, found.likeliest
-    if best is None or best.same_as or refit is None:
-        return None
-    of_law = next(one for one in screening.laws if one.law.name == best.law.name)
-    return product_beside(screening.listed.search, screening.listed.fingerprints, of_law, refit, watch)
-
-
-def _alike(screening: LawScreening, one: Hypothesis, own: Law) -> tuple[str, ...]:
-    """Names of listed effects, and of the nearest law of any other quantity, that leave the same trace as this law, the
-    most alike first.
-    """
-    row = np.abs(screening.cosine[screening.of_listed + one.column])
-    listed = screening.listed.fingerprints
-    near = {of.name: float(row[some].max()) for of, some in zip(listed.candidates, listed.columns, strict=True)}
-    for said, laws in screening.subjects.items():
-        if said != own.subject:
-            cosine = {law: float(row[screening.of_listed + screening.columns[law]].max()) for law in laws}
-            nearest = max(laws, key=lambda law: cosine[law])
-            near[screening.laws[nearest].candidate.name] = cosine[nearest]
-    return tuple(name for name in sorted(near, key=lambda name: -near[name]) if near[name] > constants().alike_cosine)
