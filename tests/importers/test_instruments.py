@@ -1,79 +1,133 @@
-"""Exports of instruments become stations: right places, right units, and errors that follow from the data."""
+"""Files of instruments become stations: right places, right units, errors that follow from the data; or a refusal."""
 
+import json
+import sys
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pandas as pd
 import pytest
-from instrument_files import VECTRINO_HEADING, flowtracker, riversurveyor, vectrino, winriver
+from field_folders import CHANNEL, folder_of, imported, refusal
+from instrument_files import VECTRINO_HEADING, flowtracker, pd0, riversurveyor, vector, vectrino, winriver
+from matlab_files import profiler_mat, qrev_mat, riversurveyor_mat
+from scipy.io import savemat
 from untrusted_imports import IMPORTS
 
-import vegglue
 from vegglue.case.frame import Frame
 from vegglue.errors import InputError
 from vegglue.importers import instruments
 from vegglue.importers.file_options import FileOptions
-from vegglue.importers.gaugings import read_gauging
-from vegglue.importers.instruments import reader_of
+from vegglue.importers.gaugings import read_flowtracker2, read_gauging
+from vegglue.importers.instruments import read_matlab, reader_of
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.nortek import read_nortek, read_vector
+from vegglue.importers.qrev import read_qrev_summary
 from vegglue.importers.teledyne import read_pd0, read_winriver
 from vegglue.measurements.observations import read_observations
 
 PLACES, DEPTHS, VELOCITIES = [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.5, 0.8, 0.6, 0.0], [0.0, 0.3, 0.5, 0.4, 0.0]
 # A tape that begins on the left bank, at y = 2 m, and runs to the right.
-ACROSS = ((12.0, 2.0), (12.0, -2.0))
-SITE = """\
-channel: {length_m: 30, bottom_width_m: 3, bank_slope_v_per_h: 0.5, bed_slope: 0.001}
-experiments: {June: {discharge: 2.0, level: 0.95}}
+TAPE = FileOptions(line=((12.0, 2.0), (12.0, -2.0)))
+START, PROBE = FileOptions(start=(100.0, 200.0)), FileOptions(position=(12.0, 0.5, 0.1))
+SITE = CHANNEL + "experiments: {June: {discharge: 2.0, level: 0.95}}\n"
+ALONG = np.linspace(0.0, 15.0, 151)  # 0.06 m/s east and 0.08 m/s north, whole millimetres as PD0 has them
+BOAT = ((0.6 * ALONG, 0.8 * ALONG), 2.0, (0.64, -0.48), 0.05)
+MEANS = np.linspace(0.30, 0.24, 31)  # slower towards the bed
+SUMMARY = """\
+<?xml version="1.0" encoding="utf-8"?>
+<?xml-stylesheet type= "text/xsl" href="QRevStylesheet.xsl"?>
+<Channel QRevFilename="mill_QRev" QRevVersion="QRevPy 4.01">
+ <Transect><Discharge><Total type="double" unitsCode="cms">9.9</Total></Discharge></Transect>
+ <ChannelSummary>
+  <Discharge><Top type="double" unitsCode="cms">0.2</Top><Total type="double" unitsCode="cms">2.040</Total></Discharge>
+  <Uncertainty><COV type="double">4.4</COV><Total type="double">8.0</Total></Uncertainty>
+ </ChannelSummary>
+</Channel>
 """
+
+
+def boat_text(**more: str) -> str:
+    (track, *rest) = BOAT
+    return winriver(*track, *rest, **more)
+
+
+def raw_boat(folder: Path) -> Path:
+    (track, *rest) = BOAT
+    (folder / "t.PD0").write_bytes(pd0(*track, *rest))
+    return folder / "t.PD0"
+
+
+def written(path: Path, content: str | bytes) -> Path:
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def refused(path: Path, options: FileOptions) -> str:
+    """Why a file is refused: one line, which names it."""
+    with pytest.raises(InputError) as caught:
+        reader_of(path)(path, options)
+    assert len(str(caught.value).splitlines()) == 1
+    assert path.name in str(caught.value)
+    assert str(caught.value).count("expected") <= 1, "a refusal within a refusal"
+    return str(caught.value)
 
 
 def test_every_reader_has_a_file_that_is_damaged(tmp_path: Path) -> None:
     """But those that hand raw records to mhkit, which may not be there."""
     damaged = set()
     for name, content, _ in IMPORTS:
-        (tmp_path / name).write_bytes(content)
+        written(tmp_path / name, content)
         (tmp_path / name).with_suffix(".hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
         damaged.add(reader_of(tmp_path / name))
     known = {one for name, one in vars(instruments).items() if name.startswith("read_")}
     assert known - damaged == {read_pd0, read_vector}
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "key"),
+    [
+        ("g.dis", flowtracker(PLACES, DEPTHS, VELOCITIES), "line"), ("t_ASC.TXT", boat_text(), "start"),
+        ("q.xml", SUMMARY, "start"), ("p.dat", vectrino((0.3, 0.0, 0.0), 0.03, 100, bad=0), "position"),
+    ],
+)  # fmt: skip
+def test_a_file_without_a_place_asks_for_its_key(tmp_path: Path, name: str, content: str, key: str) -> None:
+    (tmp_path / "p.hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
+    assert f"`{key}: [" in refused(written(tmp_path / name, content), FileOptions())
+
+
 @pytest.mark.parametrize("export", [flowtracker, riversurveyor])
 def test_verticals_along_a_tape_stand_where_it_lay(tmp_path: Path, export) -> None:
-    path = tmp_path / "gauging.dis"
-    path.write_text(export(PLACES, DEPTHS, VELOCITIES), encoding="utf-8")
-    words = FileOptions(line=ACROSS)
+    path = written(tmp_path / "gauging.dis", export(PLACES, DEPTHS, VELOCITIES))
     assert reader_of(path) is read_gauging
-    taken = read_gauging(path, words)
+    taken = read_gauging(path, TAPE)
     assert np.allclose(taken.numbers["x"], 12.0)
     assert np.allclose(taken.numbers["y"], [1.0, 0.0, -1.0], atol=0.01)
     assert np.allclose(taken.numbers["u"], [0.3, 0.5, 0.4], atol=0.001)
     assert (taken.numbers["u_se"] > 0.05 * 0.3).all()
-    with pytest.raises(InputError, match="expected where the tape lay"):
-        read_gauging(path, FileOptions())
 
 
 def test_a_gauging_becomes_a_case(tmp_path: Path) -> None:
-    folder = tmp_path / "brook"
-    folder.mkdir()
-    (folder / "june.dis").write_text(flowtracker(PLACES, DEPTHS, VELOCITIES), encoding="utf-8")
-    (folder / "site.yaml").write_text(SITE + "files: {june.dis: {line: [[12, 2], [12, -2]], section: A}}\n", "utf-8")
-    case = vegglue.import_folder(folder, tmp_path / "brook.yaml")
-    table = read_observations(case).table
-    assert table["section"].tolist() == ["A"] * 3
-    assert np.allclose(table["value"], [0.3, 0.5, 0.4], atol=0.001)
-    assert case.imported is not None
-    assert case.imported[0].units["u"] == "ft/s"
-    assert "FlowTracker" in case.imported[0].taken
+    site = SITE + "files: {june.dis: {line: [[12, 2], [12, -2]], section: A}}\n"
+    found = imported(folder_of(tmp_path / "brook", site, june__dis=flowtracker(PLACES, DEPTHS, VELOCITIES)))
+    assert found.table["section"].tolist() == ["A"] * 3
+    assert found.values() == pytest.approx([0.3, 0.5, 0.4], abs=0.001)
+    assert (found.case.imported or ())[0].units["u"] == "ft/s"
+
+
+@pytest.mark.parametrize("stations", [[], {}, [1], [{}], [{"Location": "a"}], None])
+def test_another_zip_is_refused(tmp_path: Path, stations: object) -> None:
+    with ZipFile(tmp_path / "g.ft", "w") as archive:
+        name = "other.json" if stations is None else "DataFile.json"
+        archive.writestr(name, json.dumps({"Properties": {}, "Stations": stations}))
+    assert reader_of(tmp_path / "g.ft") is read_flowtracker2
+    refused(tmp_path / "g.ft", TAPE)
 
 
 def test_a_transect_is_averaged_over_the_depth_and_along_the_section(tmp_path: Path) -> None:
-    along = np.linspace(0.0, 10.0, 150)
-    text = winriver(0.6 * along, 0.8 * along, 2.0, (0.64, -0.48), 0.05)
-    (tmp_path / "transect_ASC.TXT").write_text(text, encoding="utf-8")
-    assert reader_of(tmp_path / "transect_ASC.TXT") is read_winriver
-    taken = read_winriver(tmp_path / "transect_ASC.TXT", FileOptions(start=(100.0, 200.0)))
+    path = written(tmp_path / "transect_ASC.TXT", boat_text())
+    assert reader_of(path) is read_winriver
+    taken = read_winriver(path, START)
     assert taken.size == 15
     assert np.allclose(taken.numbers["x"] - 100.0, 0.75 * (taken.numbers["y"] - 200.0), atol=0.02)
     assert taken.numbers["east_velocity"] == pytest.approx(0.64, abs=0.03)
@@ -84,96 +138,257 @@ def test_a_transect_is_averaged_over_the_depth_and_along_the_section(tmp_path: P
 
 def test_a_transect_is_turned_into_the_channel(tmp_path: Path) -> None:
     """Water that heads to the south-east, in a channel that does: all of it along, with its errors."""
-    folder = tmp_path / "bend"
-    folder.mkdir()
     frame = Frame(origin=(100.0, 200.0), angle=-36.8698976458)
     start = frame.to_map(12.0, -4.0)
     along = np.linspace(0.0, 8.0, 120)
-    (folder / "t_ASC.TXT").write_text(winriver(0.6 * along, 0.8 * along, 2.0, (0.64, -0.48), 0.05), encoding="utf-8")
-    (folder / "site.yaml").write_text(
-        SITE + f"frame: {{origin: [100, 200], angle: {frame.angle}}}\n"
-        f"files: {{t_ASC.TXT: {{start: [{start[0]}, {start[1]}], section: A}}}}\n",
-        encoding="utf-8",
-    )
-    table = read_observations(vegglue.import_folder(folder, tmp_path / "bend.yaml")).table
-    parts = {kind: table[table["kind"] == kind] for kind in ("velocity", "velocity_across")}
-    assert np.allclose(parts["velocity"]["value"], 0.8, atol=0.03)
-    assert np.allclose(parts["velocity_across"]["value"], 0.0, atol=0.03)
-    assert np.allclose(table["x"], 12.0, atol=0.01)
-    assert table["y"].between(-4.0, 4.0).all()
-    assert (table["standard_error"] > 0.0).all()
+    site = SITE + f"frame: {{origin: [100, 200], angle: {frame.angle}}}\n"
+    site += f"files: {{t_ASC.TXT: {{start: [{start[0]}, {start[1]}], section: A}}}}\n"
+    text = winriver(0.6 * along, 0.8 * along, 2.0, (0.64, -0.48), 0.05)
+    found = imported(folder_of(tmp_path / "bend", site, t_ASC__TXT=text))
+    assert np.allclose(found.values(), 0.8, atol=0.03)
+    assert np.allclose(found.values("velocity_across"), 0.0, atol=0.03)
+    assert np.allclose(found.table["x"], 12.0, atol=0.01)
+    assert found.table["y"].between(-4.0, 4.0).all()
+    assert (found.table["standard_error"] > 0.0).all()
+
+
+def test_a_raw_transect_gives_the_stations_of_its_ascii_output(tmp_path: Path) -> None:
+    pytest.importorskip("mhkit")
+    path = raw_boat(tmp_path)
+    assert reader_of(path) is read_pd0
+    raw, text = read_pd0(path, START), read_winriver(written(tmp_path / "t_ASC.TXT", boat_text()), START)
+    assert raw.size == text.size == 15
+    for role, off in (("x", 0.08), ("y", 0.08), ("east_velocity", 0.02), ("north_velocity", 0.02)):
+        assert raw.numbers[role] == pytest.approx(text.numbers[role], abs=off), role
+    assert np.median(raw.numbers["u_se"]) == pytest.approx(np.median(text.numbers["u_se"]), rel=0.5)
+    assert "Rio Grande 0.2 m" in raw.notes[0]
+    assert "151 ensembles" in raw.notes[0]
+
+
+def test_a_compass_is_turned_to_true_north(tmp_path: Path) -> None:
+    pytest.importorskip("mhkit")
+    path = raw_boat(tmp_path)
+    plain, turned = (read_pd0(path, FileOptions(start=(0.0, 0.0), declination=d)) for d in (0.0, 90.0))
+    for role, same, sign in (
+        ("east_velocity", "north_velocity", 1.0), ("north_velocity", "east_velocity", -1.0), ("x", "y", 1.0),
+    ):  # fmt: skip
+        assert np.allclose(turned.numbers[role], sign * plain.numbers[same], atol=1e-6), role
+
+
+def test_a_damaged_raw_file_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("mhkit")
+    path = raw_boat(tmp_path)
+    for content in (b"\x7f\x7f", b"\x7f\x7f" + bytes(400), path.read_bytes()[:500]):
+        refused(written(path, content), START)
+
+
+def test_a_binary_record_of_a_vector_is_its_mean_without_spikes(tmp_path: Path) -> None:
+    pytest.importorskip("mhkit")
+    path = written(tmp_path / "p.vec", vector((0.30, 0.02, 0.0), 0.03, 960, bad=20))
+    assert reader_of(path) is read_vector
+    taken = read_vector(path, PROBE)
+    for role, value, off in (
+        ("u", 0.30, 0.005),
+        ("v", 0.02, 0.005),
+        ("u_std", 0.03, 0.003),
+        ("duration_s", 940 / 32, 0.3),
+    ):
+        assert taken.numbers[role][0] == pytest.approx(value, abs=off), role
+    assert "20 left out" in taken.notes[0]
+    assert taken.texts["device"] == ["Vector"]
+    refused(path, FileOptions())
+
+
+def test_without_the_library_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mhkit", None)
+    record = written(tmp_path / "p.vec", vector((0.3, 0.0, 0.0), 0.03, 64, bad=0))
+    for path, options in ((raw_boat(tmp_path), START), (record, PROBE)):
+        assert "vegglue[instruments]" in refused(path, options)
+
+
+@pytest.mark.parametrize(("raw", "read"), [("t.PD0", True), ("t_1.vno", False)])
+def test_a_raw_record_beside_its_export_is_left_alone(tmp_path: Path, raw: str, read: bool) -> None:
+    """But not one beside the export of another, t_10, whose name begins alike."""
+    name = "t_ASC.TXT" if read else "t_10_ASC.TXT"
+    folder = folder_of(tmp_path / "brook", f"{SITE}files: {{{name}: {{start: [10, -1], section: A}}}}\n")
+    written(folder / name, boat_text())
+    written(folder / raw, b"\x7f\x7f" + bytes(100))
+    if read:
+        assert list(imported(folder).taken) == [name]
+    else:
+        assert raw in refusal(folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "begins"),
+    [
+        ("p.vec", b"\xa5\x05\x18\x00"), ("p.dat", b"\xa5\x05\x18\x00"), ("p.ad2cp", b"\xa5\x0a\x0a\x10"),
+        ("p.vno", b"??"),
+        ("p.ntk", b"??"),
+    ],
+)  # fmt: skip
+def test_records_without_a_reader_are_refused_with_what_to_export(tmp_path: Path, name: str, begins: bytes) -> None:
+    folder = folder_of(tmp_path / "flume", SITE)
+    written(folder / name, begins + bytes(100))
+    error = refusal(folder)
+    assert name in error
+    assert ".hdr" in error
+
+
+def flume(
+    tmp_path: Path, options: list[str], records: list[tuple[float, float]], axes: str = "", more: str = ""
+) -> Path:
+    """Records of a Vectrino of mean u and v, each with its options in the site file."""
+    entries = ", ".join(f"p{number}.dat: {{{one}}}" for number, one in enumerate(options))
+    folder = folder_of(tmp_path / "flume", f"{SITE}{more}files: {{{entries}}}\n")
+    of_axes = f"Coordinate system                     {axes}\n" if axes else ""
+    for number, (u, v) in enumerate(records):
+        written(folder / f"p{number}.dat", vectrino((u, v, 0.0), 0.03, 1000, bad=20))
+        written(folder / f"p{number}.hdr", VECTRINO_HEADING + of_axes)
+    return folder
 
 
 def test_records_of_one_point_become_a_vertical(tmp_path: Path) -> None:
-    folder = tmp_path / "flume"
-    folder.mkdir()
-    entries = []
-    for number, (z, u) in enumerate([(0.1, 0.30), (0.3, 0.38), (0.6, 0.44)]):
-        (folder / f"p{number}.dat").write_text(vectrino((u, 0.02, 0.0), 0.03, 1000, bad=20), encoding="utf-8")
-        (folder / f"p{number}.hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
-        entries.append(f"p{number}.dat: {{position: [12, 0.5, {z}], section: A}}")
-    (folder / "site.yaml").write_text(f"{SITE}files: {{{', '.join(entries)}}}\n", encoding="utf-8")
-    case = vegglue.import_folder(folder, tmp_path / "flume.yaml")
-    observations = read_observations(case)
-    assert observations.points["u"].tolist() == pytest.approx([0.30, 0.38, 0.44], abs=0.005)
-    assert observations.points["u_std"].tolist() == pytest.approx([0.03] * 3, rel=0.1)
-    assert observations.table["kind"].tolist() == ["velocity", "velocity_across"]
-    assert 0.3 < observations.table["value"].iloc[0] < 0.5
-    assert observations.table["value"].iloc[1] == pytest.approx(0.02, abs=0.005)
-    assert case.imported is not None
-    assert "1,000 samples at 25 Hz, 20 left out" in case.imported[0].taken
+    points = [(0.1, 0.30), (0.3, 0.38), (0.6, 0.44)]
+    found = imported(
+        flume(tmp_path, [f"position: [12, 0.5, {z}], section: A" for z, _ in points], [(u, 0.02) for _, u in points])
+    )
+    read = read_observations(found.case)
+    assert read.points["u"].tolist() == pytest.approx([0.30, 0.38, 0.44], abs=0.005)
+    assert read.points["u_std"].tolist() == pytest.approx([0.03] * 3, rel=0.1)
+    assert 0.3 < found.values()[0] < 0.5
+    assert found.values("velocity_across") == pytest.approx([0.02], abs=0.005)
+    assert "20 left out" in found.taken["p0.dat"]
 
 
 def test_records_of_one_vertical_keep_errors_of_their_own(tmp_path: Path) -> None:
-    """All had that of the first."""
-    folder = tmp_path / "flume"
-    folder.mkdir()
-    entries = []
-    for number, error in enumerate((", standard_error: 1 cm/s", "", ", standard_error: 4 cm/s")):
-        (folder / f"p{number}.dat").write_text(vectrino((0.3, 0.02, 0.0), 0.03, 400, bad=0), encoding="utf-8")
-        (folder / f"p{number}.hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
-        entries.append(f"p{number}.dat: {{position: [12, 0.5, {0.1 + 0.2 * number:.1f}], section: A{error}}}")
-    (folder / "site.yaml").write_text(f"{SITE}files: {{{', '.join(entries)}}}\n", encoding="utf-8")
-    case = vegglue.import_folder(folder, tmp_path / "flume.yaml")
+    errors = (", standard_error: 1 cm/s", "", ", standard_error: 4 cm/s")
+    options = [f"position: [12, 0.5, {0.1 + 0.2 * n:.1f}], section: A{error}" for n, error in enumerate(errors)]
+    case = imported(flume(tmp_path, options, [(0.3, 0.02)] * 3)).case
     assert pd.read_csv(case.observations[0].file)["u_se"].tolist() == [0.01, 0.0, 0.04]
 
 
 @pytest.mark.parametrize(
-    ("axes", "said", "velocity"),
-    [
-        ("XYZ", "", (0.4, 0.05)),
-        ("", "", (0.4, 0.05)),
-        ("XYZ", ", directions: map", (0.05, -0.4)),
-        ("ENU", "", (0.05, -0.4)),
-    ],
-)
+    ("axes", "directions", "velocity"),
+    [("XYZ", "", (0.4, 0.05)), ("", "", (0.4, 0.05)), ("XYZ", ", directions: map", (0.05, -0.4)),
+    ("ENU", "", (0.05, -0.4))],
+)  # fmt: skip
 def test_the_axes_of_a_probe_are_not_those_of_the_map(
-    tmp_path: Path, axes: str, said: str, velocity: tuple[float, float]
+    tmp_path: Path, axes: str, directions: str, velocity: tuple[float, float]
 ) -> None:
     """0.4 m/s along a channel that runs north were 0.4 m/s across it."""
-    folder = tmp_path / "flume"
-    folder.mkdir()
-    (folder / "p.dat").write_text(vectrino((0.4, 0.05, 0.0), 0.01, 400, bad=0), encoding="utf-8")
-    of_axes = f"Coordinate system                     {axes}\n" if axes else ""
-    (folder / "p.hdr").write_text(VECTRINO_HEADING + of_axes, encoding="utf-8")
-    more = f"frame: {{origin: [1000, 2000], angle: 90}}\nfiles: {{p.dat: {{position: [1000, 2010, 0.3]{said}}}}}\n"
-    (folder / "site.yaml").write_text(SITE + more, encoding="utf-8")
-    case = vegglue.import_folder(folder, tmp_path / "flume.yaml")
+    more = "frame: {origin: [1000, 2000], angle: 90}\n"
+    case = imported(flume(tmp_path, [f"position: [1000, 2010, 0.3]{directions}"], [(0.4, 0.05)], axes, more)).case
     found = [pd.read_csv(one.file)[column].item() for one, column in zip(case.observations, "uv", strict=True)]
     assert found == pytest.approx(velocity, abs=0.003)
 
 
-def test_a_record_in_beams_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "p.dat").write_text(vectrino((0.4, 0.0, 0.0), 0.01, 100, bad=0), encoding="utf-8")
-    (tmp_path / "p.hdr").write_text(f"{VECTRINO_HEADING}Coordinate system    BEAM\n", encoding="utf-8")
-    with pytest.raises(InputError, match="expected velocities in XYZ or ENU, got BEAM; export them anew"):
-        read_nortek(tmp_path / "p.dat", FileOptions(position=(1.0, 0.0, 0.2)))
+@pytest.mark.parametrize(
+    ("heading", "word"), [(f"{VECTRINO_HEADING}Coordinate system    BEAM\n", "BEAM"), ("", "Sampling rate")]
+)
+def test_a_record_in_beams_or_without_its_rate_is_refused(tmp_path: Path, heading: str, word: str) -> None:
+    path = written(tmp_path / "p.dat", vectrino((0.4, 0.0, 0.0), 0.01, 100, bad=0))
+    written(tmp_path / "p.hdr", heading)
+    with pytest.raises(InputError, match=word):
+        read_nortek(path, PROBE)
 
 
-def test_a_record_without_its_rate_or_place_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "p.dat"
-    path.write_text(vectrino((0.3, 0.0, 0.0), 0.03, 100, bad=0), encoding="utf-8")
-    with pytest.raises(InputError, match="expected where the probe stood"):
-        read_nortek(path, FileOptions())
-    with pytest.raises(InputError, match=r"expected `Sampling rate` in the \.hdr"):
-        read_nortek(path, FileOptions(position=(1.0, 0.0, 0.2)))
+@pytest.mark.parametrize("unit", ["m", "ft"])
+def test_a_transect_of_a_riversurveyor_becomes_stations(tmp_path: Path, unit: str) -> None:
+    riversurveyor_mat(tmp_path / "t.mat", unit)
+    assert reader_of(tmp_path / "t.mat") is read_matlab
+    taken = read_matlab(tmp_path / "t.mat", START)
+    assert "36 ensembles" in taken.notes[0]
+    assert taken.numbers["east_velocity"] == pytest.approx(0.64, abs=0.03)
+    assert taken.numbers["north_velocity"] == pytest.approx(-0.48, abs=0.03)
+    assert np.allclose(taken.numbers["x"] - 100.0, 0.75 * (taken.numbers["y"] - 200.0), atol=1e-6)
+
+
+def qrev(tmp_path: Path, transects: int) -> MeasuredRows:
+    qrev_mat(tmp_path / "mill_QRev.mat", transects=transects)
+    return read_matlab(tmp_path / "mill_QRev.mat", START)
+
+
+def test_transects_there_and_back_lie_on_one_another(tmp_path: Path) -> None:
+    taken = qrev(tmp_path, 2)
+    assert "2 transects, 118 ensembles, 2 " in taken.notes[0]
+    assert taken.size == 15
+    assert taken.numbers["x"].min() == pytest.approx(100.0, abs=0.2)
+    assert taken.numbers["x"].max() == pytest.approx(100.0 + 59 * 0.06, abs=0.2)
+    assert np.allclose(taken.numbers["y"] - 200.0, (taken.numbers["x"] - 100.0) / 0.75, atol=1e-6)
+    assert taken.numbers["east_velocity"] == pytest.approx(0.64, abs=0.02)  # without the cells that were filled up
+    assert taken.numbers["north_velocity"] == pytest.approx(-0.48, abs=0.02)
+    assert "1 transect, 59 ensembles" in qrev(tmp_path, 1).notes[0]
+
+
+@pytest.mark.parametrize("beams", [False, True])
+def test_a_profile_is_the_mean_of_each_cell_that_is_strong(tmp_path: Path, beams: bool) -> None:
+    path = tmp_path / "p.mat"
+    profiler_mat(path, MEANS, beams)
+    taken = read_matlab(path, FileOptions(position=(2.0, 0.3, 0.15)))
+    assert taken.size == 30
+    assert "30 of 31 cells" in taken.notes[0]
+    assert taken.numbers["z"] == pytest.approx(0.15 - 0.04 - 0.001 * np.arange(30))
+    assert taken.numbers["u"] == pytest.approx(MEANS[:30], abs=0.005)
+    assert taken.numbers["v"] == pytest.approx(0.0, abs=0.005)
+    assert taken.numbers["u_std"] == pytest.approx(0.02, rel=0.2)
+    assert taken.numbers["duration_s"] == pytest.approx(np.where(np.arange(30) == 3, 359, 360) / 50)
+    refused(path, FileOptions())
+
+
+def test_cells_at_the_bed_are_left_out(tmp_path: Path) -> None:
+    profiler_mat(tmp_path / "p.mat", MEANS, bed=0.0602)
+    taken = read_matlab(tmp_path / "p.mat", FileOptions(position=(2.0, 0.3, 0.0602)))
+    assert taken.numbers["z"].min() == pytest.approx(0.0012)
+
+
+def test_profiles_one_above_the_other_become_a_vertical(tmp_path: Path) -> None:
+    files = [f"p{n}.mat: {{position: [2, 0.1, {0.08 + 0.04 * n}], section: A}}" for n in (0, 1)]
+    site = "channel: {length_m: 4, bottom_width_m: 0.8, bed_slope: 0.001}\nwalls: {n: 0.01}\n"
+    site += f"experiments: {{run: {{discharge: 20 l/s, level: 0.13}}}}\nfiles: {{{', '.join(files)}}}\n"
+    folder = folder_of(tmp_path / "flume", site)
+    for number, speed in enumerate((0.24, 0.30)):
+        profiler_mat(folder / f"p{number}.mat", np.full(31, speed))
+    found = imported(folder)
+    assert 0.24 < found.values()[0] < 0.30
+    assert found.values("velocity_across") == pytest.approx([0.0], abs=0.005)
+
+
+def test_another_mat_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "t.mat"
+    riversurveyor_mat(path, "m", coordinateSystem=0)
+    assert "ENU" in refused(path, START)
+    for water, word in (({"coordSys": "Ship"}, "Ship"), ({"validData": np.ones(3)}, "QRev")):
+        qrev_mat(path, **water)
+        assert word in refused(path, START)
+    profiler_mat(path, MEANS, sampleRate="fast")
+    assert "Vectrino Profiler" in refused(path, PROBE)
+    for variables, word in (
+        ({"meas_struct": {"a": 1.0}}, "QRev"), ({"depths": 1.0}, "depths"),
+        ({name: {"a": 1.0} for name in ("Setup", "Summary", "System", "WaterTrack")}, "RiverSurveyor Live"),
+    ):  # fmt: skip
+        savemat(path, variables)
+        assert word in refused(path, START)
+    for content in (b"MATLAB 5.0 MAT-file" + bytes(200), b"MATLAB 7.3 MAT-file, HDF5" + bytes(600)):
+        refused(written(path, content), START)
+
+
+def test_a_summary_of_qrev_is_a_discharge_with_its_error(tmp_path: Path) -> None:
+    site = SITE + "files: {mill_QRev.xml: {start: [12, 2]}}\n"
+    folder = folder_of(tmp_path / "mill", site, mill_QRev__xml=SUMMARY)
+    assert reader_of(folder / "mill_QRev.xml") is read_qrev_summary
+    table = imported(folder).table
+    assert table[["kind", "x", "value"]].to_numpy().tolist() == [["discharge", 12.0, 2.04]]
+    assert table["standard_error"].tolist() == pytest.approx([0.04 * 2.04])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("<Channel Q", '<!DOCTYPE a [<!ENTITY b "bb">]><Channel Q'), ("</Channel>", ""),
+        ("<ChannelSummary>", "<Summary>"),
+        (">2.040<", ">many<"), ("<Total type", "<All type"), ('unitsCode="cms">2', 'unitsCode="m">2'),
+    ],
+)  # fmt: skip
+def test_another_summary_is_refused(tmp_path: Path, change: tuple[str, str]) -> None:
+    refused(written(tmp_path / "mill_QRev.xml", SUMMARY.replace(*change)), START)

