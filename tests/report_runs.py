@@ -8,7 +8,7 @@ import pandas as pd
 
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import Site, build_site
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import sample_prior
 from vegglue.case.schema import Case
 from vegglue.flow.sensor import FlowFields
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING

@@ -9,9 +9,9 @@ from field_folders import SITE
 from reach import COARSE, block, write_reach
 from untrusted_imports import IMPORTS
 
+from vegglue.case.bed import read_raster, survey_levels
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
-from vegglue.case.terrain import read_raster, survey_levels
 from vegglue.errors import InputError, StorageError
 from vegglue.importers.site_file import read_site
 from vegglue.measurements.observations import read_observations

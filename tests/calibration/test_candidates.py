@@ -21,8 +21,8 @@ from vegglue.calibration.candidates import (
     patch_candidate,
     with_effect,
 )
-from vegglue.case.parts import Value
 from vegglue.case.schema import Case, EffectEntry, Parameter
+from vegglue.case.site_schema import Value
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.effects.library import library
 from vegglue.errors import InputError

@@ -5,12 +5,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vegglue.case.centreline import Centreline, along_and_across, centreline_of, heading_at, on_map
 from vegglue.case.config import load_case
-from vegglue.case.grid import build_grid, cell_stretch, curvature_of
+from vegglue.case.grid import (
+    Centreline,
+    along_and_across,
+    build_grid,
+    cell_stretch,
+    centreline_of,
+    curvature_of,
+    heading_at,
+    on_map,
+)
 from vegglue.case.gridded_site import build_site
-from vegglue.case.polygons import corners_of
 from vegglue.case.site_schema import CentrelineShape, Stretch
+from vegglue.case.zones import corners_of
 from vegglue.diagnosis.case_check import check_case
 from vegglue.diagnosis.channel_check import PatchAreaMissed
 from vegglue.diagnosis.flow_check import GridEndInBend

@@ -147,7 +147,7 @@ REFUSED = [
         "discharge: {west: 1}",
         "names the inflow `west`, which is not declared: known here are upstream.",
     ),
-    ("discharge: 2.66", "discharge: {}", "`experiments.low.discharge` says nothing about the inflow `upstream`"),
+    ("discharge: 2.66", "discharge: {}", "`experiments.low.discharge` lacks the inflow `upstream`"),
     ("law: manning", "law: maning", "`friction.classes.bed.law`"),
     ("k_s: 1.0", "n: 1.0", "`friction.classes.bank` expected the key `k_s`, which keulegan needs"),
     ("k_s: 1.0", "k_s: 1.0, n: 0.1", "expected no key `n` together with keulegan"),

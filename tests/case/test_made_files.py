@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vegglue.case.made_files import write_made
+from vegglue.case.resolved_config import write_made
 from vegglue.errors import InputError
 
 ADVICE = "give another file by --to"

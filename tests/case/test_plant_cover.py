@@ -9,9 +9,8 @@ from sound_case import ROWS, SOUND
 from vegglue.case.channel_geometry import channel_geometry
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import Site, build_site
-from vegglue.case.plant_cover import share_in_patch
-from vegglue.case.polygons import area_of, corners_of
 from vegglue.case.schema import Case
+from vegglue.case.zones import area_of, corners_of, share_in_patch
 from vegglue.diagnosis.channel_check import PatchHidden, remarks_on_patches
 from vegglue.flow.closures import drag
 from vegglue.flow.problem_setup import build_problem

@@ -1,13 +1,11 @@
-"""Priors: Sobol' points follow the distributions, and densities integrate to one over what quantiles cover."""
+"""Priors: quantiles and probabilities are those of the distributions, and Sobol' points follow them."""
 
 import numpy as np
 import pytest
 import scipy.stats
-from scipy.integrate import quad
 
-from vegglue.case.prior import log_prior, probability, quantile, sample_prior
-from vegglue.case.prior_tails import share_below
-from vegglue.case.schema import Parameter
+from vegglue.case.parameter_space import probability, quantile, sample_prior
+from vegglue.case.schema import Parameter, share_below
 
 PRIORS = {
     "uniform": Parameter(distribution="uniform", low=0.01, high=0.15, unit="-"),
@@ -56,20 +54,6 @@ def test_what_lies_below_a_value_is_what_scipy_says(name):
     expected = BY_SCIPY[name].cdf(values)
     np.testing.assert_allclose(probability(prior, values), expected, rtol=0, atol=1e-14)
     np.testing.assert_allclose([share_below(prior, float(x)) for x in values], expected, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", PRIORS)
-def test_density_is_the_derivative_of_the_distribution(name):
-    low, high = quantile(PRIORS[name], [0.1, 0.7])
-    share, _ = quad(lambda x: float(np.exp(log_prior({name: PRIORS[name]}, {name: x}))), low, high)
-    assert share == pytest.approx(0.6, rel=1e-7)
-
-
-def test_independent_priors_add_and_bounds_are_hard():
-    theta = {name: quantile(prior, [0.3, 0.6]) for name, prior in PRIORS.items()}
-    alone = [log_prior({name: prior}, theta) for name, prior in PRIORS.items()]
-    assert log_prior(PRIORS, theta) == pytest.approx(np.sum(alone, axis=0))
-    assert log_prior(PRIORS, theta | {"uniform": np.array([0.009, 0.02])})[0] == -np.inf
 
 
 def test_every_quarter_of_every_prior_gets_its_share_of_a_power_of_two():

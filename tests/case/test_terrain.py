@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from vegglue.case import terrain
-from vegglue.case.terrain import read_points, read_raster
+from vegglue.case import bed
+from vegglue.case.bed import read_points, read_raster
 from vegglue.errors import InputError
 
 HEADER = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 2\n"
@@ -51,6 +51,6 @@ def test_faulty_points_are_refused(tmp_path: Path, text: str, expected: str) -> 
 
 
 def test_no_more_of_a_raster_is_read_than_the_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(terrain, "LARGEST_DATA", 20)
+    monkeypatch.setattr(bed, "LARGEST_DATA", 20)
     with pytest.raises(InputError, match="expected at most 20 bytes, got more"):
         read_raster(written(tmp_path, HEADER + "1 2\n3 4\n"))

@@ -5,7 +5,7 @@ import pytest
 from sound_case import ROWS, SOUND, found_in, odd, read_case
 
 from vegglue.case.channel_geometry import expected_depth
-from vegglue.case.polygons import distance_to_outline
+from vegglue.case.zones import distance_to_outline
 from vegglue.diagnosis.channel_check import (
     BankLawHeld,
     BeyondGrid,

@@ -14,10 +14,9 @@ from verdicts import step
 from vegglue.calibration.candidates import with_effect
 from vegglue.calibration.noise import with_correlation, with_grid_error
 from vegglue.calibration.residual_screening import Screening
-from vegglue.case.frame import Frame
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, EffectEntry
-from vegglue.case.site_schema import CentrelineShape
+from vegglue.case.site_schema import CentrelineShape, Frame
 from vegglue.decision_constants import constants
 from vegglue.diagnosis import conclusion
 from vegglue.diagnosis.child_config import candidate_at

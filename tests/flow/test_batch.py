@@ -11,8 +11,7 @@ from reach import COARSE, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import Site, build_site
-from vegglue.case.parameter_space import parameters_at, sample_at
-from vegglue.case.prior import sample_prior, sobol_points
+from vegglue.case.parameter_space import parameters_at, sample_at, sample_prior, sobol_points
 from vegglue.case.schema import Case
 from vegglue.flow.anderson import minimise
 from vegglue.flow.batch import CLUSTER_SIZE, blend, put_rows, solve_members

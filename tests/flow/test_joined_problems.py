@@ -8,7 +8,7 @@ from reach import COARSE, write_reach
 from vegglue.calibration.candidates import candidates_of, cause_of
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import sample_prior
 from vegglue.flow.equations import residual
 from vegglue.flow.problem import Problem, joined
 from vegglue.flow.problem_setup import build_problem

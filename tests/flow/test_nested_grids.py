@@ -8,8 +8,7 @@ from reach import COARSE, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import Site, build_site
-from vegglue.case.parameter_space import parameters_at
-from vegglue.case.prior import sobol_points
+from vegglue.case.parameter_space import parameters_at, sobol_points
 from vegglue.case.schema import Case
 from vegglue.engine.model import ever_coarser
 from vegglue.flow import nested_grids

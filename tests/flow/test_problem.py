@@ -11,7 +11,7 @@ from reach import COARSE, write_reach
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import sample_prior
 from vegglue.case.schema import Numerics
 from vegglue.flow.problem import BedFriction, Problem
 from vegglue.flow.problem_setup import build_problem

@@ -9,7 +9,7 @@ from reach import COARSE, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import Site, build_site
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import sample_prior
 from vegglue.flow.problem import EMPTY, InflowSegment, Problem, crop
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import flow_fields

@@ -9,13 +9,11 @@ import pytest
 from reach import COARSE, said_to, write_reach
 
 import vegglue
-from vegglue.case.centreline import centreline_of
 from vegglue.case.config import load_case
-from vegglue.case.frame import Frame
-from vegglue.case.grid import build_grid, places_on_map
+from vegglue.case.grid import build_grid, centreline_of, places_on_map
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
-from vegglue.case.site_schema import CentrelineShape
+from vegglue.case.site_schema import CentrelineShape, Frame
 from vegglue.errors import InputError
 from vegglue.importers.measured_rows import Placement
 from vegglue.measurements.observations import read_observations

@@ -13,7 +13,7 @@ from reach import here, said_to
 
 import vegglue
 from vegglue.case.config import load_case
-from vegglue.case.frame import Frame
+from vegglue.case.site_schema import Frame
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError

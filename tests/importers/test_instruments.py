@@ -14,7 +14,7 @@ from matlab_files import profiler_mat, qrev_mat, riversurveyor_mat
 from scipy.io import savemat
 from untrusted_imports import IMPORTS
 
-from vegglue.case.frame import Frame
+from vegglue.case.site_schema import Frame
 from vegglue.errors import InputError
 from vegglue.importers import instruments
 from vegglue.importers.file_options import FileOptions

@@ -10,11 +10,11 @@ from field_folders import CHANNEL, JUNE, folder_of, import_of, imported, refusal
 
 import vegglue
 from vegglue.arrays import Array
-from vegglue.case.frame import Frame
 from vegglue.case.grid import Grid
 from vegglue.case.gridded_site import build_site
-from vegglue.case.polygons import area_of, in_polygon
 from vegglue.case.schema import Case
+from vegglue.case.site_schema import Frame
+from vegglue.case.zones import area_of, in_polygon
 from vegglue.cli.loop_commands import import_command
 from vegglue.errors import InputError
 from vegglue.importers.coordinate_systems import system_of_wkt

@@ -7,7 +7,7 @@ import pytest
 from field_folders import CHANNEL, JUNE, Imported, field_folder, folder_of, import_of, imported, refusal, refusal_of
 
 import vegglue
-from vegglue.case.frame import Frame
+from vegglue.case.site_schema import Frame
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.measured_rows import Placement, in_the_channel, read_rows

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from vegglue.case.config import load_case
-from vegglue.case.prior import quantile, sample_prior
+from vegglue.case.parameter_space import quantile, sample_prior
 from vegglue.case.schema import CanopyCorrection, Case, Parameter
 from vegglue.effects.plant_laws import baptist_chezy
 from vegglue.errors import InputError

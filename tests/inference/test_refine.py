@@ -13,8 +13,7 @@ from reach import COARSE, said_to, write_reach
 from refined_reach import FEW_MEMBERS, SolvedReach, solved_reach
 
 from vegglue.calibration.noise import Noise, covariance_of
-from vegglue.case.parameter_space import theta_at, z_at
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import sample_prior, theta_at, z_at
 from vegglue.engine.interface import linearise, predict
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError

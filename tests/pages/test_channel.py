@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
-from vegglue.case.polygons import corners_of
+from vegglue.case.zones import corners_of
 from vegglue.measurements.observations import read_observations
 from vegglue.pages.channel import REACH_OF_INTEREST_MARGIN, draw_channel
 

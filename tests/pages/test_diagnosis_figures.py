@@ -16,7 +16,7 @@ from matplotlib.patches import Polygon
 from matplotlib.transforms import Bbox
 
 from vegglue.case.config import load_case
-from vegglue.case.polygons import corners_of
+from vegglue.case.zones import corners_of
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.pages.diagnosis_figures import (
     MARKS,

@@ -17,8 +17,7 @@ from joblib import Parallel, delayed
 
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
-from vegglue.case.parameter_space import parameters_at, sobol_sample
-from vegglue.case.prior import sample_prior, sobol_points
+from vegglue.case.parameter_space import parameters_at, sample_prior, sobol_points, sobol_sample
 from vegglue.flow.batch import MEMBER_SLOTS, solve_members
 from vegglue.flow.equations import faces
 from vegglue.flow.march import advance, march

@@ -15,7 +15,7 @@ import numpy as np
 from instrument_files import winriver
 from scipy.interpolate import RegularGridInterpolator
 
-from vegglue.case.centreline import centreline_of, heading_at
+from vegglue.case.grid import centreline_of, heading_at
 from vegglue.case.schema import Case
 from vegglue.flow.sensor import FlowFields
 from vegglue.importers.measured_rows import Placement

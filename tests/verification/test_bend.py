@@ -8,8 +8,7 @@ from channels import GRAVITY, changed, discharge, even_geometry, make_problem, s
 from scipy.optimize import brentq
 
 from vegglue.arrays import Array
-from vegglue.case.centreline import centreline_of
-from vegglue.case.grid import Grid, cell_stretch, curvature_of
+from vegglue.case.grid import Grid, cell_stretch, centreline_of, curvature_of
 from vegglue.case.site_schema import CentrelineShape, Stretch
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.bed_laws import CHEZY

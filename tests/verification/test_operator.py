@@ -5,8 +5,7 @@ import pytest
 from channels import GRAVITY, changed, filled, make_problem, order, shown
 from scipy.integrate import cumulative_simpson
 
-from vegglue.case.centreline import Centreline, heading_at, on_map
-from vegglue.case.grid import Grid
+from vegglue.case.grid import Centreline, Grid, heading_at, on_map
 from vegglue.effects import bed_laws
 from vegglue.flow.equations import faces, push_momentum, residual, storage
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL

@@ -18,8 +18,8 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.case.case_effects import effect_of
 from vegglue.case.parameter_space import middle_value
-from vegglue.case.parts import Value
 from vegglue.case.schema import Case, EffectEntry, Parameter
+from vegglue.case.site_schema import Value
 from vegglue.decision_constants import constants
 from vegglue.effects.definition import Amplitude, Effect
 from vegglue.effects.identity import EffectIdentity

@@ -1,25 +1,203 @@
-"""Bed level of each cell, from the layers of a case: trapezoids, rasters and surveyed points."""
+"""Bed level of each cell, from the layers of a case: trapezoids, ESRI ASCII grids and scattered survey points."""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.case.grid import Grid, places_on_map
+from vegglue.case.grid import Grid, centres, places_on_map
 from vegglue.case.schema import Case
-from vegglue.case.site_schema import BedLayer, Trapezoid
-from vegglue.case.terrain import levels_at, read_raster, survey_levels
+from vegglue.case.size_limits import LARGEST_DATA
+from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
+
+# Keys of the header of an ESRI ASCII grid, in lower case.
+HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "nodata_value")
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Values (nx, ny) at centres x (nx,) and y (ny,), both rising [m]; NaN where the file has no data."""
+
+    x: Array
+    y: Array
+    size: float
+    values: Array
+
+
+def read_raster(path: Path) -> Raster:
+    """The raster in an ESRI ASCII grid: a header, then rows of values from north (largest y) to south.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        Naming file and line, if the header or the values are incomplete or no numbers.
+    """
+    lines, header, first = read_text(path, LARGEST_DATA).splitlines(), dict[str, float](), 0
+    while first < len(lines) and (words := lines[first].split()) and words[0].lower() in HEADER:
+        if len(words) != 2:
+            raise InputError(f"{path}, line {first + 1}: expected `{words[0]}` and one number, got {lines[first]!r}.")
+        header[words[0].lower()] = _number(path, first + 1, words[1], words[0])
+        first += 1
+    for key in ("ncols", "nrows", "cellsize"):
+        if header.get(key, 0.0) <= 0:
+            raise InputError(
+                f"{path}: expected an ESRI ASCII grid whose header has a `{key}` above 0, got {header or 'no header'}."
+            )
+        if key != "cellsize" and header[key] != int(header[key]):
+            raise InputError(
+                f"{path}: expected a whole number of cells as `{key}`, got {header[key]:g}; correct the header."
+            )
+    columns, rows, size = int(header["ncols"]), int(header["nrows"]), header["cellsize"]
+    corner = {}
+    for axis in "xy":
+        if f"{axis}llcorner" not in header and f"{axis}llcenter" not in header:
+            raise InputError(f"{path}: expected `{axis}llcorner` or `{axis}llcenter` in the header, got neither.")
+        corner[axis] = header.get(f"{axis}llcorner", header.get(f"{axis}llcenter", 0.0) - 0.5 * size)
+    found = [np.empty(0)]  # a line at a time, so that a large file takes little more than its numbers do
+    for number, line in enumerate(lines[first:], first + 1):
+        words = line.split()
+        try:
+            found.append(np.array(words, dtype=np.float64))
+        except ValueError as error:
+            word = str(error).rpartition(": ")[2]
+            raise InputError(f"{path}, line {number}: expected numbers, got {word}.") from None
+        if np.isinf(found[-1]).any():
+            word = words[int(np.isinf(found[-1]).argmax())]
+            raise InputError(f"{path}, line {number}: expected finite numbers, got {word!r}.")
+    values = np.concatenate(found)
+    if len(values) != rows * columns:
+        raise InputError(
+            f"{path}: expected nrows x ncols = {rows * columns} values after the header, got {len(values)}."
+        )
+    values = values.reshape(rows, columns)[::-1].T
+    values = np.where(values == header.get("nodata_value", -9999.0), np.nan, values)
+    return Raster(centres(corner["x"], size, columns), centres(corner["y"], size, rows), size, values)
+
+
+def levels_at(raster: Raster, x: Array, y: Array) -> Array:
+    """Levels [m] at x (nx, 1) and y (1, ny), or both (nx, ny): bilinear between the centres of the raster.
+
+    Constant in its outer half cell; NaN outside and next to missing data.
+    """
+    i, weight_x = _between(raster.x, x)
+    j, weight_y = _between(raster.y, y)
+    shape = np.broadcast_shapes(x.shape, y.shape)
+    level, share = np.zeros(shape), np.zeros(shape)
+    for di, wx in ((0, 1.0 - weight_x), (1, weight_x)):
+        for dj, wy in ((0, 1.0 - weight_y), (1, weight_y)):
+            weight = wx * wy
+            corner = raster.values[np.minimum(i + di, raster.x.size - 1), np.minimum(j + dj, raster.y.size - 1)]
+            known = ~np.isnan(corner)
+            level += np.where(known, weight * np.where(known, corner, 0.0), 0.0)
+            share += np.where(known, weight, 0.0)
+    return np.where(_covered(raster, x, y) & (share > 1.0 - 1e-9), level, np.nan)
+
+
+def nearest_at(raster: Raster, x: Array, y: Array) -> Array:
+    """Values of the raster cells in which x (nx, 1) and y (1, ny), or both (nx, ny), lie; NaN outside."""
+    i = np.clip(np.rint((x - raster.x[0]) / raster.size).astype(int), 0, raster.x.size - 1)
+    j = np.clip(np.rint((y - raster.y[0]) / raster.size).astype(int), 0, raster.y.size - 1)
+    return np.where(_covered(raster, x, y), raster.values[i, j], np.nan)
+
+
+def survey_levels(path: Path, x: Array, y: Array) -> Array:
+    """Levels [m] at x (nx, 1) and y (1, ny), or both (nx, ny): linear on the Delaunay triangles of surveyed points x,
+    y, z; NaN outside their hull.
+
+    Errors: InputError when the file cannot be read, or all points lie on one line.
+    """
+    from scipy.interpolate import LinearNDInterpolator  # late: a bed without points need not wait for it
+    from scipy.spatial import QhullError
+
+    points = read_points(path)
+    try:
+        surface = LinearNDInterpolator(points[:, :2], points[:, 2])
+    except (QhullError, ValueError):
+        raise InputError(
+            f"{path}: expected at least three points that are not on one line, got {len(points)}: add more."
+        ) from None
+    return np.asarray(surface(*np.broadcast_arrays(x, y)), dtype=np.float64)
+
+
+def read_points(path: Path) -> Array:
+    """The columns x, y, z of a CSV file, (points, 3) [m]. Errors: InputError for a missing column or number."""
+    lines = (line for line in read_text(path, LARGEST_DATA).splitlines() if line.strip() and not line.startswith("#"))
+    points = []
+    try:
+        rows = csv.DictReader(lines)
+        if any(name not in (rows.fieldnames or ()) for name in "xyz"):
+            raise InputError(f"{path}: expected a header with the columns x, y and z, got {rows.fieldnames}.")
+        for number, row in enumerate(rows, 1):
+            if any(text.strip() for text in row.get(None, ())):  # where `csv` keeps what goes beyond the heading
+                raise InputError(
+                    f"{path}, data row {number}: expected as many fields as in the heading, got more; write numbers "
+                    "with a decimal point."
+                )
+            points.append([_number(path, number, row[name], name) for name in "xyz"])
+    except csv.Error as error:
+        raise InputError(f"{path}: expected a CSV table, which cannot be read ({error}); check it.") from None
+    return np.array(points).reshape(-1, 3)
+
+
+def _number(path: Path, row: int, text: str | None, name: str) -> float:
+    try:
+        number = float(text or "")
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(f"{path}, data row {row}: column {name} expected a number in m, got {text!r}.")
+    return number
+
+
+def _between(centres: Array, at: Array) -> tuple[NDArray[np.int64], Array]:
+    """Index of the centre before each point, and the weight of the one after it."""
+    inside = np.clip(at, centres[0], centres[-1])
+    index = np.clip(np.searchsorted(centres, inside, side="right") - 1, 0, max(centres.size - 2, 0))
+    step = centres[1] - centres[0] if centres.size > 1 else 1.0
+    return index, (inside - centres[index]) / step
+
+
+def _covered(raster: Raster, x: Array, y: Array) -> NDArray[np.bool_]:
+    half = 0.5 * raster.size
+    along = (x >= raster.x[0] - half) & (x <= raster.x[-1] + half)
+    across = (y >= raster.y[0] - half) & (y <= raster.y[-1] + half)
+    return along & across
 
 
 def bed_levels(case: Case, grid: Grid, experiment: str = "") -> Array:
     """Bed level z_b (nx, ny) [m] at the centres of any grid, of each cell the last layer that has data: those of the
     case, then those of an experiment that is named and has its own.
 
-    Errors: InputError where no layer has data, or a file cannot be read.
+    A trapezoid has z_b = level - S (x - x_0) + s min(max(|y - axis| - b/2, 0), (B - b)/2), with floor b and top B [m].
+    Errors: InputError if no layer has data, or a file cannot be read.
     """
     bed = np.full((grid.x.size, grid.y.size), np.nan)
     own = case.experiments[experiment].bed if experiment in case.experiments else None
     for layer in (*case.bed, *(own or ())):
-        level = _layer_levels(layer, grid, case.grid.x[0])
+        level = np.array(np.nan)
+        if layer.trapezoid is not None:
+            channel = layer.trapezoid
+            out = np.abs(grid.y - channel.axis) - 0.5 * channel.bottom_width
+            reach = np.inf if channel.top_width is None else 0.5 * (channel.top_width - channel.bottom_width)
+            bank = channel.bank_slope * np.clip(out, 0.0, reach)
+            level = (channel.level - channel.bed_slope * (grid.x - case.grid.x[0]))[:, None] + bank[None, :]
+        elif layer.raster is not None:
+            level = levels_at(read_raster(layer.raster), *places_on_map(grid))
+        elif layer.points is not None:
+            level = survey_levels(layer.points, *places_on_map(grid))
         bed = np.where(np.isnan(level), bed, level)
     if np.isnan(bed).any():
         i, j = np.argwhere(np.isnan(bed))[0]
@@ -28,22 +206,3 @@ def bed_levels(case: Case, grid: Grid, experiment: str = "") -> Array:
             f"at x = {grid.x[i]:g}, y = {grid.y[j]:g} m: add a layer that covers them, or shrink `grid`."
         )
     return bed
-
-
-def _layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
-    if layer.trapezoid is not None:
-        return _trapezoid(layer.trapezoid, grid, upstream)
-    if layer.raster is not None:
-        return levels_at(read_raster(layer.raster), *places_on_map(grid))
-    if layer.points is not None:
-        return survey_levels(layer.points, *places_on_map(grid))
-    return np.full((grid.x.size, grid.y.size), np.nan)
-
-
-def _trapezoid(channel: Trapezoid, grid: Grid, upstream: float) -> Array:
-    """z_b = level - S (x - x_0) + s min(max(|y - axis| - b/2, 0), (B - b)/2), with floor b and top B [m]."""
-    out = np.abs(grid.y - channel.axis) - 0.5 * channel.bottom_width
-    reach = np.inf if channel.top_width is None else 0.5 * (channel.top_width - channel.bottom_width)
-    bank = channel.bank_slope * np.clip(out, 0.0, reach)
-    floor = channel.level - channel.bed_slope * (grid.x - upstream)
-    return floor[:, None] + bank[None, :]

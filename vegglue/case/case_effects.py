@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.parts import Value
 from vegglue.case.schema import Case
+from vegglue.case.site_schema import Value
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.definition import Effect, Stage
 from vegglue.effects.library import library
@@ -45,19 +45,9 @@ def active_effects(case: Case, experiment: str, theta: Theta, members: int) -> t
         if entry.experiments is None or experiment in entry.experiments
     ]
     here.sort(key=lambda pair: order.index(pair[0].name))
-    return tuple(
-        ActiveEffect(
-            effect,
-            {
-                parameter.name: value_of(entry.values.get(parameter.name, _default(parameter)), theta, members)
-                for parameter in effect.parameters
-            },
-            entry.sections,
-            entry.devices,
-        )
-        for effect, entry in here
-    )
-
-
-def _default(parameter: object) -> float:
-    return float(getattr(parameter, "default", getattr(parameter, "off", 0.0)))
+    found = []
+    for effect, entry in here:
+        defaults = {effect.amplitude.name: effect.amplitude.off} | {one.name: one.default for one in effect.shapes}
+        given = {name: value_of(entry.values.get(name, default), theta, members) for name, default in defaults.items()}
+        found.append(ActiveEffect(effect, given, entry.sections, entry.devices))
+    return tuple(found)

@@ -73,7 +73,10 @@ def _geometry(
     patch = np.where(np.isin(site.patch, present), site.patch, -1)
     cover = np.where(patch >= 0, site.cover, 0.0)
     front, edge, wake = _distances(patch, cover, grid)
-    bent = {} if grid.centreline is None else _bent(grid)
+    bent = {}
+    if grid.centreline is not None:
+        stretch = cell_stretch(grid)[..., None]
+        bent = {"stretch": stretch, "turning": curvature_of(grid)[:, None, None] / stretch}
     return ChannelGeometry(
         x=grid.x[:, None, None],
         y=grid.y[None, :, None],
@@ -97,20 +100,16 @@ def _geometry(
 
 
 def _section(site: Site) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Axis and half width of the floor (nx,) [m], and the cells that are floor (nx, ny)."""
-    floor = ~beyond_slope_break(_side_slope(site) > BANK_SLOPE, site.bed)
-    return *_extent(floor, site.grid.y, site.grid.dy), floor
+    """Axis and half width of the floor (nx,) [m], at least one cell, and the cells that are floor (nx, ny)."""
+    y, dy, floor = site.grid.y, site.grid.dy, ~beyond_slope_break(_side_slope(site) > BANK_SLOPE, site.bed)
+    first, last = floor.argmax(axis=1), floor.shape[1] - 1 - floor[:, ::-1].argmax(axis=1)
+    low, high = y[first] - 0.5 * dy, y[last] + 0.5 * dy
+    return 0.5 * (low + high), np.maximum(0.5 * (high - low), 0.5 * dy), floor
 
 
 def _side_slope(site: Site) -> Array:
     """|dz/dy| (nx, ny) [-]."""
     return np.abs(np.gradient(site.bed, site.grid.dy, axis=1))
-
-
-def _bent(grid: Grid) -> dict[str, Array]:
-    """Stretch and turning of a grid along a centreline."""
-    stretch = cell_stretch(grid)[..., None]
-    return {"stretch": stretch, "turning": curvature_of(grid)[:, None, None] / stretch}
 
 
 def rows_of(geometry: ChannelGeometry, south: int, north: int) -> ChannelGeometry:
@@ -123,31 +122,15 @@ def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGe
     cut = {
         name: getattr(geometry, name)[columns, rows]
         for name in (
-            "bed",
-            "offset",
-            "half_width",
-            "side_slope",
-            "bank",
-            "planted",
-            "front",
-            "edge",
-            "wake",
-            "patch",
+            "bed", "offset", "half_width", "side_slope", "bank", "planted", "front", "edge", "wake", "patch",
             "relative_stems",
         )
-    }
+    }  # fmt: skip
     if geometry.turning.size:
         cut |= {"stretch": geometry.stretch[columns, rows], "turning": geometry.turning[columns, rows]}
     along = {name: getattr(geometry, name)[columns] for name in ("x", "share_along")}
     whole = {name: getattr(geometry, name) for name in ("dx", "dy", "filter_width")}
     return ChannelGeometry(y=geometry.y[:, rows], **whole, **along, **cut)
-
-
-def _extent(floor: NDArray[np.bool_], y: Array, dy: float) -> tuple[Array, Array]:
-    """Axis and half width of the floor of each cross-section [m]; at least one cell."""
-    first, last = floor.argmax(axis=1), floor.shape[1] - 1 - floor[:, ::-1].argmax(axis=1)
-    low, high = y[first] - 0.5 * dy, y[last] + 0.5 * dy
-    return 0.5 * (low + high), np.maximum(0.5 * (high - low), 0.5 * dy)
 
 
 def _distances(patch: NDArray[np.int64], cover: Array, grid: Grid) -> tuple[Array, Array, Array]:

@@ -1,20 +1,30 @@
-"""Cases as files: YAML read with all that `extends` names, and refused in one sentence where it is wrong."""
+"""Cases as files: YAML read with all that `extends` names, and refused in one sentence if it is wrong or its parts
+disagree: every name used is declared and every declaration used, files and places exist.
+"""
 
 import os
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 from pydantic import ValidationError
 
-from vegglue.case.consistency import disagreement
-from vegglue.case.messages import KeyPath, Refusal, dotted, first_refusal, unknown_without_value
+from vegglue.case.messages import KeyPath, Refusal, dotted, first_refusal, nearest, unknown_without_value
 from vegglue.case.resolved_config import Tree
-from vegglue.case.safe_yaml import safe_yaml
-from vegglue.case.schema import Case
-from vegglue.case.size_limits import LARGEST_CONFIG, LONGEST_CHAIN
+from vegglue.case.safe_yaml import safe_yaml, yaml_problem
+from vegglue.case.schema import Case, Experiment, Observation, share_below
+from vegglue.case.site_schema import (
+    COEFFICIENT_OF,
+    BedLayer,
+    FrictionClass,
+    Interval,
+    Value,
+    VegetationOverride,
+    VegetationType,
+)
+from vegglue.case.size_limits import LARGEST_CONFIG, LARGEST_DATA, LONGEST_CHAIN
 from vegglue.case.text_files import read_text
-from vegglue.case.yaml_problems import yaml_problem
 from vegglue.errors import InputError, shown_path
 
 # Keys whose value is a path, relative to the file it is written in.
@@ -27,26 +37,58 @@ DECLARING = ("law", "distribution")
 SITE_FILES = ("site.yaml", "site.json")
 KINDS_OF_YAML = {type(None): "an empty file", list: "a list", str: "a text"}
 COMPILER_SETTINGS = ".numba_config.yaml"
+# Names that dimensions of the result files have, and a variable in them must not.
+DIMENSIONS = ("chain", "draw", "member", "station", "experiment", "section")
+# Share of its prior [-] at which a quantity that must be positive may be 0 or less: no ensemble is that large.
+LEAST_PROBABILITY = 1e-6
 
 
 def load_case(path: Path | str, trust: bool = False) -> Case:
     """The case in a YAML file, with all it extends.
 
-    trust: whether a Python file or a command that the case names may be run, and settings of the folder may say where
-    compiled code lies. Errors: InputError, which says what is wrong, where, and what to do.
+    Parameters
+    ----------
+    path : Path or str
+    trust : bool
+        Whether a Python file or a command that the case names may be run, and settings of the folder may choose where
+        compiled code lies.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        With what is wrong, where, and what to do.
     """
     path = Path(path)
-    if not trust:
-        _refuse_settings_of_folder()
+    # The compiler takes settings from the working folder, which may be a stranger's, and runs code from where they say.
+    if not trust and Path(COMPILER_SETTINGS).exists():
+        raise InputError(
+            f"{COMPILER_SETTINGS}: can make numba run code that lies where it says: remove it, or add --trust if you "
+            "trust it."
+        )
     layers = _layers(path, ())
-    _refuse_site_file(*layers[0])
+    file, layer = layers[0]
+    if file.name in SITE_FILES and "channel" in layer:
+        raise InputError(
+            f"{shown_path(file)}: expected a config, got the site file of a folder of measurements: "
+            f"`vegglue import {shown_path(file.parent)}` makes a config of it."
+        )
     for file, layer in layers:
         if (refusal := unknown_without_value(layer)) is not None:
             raise _input_error([(file, layer)], refusal)
     tree: Tree = {}
     for _, layer in reversed(layers):
         tree = _merged(tree, layer)
-    tree = _with_one_inflow_named(tree) | {"source": Path(os.path.realpath(path))}
+    # With a single inflow, `discharge: 2.66` means all of it: {inflow: 2.66}.
+    if isinstance(tree.get("inflows"), dict) and len(tree["inflows"]) == 1:
+        (inflow,) = tree["inflows"]
+        tree |= _all_named(tree, inflow)
+        if isinstance(tree.get("validation"), dict):
+            tree |= {"validation": tree["validation"] | _all_named(tree["validation"], inflow)}
+    tree |= {"source": Path(os.path.realpath(path))}
     try:
         case = Case.model_validate(tree)
     except ValidationError as error:
@@ -65,26 +107,6 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
     if refusal is not None:
         raise _input_error(layers, refusal)
     return case
-
-
-def _refuse_settings_of_folder() -> None:
-    """The compiler takes settings from the folder the user stands in, which may be a stranger's, and runs what lies
-    where they say. Errors: InputError when there are any.
-    """
-    if Path(COMPILER_SETTINGS).exists():
-        raise InputError(
-            f"{COMPILER_SETTINGS}: can make numba run code that lies where it says: remove it, or add --trust if you "
-            "trust it."
-        )
-
-
-def _refuse_site_file(path: Path, tree: Tree) -> None:
-    """Errors: InputError for the site file of a folder of measurements, whose keys are not those of a case."""
-    if path.name in SITE_FILES and "channel" in tree:
-        raise InputError(
-            f"{shown_path(path)}: expected a config, got the site file of a folder of measurements: "
-            f"`vegglue import {shown_path(path.parent)}` makes a config of it."
-        )
 
 
 def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
@@ -107,8 +129,12 @@ def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
 
 def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
     """Keys and values of a YAML file; above: the files whose `extends` led to it. Errors: InputError."""
-    named = f"it is named by `extends` in {shown_path(above[-1])}, check the path" if above else _way_from(path)
-    text = read_text(path, LARGEST_CONFIG, named)
+    advice = "check the path"
+    if above:
+        advice = f"it is named by `extends` in {shown_path(above[-1])}, check the path"
+    elif any(os.path.isfile(path / name) for name in SITE_FILES):  # which no name is too long for
+        advice = f"`vegglue import {shown_path(path)}` makes a config of that folder"
+    text = read_text(path, LARGEST_CONFIG, advice)
     try:
         tree = safe_yaml(text)
     except yaml.YAMLError as error:
@@ -117,13 +143,6 @@ def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
         got = KINDS_OF_YAML.get(type(tree), "a single value")
         raise InputError(f"{shown_path(path)}: expected keys and values (`name: ...`), got {got}; correct the file.")
     return tree
-
-
-def _way_from(path: Path) -> str:
-    """What to do about a config that cannot be read: a folder of measurements has to be imported."""
-    if any(os.path.isfile(path / name) for name in SITE_FILES):  # which no name is too long for
-        return f"`vegglue import {shown_path(path)}` makes a config of that folder"
-    return "check the path"
 
 
 def _with_full_paths(tree: Any, folder: Path) -> Any:
@@ -149,43 +168,207 @@ def _merged(base: Any, layer: Any) -> Any:
     return {key: value for key, value in both.items() if value is not None}
 
 
-def _with_one_inflow_named(tree: Tree) -> Tree:
-    """With a single inflow, `discharge: 2.66` means all of it: write it as {inflow: 2.66}."""
-    inflows = tree.get("inflows")
-    if not (isinstance(inflows, dict) and len(inflows) == 1):
-        return tree
-    (inflow,) = inflows
-    named = _all_named(tree, inflow)
-    if isinstance(tree.get("validation"), dict):
-        named |= {"validation": tree["validation"] | _all_named(tree["validation"], inflow)}
-    return tree | named
-
-
 def _all_named(tree: Tree, inflow: str) -> Tree:
-    experiments = tree.get("experiments")
-    if not isinstance(experiments, dict):
+    """The experiments of a tree with discharges by inflow."""
+    if not isinstance(tree.get("experiments"), dict):
         return {}
-    return {"experiments": {name: _named(experiment, inflow) for name, experiment in experiments.items()}}
-
-
-def _named(experiment: Any, inflow: str) -> Any:
-    if not isinstance(experiment, dict) or isinstance(experiment.get("discharge"), dict | None):
-        return experiment
-    return experiment | {"discharge": {inflow: experiment["discharge"]}}
+    named = {
+        name: one | {"discharge": {inflow: one["discharge"]}}
+        for name, one in tree["experiments"].items()
+        if isinstance(one, dict) and not isinstance(one.get("discharge"), dict | None)
+    }
+    return {"experiments": tree["experiments"] | named}
 
 
 def _input_error(layers: list[tuple[Path, Tree]], refusal: Refusal) -> InputError:
-    """The sentence, with the file that says (or should say) what is refused: the first of those that say most of it."""
-    path, _ = max(layers, key=lambda layer: _depth(layer[1], refusal.place))
+    """The message, with the file that has (or lacks) what is refused: the first of those with most of its keys."""
+
+    def depth(tree: Any) -> int:
+        for depth, key in enumerate(refusal.place):
+            keys = tree if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()
+            if key not in keys:
+                return depth
+            tree = tree[key]
+        return len(refusal.place)
+
+    path, _ = max(layers, key=lambda layer: depth(layer[1]))
     end = "" if refusal.complaint.endswith(("?", ".")) else "."
     return InputError(f"{shown_path(path)}: `{dotted(refusal.place)}` {refusal.complaint}{end}")
 
 
-def _depth(tree: Any, place: KeyPath) -> int:
-    """How many keys of a place a tree has."""
-    for depth, key in enumerate(place):
-        keys = tree if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()
-        if key not in keys:
-            return depth
-        tree = tree[key]
-    return len(place)
+def disagreement(case: Case) -> Refusal | None:
+    """The first thing in a case that does not agree with the rest of it; None when all agrees."""
+    checks = (_names_and_files, _effects, _values_and_ranges)
+    return next((refusal for check in checks for refusal in check(case)), None)
+
+
+def values(case: Case) -> Iterator[tuple[KeyPath, Value | None, bool]]:
+    """Every number that may be a parameter: where it stands, what stands there, and whether it must be positive."""
+    for name, friction_class in case.friction.classes.items():
+        yield from _coefficients(("friction", "classes", name), friction_class)
+    if case.friction.walls is not None:
+        yield from _coefficients(("friction", "walls"), case.friction.walls)
+    owners: list[tuple[KeyPath, Mapping[str, VegetationType | VegetationOverride]]]
+    owners = [(("plants",), case.plants.stands), *((at, one.stands) for at, one in _experiments(case))]
+    for place, stands in owners:
+        for name, stand in stands.items():
+            for key in ("phi", "canopy_height", "bare_chezy"):
+                yield (*place, "stands", name, key), getattr(stand, key), True
+    for at, experiment in _experiments(case):
+        for inflow, discharge in experiment.discharge.items():
+            yield (*at, "discharge", inflow), discharge, True
+        yield (*at, "level"), experiment.level, False
+    yield ("eddy_viscosity",), case.eddy_viscosity, True
+    for name, entry in case.effects.items():
+        for key, value in entry.values.items():
+            yield ("effects", name, "values", key), value, False
+
+
+def _experiments(case: Case) -> Iterator[tuple[KeyPath, Experiment]]:
+    """Every experiment and where it stands: those that are calibrated to, then those of the validation."""
+    yield from ((("experiments", name), one) for name, one in case.experiments.items())
+    if case.validation is not None:
+        yield from ((("validation", "experiments", name), one) for name, one in case.validation.experiments.items())
+
+
+def _observations(case: Case) -> Iterator[tuple[KeyPath, Observation, Iterable[str]]]:
+    """Every observation, where it stands, and the names of the experiments that it may be of."""
+    yield from ((("observations", i), one, case.experiments) for i, one in enumerate(case.observations))
+    if case.validation is not None:
+        unseen = case.validation.experiments
+        for i, one in enumerate(case.validation.observations):
+            yield ("validation", "observations", i), one, unseen
+
+
+def _coefficients(place: KeyPath, law: FrictionClass) -> Iterator[tuple[KeyPath, Value | None, bool]]:
+    for key in COEFFICIENT_OF.values():
+        yield (*place, key), getattr(law, key), True
+
+
+def _unknown(place: KeyPath, word: str, known: Iterable[str], what: str) -> Iterator[Refusal]:
+    if word not in (names := list(known)):
+        yield Refusal(place, f"names the {what} `{word}`, which is not declared: {nearest(word, names)}")
+
+
+def _names_and_files(case: Case) -> Iterator[Refusal]:
+    """Every name is declared, and every file is there and not too large."""
+    classes, stands = case.friction.classes, case.plants.stands
+    yield from _unknown(("friction", "default"), case.friction.default, classes, "friction class")
+    for i, zone in enumerate(case.friction.zones):
+        for word in [zone.friction_class] if zone.friction_class else (zone.values or {}).values():
+            yield from _unknown(("friction", "zones", i), word, classes, "friction class")
+    patches = [patch.name for patch in case.plants.patches]
+    for i, patch in enumerate(case.plants.patches):
+        yield from _unknown(("plants", "patches", i, "stand"), patch.stand, stands, "stand")
+        if patch.name in patches[:i]:
+            yield Refusal(("plants", "patches", i, "name"), f"is `{patch.name}` a second time: rename one of them")
+    for at, experiment in _experiments(case):
+        for inflow in experiment.discharge:
+            yield from _unknown((*at, "discharge"), inflow, case.inflows, "inflow")
+        for inflow in case.inflows.keys() - experiment.discharge.keys():
+            yield Refusal((*at, "discharge"), f"lacks the inflow `{inflow}`: add it")
+        for stand in experiment.stands:
+            yield from _unknown((*at, "stands"), stand, stands, "stand")
+        for present in experiment.plants if isinstance(experiment.plants, tuple) else ():
+            yield from _unknown((*at, "plants"), present, patches, "patch")
+    for at, observation, experiments in _observations(case):
+        if observation.experiment is not None:
+            yield from _unknown((*at, "experiment"), observation.experiment, experiments, "experiment")
+    for name, entry in case.effects.items():
+        for word in entry.experiments or ():
+            yield from _unknown(("effects", name, "experiments"), word, case.experiments, "experiment")
+    if case.canopy_correction is not None:
+        yield from _unknown(("canopy_correction", "stand"), case.canopy_correction.stand, stands, "stand")
+    beds: list[tuple[KeyPath, Iterable[BedLayer]]] = [((), case.bed)]
+    beds += [(at, experiment.bed or ()) for at, experiment in _experiments(case)]
+    named: list[tuple[KeyPath, Path | None]] = []
+    for at, layers in beds:
+        for i, layer in enumerate(layers):
+            named += [((*at, "bed", i, "raster"), layer.raster), ((*at, "bed", i, "points"), layer.points)]
+    named += [(("friction", "zones", i, "raster"), zone.raster) for i, zone in enumerate(case.friction.zones)]
+    named += [((*at, "file"), observation.file) for at, observation, _ in _observations(case)]
+    named += [(("survey", "file"), case.survey.file)] if case.survey else []
+    named += [(("effect_file",), case.effect_file)]
+    for place, file in named:
+        if file is None:
+            continue
+        if not os.path.isfile(file):  # False for every name that no file can have, where a Path would raise
+            yield Refusal(place, f"expected an existing file, got {shown_path(file)}: put it there or correct the path")
+        elif os.path.getsize(file) > LARGEST_DATA:
+            yield Refusal(place, f"expected a file of at most {LARGEST_DATA:,} bytes, got more: make it smaller")
+
+
+def _effects(case: Case) -> Iterator[Refusal]:
+    """Effects and their parameters by name; none without its amplitude, and no number outside what it may be."""
+    if not case.effects and case.effect_file is None:
+        return
+    from vegglue.effects.library import library  # which needs numpy
+
+    known = library(case.effect_file)
+    for key, entry in case.effects.items():
+        place: KeyPath = ("effects", key)
+        name = entry.effect or key
+        yield from _unknown(place if entry.effect is None else (*place, "effect"), name, known, "effect")
+        effect = known[name]
+        parameters = {parameter.name: parameter for parameter in effect.parameters}
+        for word, value in entry.values.items():
+            at: KeyPath = (*place, "values", word)
+            if word not in parameters:
+                yield Refusal(at, f"is no parameter of this effect: {nearest(word, list(parameters))}")
+            low, high, unit = parameters[word].low, parameters[word].high, parameters[word].unit
+            if isinstance(value, str) and value in case.parameters:
+                prior = case.parameters[value]
+                if share_below(prior, low) > LEAST_PROBABILITY or share_below(prior, high) < 1.0 - LEAST_PROBABILITY:
+                    complaint = f"may leave {low:g} to {high:g} {unit}, where `{dotted(at)}` must lie: bound it"
+                    yield Refusal(("parameters", value), complaint)
+            elif not isinstance(value, str) and not low <= value <= high:
+                yield Refusal(at, f"expected a number from {low:g} to {high:g} {unit}, got {value:g}")
+        if effect.amplitude.name not in entry.values:
+            complaint = f"lacks `{effect.amplitude.name}`, without which {name} is off: add it"
+            yield Refusal((*place, "values"), complaint)
+        if effect.stage != "sensor" and (entry.sections or entry.devices):
+            yield Refusal(place, f"names sections or devices, but {name} acts on the flow: use `experiments`")
+
+
+def _values_and_ranges(case: Case) -> Iterator[Refusal]:
+    """Quantities are positive if they must be, every parameter is used, ranges lie in the grid, and a command is asked
+    for nothing that it does not give.
+    """
+    for place, value, positive in values(case):
+        if isinstance(value, str):
+            yield from _unknown(place, value, case.parameters, "parameter")
+            if positive and share_below(case.parameters[value], 0.0) >= LEAST_PROBABILITY:
+                complaint = f"may fall to 0 or below, but `{dotted(place)}` must be above 0: raise its lower bound"
+                yield Refusal(("parameters", value), complaint)
+        elif value is not None and positive and value <= 0:
+            yield Refusal(place, f"expected a number above 0, got {value:g}")
+    used = {value for _, value, _ in values(case) if isinstance(value, str)}
+    for name in case.parameters:
+        if name in DIMENSIONS:
+            complaint = f"has one of the names {', '.join(DIMENSIONS)}, kept for results: rename it"
+            yield Refusal(("parameters", name), complaint)
+        if name not in used and case.engine is None:  # a command may know what the built-in solver does not
+            complaint = "is declared but used nowhere: name it where its value belongs, or remove it"
+            yield Refusal(("parameters", name), complaint)
+    ranges: list[tuple[KeyPath, Interval | None, Interval]] = [
+        (("inflows", name, "range"), inflow.range, case.grid.y if inflow.side == "west" else case.grid.x)
+        for name, inflow in case.inflows.items()
+    ]
+    ranges.append((("outlet", "range"), case.outlet.range, case.grid.y))
+    if case.simulate.fields is not None:
+        ranges.append((("simulate", "fields", "x"), case.simulate.fields.x, case.grid.x))
+    for place, part, (low, high) in ranges:
+        if part is not None and (part[0] < low or part[1] > high):
+            got = f"got {part[0]:g} to {part[1]:g} m"
+            yield Refusal(place, f"expected a range within {low:g} to {high:g} m, {got}")
+    if case.infer.behavioural is not None and case.infer.likelihood == "gaussian":
+        complaint = "goes with an informal likelihood, not with gaussian: remove it"
+        yield Refusal(("infer", "behavioural"), complaint)
+    if case.engine is None:
+        return
+    for name, path in case.engine.files.items():
+        if not os.path.exists(path):
+            complaint = f"expected an existing file or folder, got {shown_path(path)}: put it there or correct the path"
+            yield Refusal(("engine", "files", name), complaint)
+    if case.simulate.fields is not None:
+        yield Refusal(("simulate", "fields"), "cannot be kept of a command, which predicts at stations only: remove it")

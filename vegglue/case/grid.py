@@ -1,13 +1,119 @@
-"""The regular grid of a site: centres of its cells, and where these lie on the map."""
+"""The regular grid of a site, and the centreline that it may follow, to and from which places on the map are mapped.
+
+    x = X(s) - n sin(theta), y = Y(s) + n cos(theta)
+
+(X, Y) a point of the centreline s from its beginning, theta the direction it heads in there, n positive to its left.
+Before its beginning and beyond its end the centreline runs on straight.
+"""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.centreline import Centreline, centreline_of, heading_at, on_map
 from vegglue.case.schema import Case
+from vegglue.case.site_schema import CentrelineShape
 from vegglue.errors import InputError, shown_path
+
+# An arc is held by nodes so far apart [radians]: cubics between them miss it by 4e-9 of its radius.
+NODE_STEP = np.radians(2.0)
+# Nodes of a centreline of straight parts and arcs at least [-], so that the nearest node is on the right part of it.
+FEWEST_NODES = 500
+# Nodes for each pair of points of a centreline through points: chosen, not measured; lengths are then right to 1e-6.
+NODES_PER_PAIR = 50
+# Steps of Newton from the nearest node [-]: two are enough where nodes are as near as these.
+STEPS = 6
+# Distances from places to nodes held at once [-]: 80 MB, where a survey of a long reach has many of both.
+DISTANCES_AT_ONCE = 10_000_000
+
+
+@dataclass(frozen=True)
+class Centreline:
+    """Nodes of a centreline: s from its beginning [m], X and Y on the map [m], direction theta from the map's x axis,
+    counterclockwise [radians].
+    """
+
+    s: Array
+    x: Array
+    y: Array
+    heading: Array
+
+
+def centreline_of(shape: CentrelineShape) -> Centreline:
+    """The centreline a case describes: through points, or of straight parts and arcs.
+
+    Through points it is a natural cubic spline, its parameter the length of the polygon. Straight parts and arcs follow
+    each other, in pieces whose chords are ds sin(dtheta/2) / (dtheta/2) long.
+    """
+    if shape.points is not None:
+        from scipy.interpolate import CubicSpline  # late: a straight grid need not wait for it
+
+        points = np.array(shape.points, dtype=np.float64)
+        at = _summed(0.0, np.hypot(*np.diff(points, axis=0).T))
+        curve = CubicSpline(at, points, bc_type="natural")
+        t = np.concatenate([*(np.linspace(*pair, NODES_PER_PAIR, endpoint=False) for pair in pairwise(at)), at[-1:]])
+        speed, middle = (np.hypot(*curve(places, 1).T) for places in (t, 0.5 * (t[1:] + t[:-1])))
+        run = np.diff(t) * (speed[:-1] + 4.0 * middle + speed[1:]) / 6.0  # Simpson's rule
+        x, y = curve(t).T
+        return Centreline(_summed(0.0, run), x, y, np.unwrap(np.arctan2(*curve(t, 1).T[::-1])))
+    parts = shape.parts or ()
+    lengths, turns = np.array([part.run for part in parts]), np.radians([part.angle or 0.0 for part in parts])
+    pieces = np.ceil(np.maximum(np.abs(turns) / NODE_STEP, lengths / lengths.sum() * FEWEST_NODES)).astype(int)
+    length, turn = np.repeat(lengths / pieces, pieces), np.repeat(turns / pieces, pieces)
+    theta = _summed(np.radians(shape.heading), turn)
+    chord, towards = length * np.sinc(turn / (2.0 * np.pi)), theta[:-1] + 0.5 * turn
+    x, y = (_summed(first, chord * part(towards)) for first, part in zip(shape.start, (np.cos, np.sin), strict=True))
+    return Centreline(_summed(0.0, length), x, y, theta)
+
+
+def heading_at(line: Centreline, s: Array) -> Array:
+    """theta(s) [radians]."""
+    return np.interp(s, line.s, line.heading)
+
+
+def on_map(line: Centreline, s: Array, n: Array) -> tuple[Array, Array]:
+    """x and y on the map [m] of places s along the centreline and n to its left [m]."""
+    x, y, theta = *_position(line, s), heading_at(line, s)
+    return x - n * np.sin(theta), y + n * np.cos(theta)
+
+
+def along_and_across(line: Centreline, x: Array, y: Array) -> tuple[Array, Array]:
+    """s and n [m] of places on the map: those of the nearest point of the centreline, where p - (X, Y) is normal to it.
+
+    Newton's steps ds = (p - (X, Y)) . t / (1 - n kappa), from the nearest node.
+    """
+    size = max(DISTANCES_AT_ONCE // line.x.size, 1)
+    nearest = [
+        np.hypot(x[i : i + size, None] - line.x, y[i : i + size, None] - line.y).argmin(axis=1)
+        for i in range(0, x.size, size)
+    ]
+    s, n = line.s[np.concatenate([np.empty(0, np.int64), *nearest])], np.zeros_like(x)
+    curvature = np.gradient(line.heading, line.s)
+    for _ in range(STEPS):
+        centre_x, centre_y = _position(line, s)
+        theta = heading_at(line, s)
+        ahead = (x - centre_x) * np.cos(theta) + (y - centre_y) * np.sin(theta)
+        n = (y - centre_y) * np.cos(theta) - (x - centre_x) * np.sin(theta)
+        turning = np.interp(s, line.s, curvature, left=0.0, right=0.0)
+        s = s + ahead / np.maximum(1.0 - n * turning, 0.5)
+    return s, n
+
+
+def _position(line: Centreline, s: Array) -> tuple[Array, Array]:
+    """X(s) and Y(s): cubics between the nodes, which keep their directions."""
+    from scipy.interpolate import CubicHermiteSpline  # late: a straight grid need not wait for it
+
+    inside = np.clip(s, line.s[0], line.s[-1])
+    beyond, theta = s - inside, heading_at(line, s)
+    x = CubicHermiteSpline(line.s, line.x, np.cos(line.heading))(inside)
+    y = CubicHermiteSpline(line.s, line.y, np.sin(line.heading))(inside)
+    return x + beyond * np.cos(theta), y + beyond * np.sin(theta)
+
+
+def _summed(first: float, steps: Array) -> Array:
+    return np.concatenate([[first], first + np.cumsum(steps)])
+
 
 # Length of a cell over that on the centreline below which a grid is refused [-]: the centre of the bend is then near,
 # where cells end in a point. Chosen, not measured.

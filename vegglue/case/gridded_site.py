@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.case.bed import bed_levels
 from vegglue.case.grid import Grid, build_grid
-from vegglue.case.plant_cover import share_in_patch
 from vegglue.case.schema import Case
-from vegglue.case.zones import friction_classes
+from vegglue.case.zones import friction_classes, share_in_patch
 
 # Nearer to an edge of its cell than this share of it [-], a place is on that edge: rounding errors are far smaller.
 ON_AN_EDGE = 1e-6
@@ -19,11 +18,22 @@ ON_AN_EDGE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """A site on its grid. bed: level of the bed (nx, ny) [m]; friction_class: index into class_names (nx, ny); patch:
-    index into the patches of the case (nx, ny), of the one that covers most of a cell, -1 without plants; cover: share
-    of a cell that plants cover (nx, ny) [-]; own: the site in experiments with another bed.
+    """A site on its grid. Compared by identity, so that what is computed of a site can be cached.
 
-    Compared by identity, so that what is computed of a site can be cached.
+    Attributes
+    ----------
+    grid : Grid
+    bed : array (nx, ny)
+        Level of the bed [m].
+    friction_class : array (nx, ny)
+        Index into class_names.
+    class_names : tuple of str
+    patch : array (nx, ny)
+        Index into the patches of the case, of the one that covers most of a cell, -1 without plants.
+    cover : array (nx, ny)
+        Share of a cell that plants cover [-].
+    own : mapping of str to Site
+        The site in experiments with another bed.
     """
 
     grid: Grid
@@ -46,31 +56,36 @@ def in_experiment(site: Site, experiment: str) -> Site:
 
 
 def build_site(case: Case) -> Site:
-    """The site of a case; where patches overlap, the later one counts.
+    """The site of a case on its grid.
 
-    Errors: InputError when a cell has no bed level or a file cannot be read.
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    Site
+        Of patches that overlap the later one counts; those that share a cell lie side by side in it.
+
+    Raises
+    ------
+    InputError
+        If a cell has no bed level, or a file cannot be read.
     """
     grid = build_grid(case)
-    plants = _plants(case, grid)
-    own = {name: _with_bed(case, grid, plants, name) for name, one in case.experiments.items() if one.bed is not None}
-    return replace(_with_bed(case, grid, plants), own=own)
-
-
-def _plants(case: Case, grid: Grid) -> tuple[NDArray[np.int64], Array]:
-    """Patch and cover of each cell (nx, ny). Patches that share a cell are taken to lie side by side in it."""
     shape = grid.x.size, grid.y.size
     patch, cover = np.full(shape, -1, dtype=np.int64), np.zeros(shape)
     for index, area in enumerate(case.plants.patches):
         share = share_in_patch(case, area, grid)
         cover = np.minimum(cover + share, 1.0)
         patch[(share > 0.0) & (share >= cover - share)] = index
-    return patch, cover
 
+    def with_bed(experiment: str = "") -> Site:
+        bed = bed_levels(case, grid, experiment)
+        return Site(grid, bed, friction_classes(case, grid, bed), tuple(case.friction.classes), patch, cover)
 
-def _with_bed(case: Case, grid: Grid, plants: tuple[NDArray[np.int64], Array], experiment: str = "") -> Site:
-    """The site with the bed of the case or of an experiment, and the friction classes that follow from its slopes."""
-    bed = bed_levels(case, grid, experiment)
-    return Site(grid, bed, friction_classes(case, grid, bed), tuple(case.friction.classes), *plants)
+    own = {name: with_bed(name) for name, one in case.experiments.items() if one.bed is not None}
+    return replace(with_bed(), own=own)
 
 
 def cells_at(site: Site, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

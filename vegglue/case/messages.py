@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, get_args, get_origin
 
-from vegglue.case.parts import Part
 from vegglue.case.schema import Case
+from vegglue.case.site_schema import Part
 from vegglue.case.text_files import case_name
 
 MOST_NAMED = 30  # words that one sentence lists; no part of a case has more keys
@@ -37,7 +37,14 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     expected = expected_in_words(problem)
     for said, meant in (("greater", "a number greater"), ("less", "a number less")):
         expected = expected.replace(said, meant)
-    advice = _how_numbers_are_written(got) if isinstance(got, str) and "number" in expected else ""
+    advice = ""
+    if isinstance(got, str) and "number" in expected:
+        if re.fullmatch(r"[-+]?\d+,\d+.*", got):
+            advice = "; write decimals with a point"
+        elif re.fullmatch(r"[-+]?[\d.]+\s*[A-Za-z%].*", got):
+            advice = "; write the number alone: a case is in SI units"
+        elif re.fullmatch(r"[-+\d.eE]+", got):
+            advice = "; write numbers without quotes"
     if kind == "string_pattern_mismatch":  # of the name of a case, which is that of a folder
         return Refusal(place, f"expected {_meaning(place)[2:-1]} alone, got {_shown(got)}; write {case_name(got)}")
     if kind == "string_type":
@@ -57,7 +64,9 @@ def expected_in_words(problem: Mapping[str, Any]) -> str:
 
 def unknown_without_value(tree: Mapping[str, Any], above: KeyPath = ()) -> Refusal | None:
     """The first key of a tree that has no value and that no part of a case knows; null only takes known keys away."""
-    known = None if _names_are_free(above) else _keys(above)
+    annotation = _annotation_at(above)
+    free = any(get_origin(part) is dict for part in (annotation, *_alternatives(annotation)))
+    known = None if free else _keys(above)  # free: names of the user's own, such as those of experiments
     for key, value in tree.items():
         if isinstance(value, Mapping):
             found = unknown_without_value(value, (*above, key))
@@ -66,15 +75,6 @@ def unknown_without_value(tree: Mapping[str, Any], above: KeyPath = ()) -> Refus
         elif value is None and known and key not in known:
             return Refusal((*above, key), f"is not a known key: {nearest(str(key), known)}")
     return None
-
-
-def _how_numbers_are_written(got: str) -> str:
-    """The end of a sentence about a text where a number was expected."""
-    if re.fullmatch(r"[-+]?\d+,\d+.*", got):
-        return "; write decimals with a point"
-    if re.fullmatch(r"[-+]?[\d.]+\s*[A-Za-z%].*", got):
-        return "; write the number alone: a case is in SI units"
-    return "; write numbers without quotes" if re.fullmatch(r"[-+\d.eE]+", got) else ""
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -145,12 +145,6 @@ def _annotation_at(place: KeyPath) -> Any:
 
 def _fields_at(place: KeyPath) -> dict[str, Any]:
     return _fields(_annotation_at(place))
-
-
-def _names_are_free(place: KeyPath) -> bool:
-    """Whether the keys there are names of the user's own, such as those of experiments."""
-    annotation = _annotation_at(place)
-    return any(get_origin(part) is dict for part in (annotation, *_alternatives(annotation)))
 
 
 def _alternatives(annotation: Any) -> list[Any]:

@@ -1,14 +1,22 @@
-"""A case as one text without `extends`, and the hashes that tie results to it."""
+"""A case as one text without `extends`, the hashes that tie results to it, and configs that vegglue writes among a
+user's own: it replaces what it wrote itself, and nothing else.
+
+A written config ends with the digests of itself and of the tables written with it. A file without one, or with another
+content, was made or edited by hand.
+"""
 
 import hashlib
 import json
 import os
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from vegglue.case.safe_yaml import yaml_of
 from vegglue.case.schema import Case
+from vegglue.case.text_files import write_text
+from vegglue.errors import InputError, shown_path
 
 # Keys that a finished ensemble does not depend on, as pydantic wants those to leave out.
 NOT_SIMULATED = dict.fromkeys(
@@ -25,7 +33,7 @@ Tree = dict[str, Any]
 
 def resolved_yaml(case: Case) -> str:
     """The case as one file without `extends`; data files are named relative to the file it was read from."""
-    return as_yaml(plain_tree(dumped(case), lambda file: _relative(file, case.source)))
+    return as_yaml(plain_tree(dumped(case), lambda file: Path(os.path.relpath(file, case.source.parent)).as_posix()))
 
 
 def as_yaml(tree: Tree) -> str:
@@ -87,5 +95,58 @@ def _files_in(folder: Path) -> list[Path]:
     return sorted(file for file in folder.rglob("*") if file.is_file() and file.parent.name != "__pycache__")
 
 
-def _relative(file: Path, source: Path) -> str:
-    return Path(os.path.relpath(file, source.parent)).as_posix()
+HEADING = "# By these vegglue knows what it wrote; what was edited since is replaced with --force only.\n"
+LINE = re.compile(r"^# sha256 ([0-9a-f]{16}) of (.+)\n", re.MULTILINE)
+
+
+def write_made(texts: Mapping[Path, str], advice: str, force: bool = False) -> None:
+    """Write a config, the last of `texts`, and before it the tables it comes with.
+
+    Errors: InputError, before anything is written, when one is there that vegglue did not write as it is, unless
+    forced; StorageError, which ends with the advice.
+    """
+    refuse_not_made(texts, advice, force)
+    *tables, config = texts
+    for table in tables:
+        write_text(table, texts[table], advice)
+    stamped = {path.name: texts[path] for path in (config, *tables)}
+    lines = "".join(f"# sha256 {_short(text)} of {name}\n" for name, text in stamped.items())
+    write_text(config, texts[config] + HEADING + lines, advice)
+
+
+def refuse_not_made(texts: Mapping[Path, str], advice: str, force: bool = False) -> None:
+    """Errors: InputError, as those of `write_made`, where something is there that is not to be replaced."""
+    config = list(texts)[-1]
+    for path in texts:
+        if (path.exists() or path.is_symlink()) and not path.is_file():  # reading a pipe would wait
+            raise InputError(f"{shown_path(path)}: expected a file or nothing, got something else; {advice}.")
+    if force:
+        return
+    try:
+        stated = {name: digest for digest, name in LINE.findall(config.read_text(encoding="utf-8"))}
+    except (OSError, UnicodeDecodeError):
+        stated = {}
+    for path, text in texts.items():
+        try:
+            there = path.read_bytes().decode(errors="backslashreplace")
+        except FileNotFoundError:
+            continue
+        except OSError:
+            there = ""  # not readable: not what vegglue wrote
+        body, heading, lines = there.rpartition(HEADING)
+        there = body if heading and not LINE.sub("", lines) else there
+        if there != text and stated.get(path.name) != _short(there):
+            raise InputError(
+                f"{shown_path(path)}: is there, and was not made by vegglue or was edited since; add --force to "
+                f"replace it, or {advice}."
+            )
+
+
+def refuse_parent(target: Path, parent: Path) -> None:
+    """Errors: InputError where a config is to be written over the one that it extends, which --force would replace."""
+    if target.resolve() == parent:
+        raise InputError(f"--to {shown_path(target)}: is the config that it extends; give another file.")
+
+
+def _short(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

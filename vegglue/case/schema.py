@@ -1,24 +1,119 @@
-"""The schema of a case: what a YAML file may say, in which unit, and which names must agree. Nothing is read here."""
+"""What a config may say: its keys, their units, and which of them must agree. Nothing is read here."""
 
+import math
+import re
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from vegglue.case.engine_schema import CommandEngine
-from vegglue.case.frame import Frame
-from vegglue.case.parts import Interval, Number, Part, Positive, Value, exactly, rising
-from vegglue.case.prior_width import unusable
-from vegglue.case.site_schema import BedLayer, Friction, GridExtent, Inflow, Outlet, Plants, StandOverride
+from vegglue.case.site_schema import (
+    BedLayer,
+    Frame,
+    Friction,
+    GridExtent,
+    Inflow,
+    Interval,
+    Number,
+    Outlet,
+    Part,
+    Plants,
+    Positive,
+    Value,
+    VegetationOverride,
+    exactly,
+    rising,
+)
 from vegglue.case.size_limits import MOST_MEMBERS
 from vegglue.wording.numbers import in_short, so_many
+
+# What a word of the command may name in braces beside the files: the Python that runs vegglue.
+PYTHON = "python"
+_PLACEHOLDER = re.compile(r"\{([^{}]*)\}")
+# Words that only a shell understands: a program would be given them as they stand.
+_OF_A_SHELL = ("|", "||", "&", "&&", ";", "<", ">", ">>", "2>", "2>&1")
+
+
+class CommandEngine(Part):
+    """A command that is started once for each member, in a folder of its own: see docs/own_engine.md."""
+
+    command: str = Field(description="program and its words, without a shell; {name} stands for one of `files`")
+    files: dict[str, Path] = Field(default_factory=dict, description="files and folders that the command needs")
+    # An hour: a steady flow of a reach takes minutes with the codes this is made for.
+    timeout: Positive = Field(default=3600.0, description="time after which a run is stopped and has failed [s]")
+    keep: Literal["failed", "all"] = Field(default="failed", description="whose folders stay after a run")
+    # A tenth of a standard deviation. Predictions rounded to 1 mm/s then give slopes to 2 % where a standard deviation
+    # moves them by 0.1 m/s, and central differences leave a thousandth of the curvature of the third order.
+    step: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=0.1, description="step of differences [standard deviations of the prior]"
+    )
+
+    @model_validator(mode="after")
+    def _words_that_are_known(self) -> Self:
+        known = [*self.files, PYTHON]
+        if PYTHON in self.files:
+            raise ValueError(f"another name than `{PYTHON}` in `files`: it stands for the Python that runs vegglue")
+        try:
+            words = shlex.split(self.command)
+        except ValueError as error:
+            raise ValueError(f"a `command` with quotes in pairs ({error})") from None
+        if not words:
+            raise ValueError("a `command` with the name of a program")
+        for word in words:
+            if word in _OF_A_SHELL:
+                raise ValueError(f"a `command` without {word!r}, as no shell reads it; put it into a script of `files`")
+        for name in _PLACEHOLDER.findall(self.command):
+            if name not in known:
+                raise ValueError(f"a `command` in which {{{name}}} names one of `files`: {', '.join(known)}")
+        return self
+
+    def words(self, python: str) -> tuple[str, ...]:
+        """The program and its words, with the path of each file that is named; python: what stands for {python}."""
+        paths = {name: str(path) for name, path in self.files.items()} | {PYTHON: python}
+        return tuple(_PLACEHOLDER.sub(lambda found: paths[found[1]], word) for word in shlex.split(self.command))
+
+
+# Numbers of a prior lie between 10^-30 and 10^30, whatever their unit: their squares and products are still numbers.
+SMALLEST_IN_PRIOR, LARGEST_IN_PRIOR = 1e-30, 1e30
+# Width of a prior over its size [-]: a thinner one is a number, whose digits end at 10^-16.
+THINNEST = 1e-9
+# Standard deviations from the mean to the nearer bound [-]: beyond lies a share of 10^-12.
+FARTHEST_BOUND = 7.0
+# Spread of the logarithm [-]: twice it, either way, is a factor of 10^17.
+WIDEST_LOG = 20.0
+
+
+def unusable(distribution: str, numbers: Mapping[str, float | None]) -> str | None:
+    """What a prior should have been, as the schema says it; None for one that can be drawn from.
+
+    numbers: low, high, mean, sd, median and log_sd, None where there is none.
+    """
+    given = {name: value for name, value in numbers.items() if value is not None}
+    if any(value and not SMALLEST_IN_PRIOR <= abs(value) <= LARGEST_IN_PRIOR for value in given.values()):
+        return f"numbers between {SMALLEST_IN_PRIOR:g} and {LARGEST_IN_PRIOR:g}"
+    if distribution == "lognormal":
+        spread = given["log_sd"]
+        return None if THINNEST < spread < WIDEST_LOG else f"a `log_sd` between {THINNEST:g} and {WIDEST_LOG:g}"
+    if distribution != "normal":
+        width, size = given["high"] - given["low"], max(abs(given["low"]), abs(given["high"]))
+        return None if width > THINNEST * size else "a range wider than the last digits; write a number instead"
+    mean, sd, low, high = given["mean"], given["sd"], given.get("low", -math.inf), given.get("high", math.inf)
+    if sd < THINNEST * abs(mean):
+        return "an `sd` wider than the last digits of the mean; write a number instead"
+    if low > mean + FARTHEST_BOUND * sd or high < mean - FARTHEST_BOUND * sd:
+        return f"bounds within {FARTHEST_BOUND:g} `sd` of the mean"
+    if high - low < THINNEST * sd:
+        return "an `sd` nearer to the width between the bounds; write a uniform prior instead"
+    return None
 
 
 class Experiment(Part):
     discharge: dict[str, Value] = Field(description="one value, or one for each inflow [m3/s]")
     level: Value = Field(description="water level at the outlet, in the datum of the bed [m]")
     plants: bool | tuple[str, ...] = Field(default=True, description="true, false, or the names of the patches present")
-    stands: dict[str, StandOverride] = Field(default_factory=dict, description="what differs in this experiment")
+    stands: dict[str, VegetationOverride] = Field(default_factory=dict, description="what differs in this experiment")
     bed: Annotated[tuple[BedLayer, ...], Field(min_length=1)] | None = Field(
         default=None, description="layers over the bed of the case, in this experiment only"
     )
@@ -247,3 +342,29 @@ class Case(Part):
 
     def __str__(self) -> str:
         return repr(self)
+
+
+def share_below(prior: Parameter, value: float) -> float:
+    """F(value) = P(X < value) [-]; the value in the unit of the prior. `prior.probability` is the same for arrays."""
+    low = -math.inf if prior.low is None else prior.low
+    high = math.inf if prior.high is None else prior.high
+    if value <= low or value >= high:
+        return float(value >= high)
+    if prior.distribution == "uniform":
+        return (value - low) / (high - low)
+    if prior.distribution == "loguniform":
+        return math.log(value / low) / math.log(high / low)
+    if prior.median is not None and prior.log_sd is not None:
+        return _mass(-math.inf, math.log(value / prior.median) / prior.log_sd) if value > 0.0 else 0.0
+    assert prior.mean is not None
+    assert prior.sd is not None
+    a, x, b = ((end - prior.mean) / prior.sd for end in (low, value, high))
+    whole = _mass(a, b)
+    return _mass(a, x) / whole if whole > 0.0 else 0.0
+
+
+def _mass(low: float, high: float) -> float:
+    """Phi(high) - Phi(low), from the tail in which both keep their digits."""
+    if low > 0.0:
+        low, high = -high, -low
+    return 0.5 * (math.erfc(-high / math.sqrt(2.0)) - math.erfc(-low / math.sqrt(2.0)))

@@ -1,14 +1,106 @@
-"""The part of the schema that describes a site: grid, bed, friction, plants, inflows and outlet."""
+"""The part of the schema that describes a site: grid, bed, friction, plants, inflows, outlet, and its frame on the map;
+and what all parts of a case are made of: numbers, ranges, polygons, and values that may be parameters.
+"""
 
 import math
+import re
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from vegglue.case.parts import Interval, Number, Part, Polygon, Positive, Value, exactly
 from vegglue.case.size_limits import LARGEST_FACTORS, MOST_CELLS, factor_bytes
+
+
+def _number_or_name(value: Any) -> Any:
+    if isinstance(value, str) and re.fullmatch(r"[A-Za-z_]\w*", value):
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError("a number or the name of an entry of `parameters`")
+    return float(value)
+
+
+def rising(interval: tuple[float, float]) -> tuple[float, float]:
+    """The interval as it is. Errors: ValueError, of which the schema makes a sentence, if its ends are not in order."""
+    if not interval[0] < interval[1]:
+        raise ValueError("two numbers, the lower one first")
+    return interval
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0)]
+Interval = Annotated[tuple[Number, Number], AfterValidator(rising)]
+Polygon = Annotated[tuple[tuple[Number, Number], ...], Field(min_length=3)]
+Value = Annotated[Number | str, BeforeValidator(_number_or_name)]
+
+
+class Part(BaseModel):
+    """What all parts of a case share: they are values, and know all their keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+
+def exactly(part: Part, chosen: str, wanted: Mapping[str, tuple[str, ...]], allowed: tuple[str, ...] = ()) -> None:
+    """Check that a part has the keys of its kind and none of another. Errors: ValueError naming the key.
+
+    chosen: the kind; wanted: the keys of each kind; allowed: keys that any kind may have.
+    """
+    others = {key for keys in wanted.values() for key in keys} - set(wanted[chosen]) - set(allowed)
+    for key in wanted[chosen]:
+        if getattr(part, key) is None:
+            raise ValueError(f"the key `{key}`, which {chosen} needs")
+    for key in sorted(others):
+        if getattr(part, key) is not None:
+            raise ValueError(f"no key `{key}` together with {chosen}")
+
+
+# Systems whose coordinates are degrees, the usual ones; WGS 84 alone may be the datum of one in metres.
+IN_DEGREES = {"EPSG:4326", "EPSG:4258", "EPSG:4269", "OGC:CRS84", "CRS84"}
+
+
+def in_metres(crs: str) -> str:
+    """The system, refused where its coordinates are degrees."""
+    if crs.strip().upper() in IN_DEGREES:
+        raise ValueError("a projected system, with coordinates in metres, such as EPSG:2056")
+    return crs
+
+
+class Frame(Part):
+    """Takes and gives floats, or arrays of them: nothing of numpy is needed to read a case.
+
+    x = (E - E_0) cos a + (N - N_0) sin a, y = (N - N_0) cos a - (E - E_0) sin a [m].
+    """
+
+    origin: tuple[Number, Number] = Field(description="east and north of x = y = 0 on the map [m]")
+    angle: Number = Field(description="from east to the x axis, which runs downstream, anticlockwise [degrees]")
+    crs: Annotated[str, AfterValidator(in_metres)] | None = Field(
+        default=None, description="coordinate system of the map, such as EPSG:2056"
+    )
+
+    def to_model(self, east: Any, north: Any) -> tuple[Any, Any]:
+        """x and y of places on the map [m]."""
+        return self.turned_to_model(east - self.origin[0], north - self.origin[1])
+
+    def to_map(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """East and north of places in the model [m]."""
+        east, north = self.turned_to_map(x, y)
+        return east + self.origin[0], north + self.origin[1]
+
+    def turned_to_model(self, east: Any, north: Any) -> tuple[Any, Any]:
+        """Components along and across of a vector whose components east and north are given."""
+        cosine, sine = self._direction()
+        return east * cosine + north * sine, north * cosine - east * sine
+
+    def turned_to_map(self, along: Any, across: Any) -> tuple[Any, Any]:
+        """Components east and north of a vector whose components along and across are given."""
+        cosine, sine = self._direction()
+        return along * cosine - across * sine, along * sine + across * cosine
+
+    def _direction(self) -> tuple[float, float]:
+        return math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle))
+
 
 # Bounds far beyond any stream, within which the geometry of a centreline has its digits; a hundred turns.
 _Run = Annotated[Number, Field(ge=1e-3, le=1e6)]
@@ -165,7 +257,7 @@ class Friction(Part):
     )
 
 
-class Stand(Part):
+class VegetationType(Part):
     phi: Value = Field(description="plant drag C_d m D h_d at `stems` [-]")
     canopy_height: Value = Field(description="height h_d of the deflected canopy [m]")
     bare_chezy: Value = Field(default=60.0, description="Chézy coefficient C_b of the bed under the plants [m^1/2/s]")
@@ -175,7 +267,7 @@ class Stand(Part):
     )
 
 
-class StandOverride(Part):
+class VegetationOverride(Part):
     phi: Value | None = Field(default=None, description="plant drag in this experiment [-]")
     canopy_height: Value | None = Field(default=None, description="canopy height in this experiment [m]")
     bare_chezy: Value | None = Field(default=None, description="Chézy coefficient under the plants [m^1/2/s]")
@@ -197,7 +289,7 @@ class Patch(Part):
 
 
 class Plants(Part):
-    stands: dict[str, Stand] = Field(default_factory=dict, description="kinds of plants by name")
+    stands: dict[str, VegetationType] = Field(default_factory=dict, description="kinds of plants by name")
     patches: tuple[Patch, ...] = Field(default=(), description="where they stand, later ones win")
 
 

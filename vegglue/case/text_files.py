@@ -25,8 +25,10 @@ def read_text(path: Path, most: int, otherwise: str = "check the path") -> str:
     Errors: InputError when it is no file, cannot be read, is larger, or is not in UTF-8.
     """
     try:
-        regular = stat.S_ISREG(path.stat().st_mode)  # opening a pipe would wait, a device never ends
-        content = _beginning(path, most + 1) if regular else None
+        content = None
+        if stat.S_ISREG(path.stat().st_mode):  # opening a pipe would wait, a device never ends
+            with path.open("rb") as file:
+                content = file.read(most + 1)
     except OSError as error:
         raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; {otherwise}.") from None
     except ValueError:  # a NUL in the name
@@ -39,11 +41,6 @@ def read_text(path: Path, most: int, otherwise: str = "check the path") -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{shown_path(path)} is not text in UTF-8: save it as UTF-8.") from None
-
-
-def _beginning(path: Path, size: int) -> bytes:
-    with path.open("rb") as file:
-        return file.read(size)
 
 
 def unprintable(text: str) -> str | None:

@@ -1,19 +1,124 @@
-"""Which cells a patch of plants, a zone of friction, an inflow or the outlet holds: those whose centre lies in it."""
+"""Cells that a patch of plants, a zone of friction, an inflow or the outlet holds, and how much of each plants cover.
 
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+Zones hold cells whose centre lies in them. Sides of patches seldom lie between cells: were cells planted whose centre
+lies in a patch, a patch would be up to half a cell too wide or too long on each side.
+"""
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Mask
-from vegglue.case.grid import Grid, cell_stretch, places_on_map
-from vegglue.case.parts import Interval
-from vegglue.case.polygons import in_polygon
+from vegglue.case.bed import nearest_at, read_raster
+from vegglue.case.grid import Grid, along_and_across, cell_stretch, centreline_in, places_on_map
 from vegglue.case.schema import Case
-from vegglue.case.site_schema import Inflow, Patch, Zone
-from vegglue.case.terrain import nearest_at, read_raster
+from vegglue.case.site_schema import Inflow, Interval, Patch, Polygon
 from vegglue.errors import InputError, shown_path
+
+# Pieces of each side of a polygon along a bend: chosen, not measured; drawings need no more.
+SIDE_PIECES = 16
+
+
+def corners_of(case: Case, patch: Patch) -> Array:
+    """Corners (x, y) of a patch in order around it in the coordinates of the grid, (corners, 2) [m].
+
+    A polygon is given on the map: along a centreline its sides bend, so that they are cut into short ones.
+    """
+    line = centreline_in(case)
+    if patch.polygon is not None and line is not None:
+        corners, share = np.array(patch.polygon), np.arange(SIDE_PIECES)[None, :, None] / SIDE_PIECES
+        pieces = (1.0 - share) * corners[:, None] + share * np.roll(corners, -1, axis=0)[:, None]
+        return np.stack(along_and_across(line, *pieces.reshape(-1, 2).T), axis=1)
+    if patch.polygon is not None:
+        return np.array(patch.polygon)
+    (west, east), (south, north) = patch.x or (0.0, 0.0), patch.y or (0.0, 0.0)
+    return np.array([[west, south], [east, south], [east, north], [west, north]])
+
+
+def distance_to_outline(outline: Array, x: float, y: float) -> float:
+    """d = min |p - (a + t (b - a))| over all sides a, b and t in [0, 1], the distance of p = (x, y) [m].
+
+    outline: corners (corners, 2) [m].
+    """
+    start, side = outline, np.roll(outline, -1, axis=0) - outline
+    from_start = np.array([x, y]) - start
+    squared = (side**2).sum(axis=1)
+    # A side of no length, where two corners are one place, is its own nearest point.
+    along = np.clip((from_start * side).sum(axis=1) / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
+    return float(np.hypot(*(from_start - along[:, None] * side).T).min())
+
+
+def in_polygon(corners: Polygon, grid: Grid) -> Mask:
+    """Cells (nx, ny) whose centre lies within the polygon on the map: a ray from it crosses the outline an odd number
+    of times.
+    """
+    inside = np.full((grid.x.size, grid.y.size), False)
+    x, y = places_on_map(grid)
+    for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], corners[0]), strict=True):
+        if y0 == y1:
+            continue
+        crossing = x0 + (y - y0) * (x1 - x0) / (y1 - y0)
+        inside ^= ((y0 <= y) != (y1 <= y)) & (x < crossing)
+    return inside
+
+
+def area_of(outline: Array) -> float:
+    """A = |sum(x_i y_(i+1) - x_(i+1) y_i)| / 2 [m2]; outline: corners (corners, 2) [m]."""
+    x, y = outline.T
+    return float(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+
+
+# Lines in each row of cells along which a polygon is measured [-]: of a side along the channel a cell is then known to
+# a thirty-second, far better than such sides are surveyed. Ranges are exact.
+LINES_IN_ROW = 16
+# Digits kept of a share [-]: what rounding leaves of a cell that is whole or bare is neither.
+SHARE_DIGITS = 6
+
+
+def share_in_patch(case: Case, patch: Patch, grid: Grid) -> Array:
+    """Share of each cell (nx, ny) [-] that lies in a patch; along a bend in the coordinates of the grid.
+
+    Of a polygon: lengths within it along LINES_IN_ROW lines of each row. A line enters it where it crosses the outline
+    for the first, third .. time, and leaves it in between.
+    """
+    if patch.polygon is None:
+        along, across = _share_in_range(patch.x, grid.x, grid.dx), _share_in_range(patch.y, grid.y, grid.dy)
+        return np.round(np.outer(along, across), SHARE_DIGITS)
+    corners = corners_of(case, patch)
+    columns, rows = _met(corners[:, 0], grid.x, grid.dx), _met(corners[:, 1], grid.y, grid.dy)
+    in_row = grid.dy * ((np.arange(LINES_IN_ROW) + 0.5) / LINES_IN_ROW - 0.5)
+    x, y = grid.x[columns], grid.y[rows]
+    lines = (y[:, None] + in_row).ravel()
+    # x where the lines cross each side, in order; infinite beyond the last.
+    crossings = np.full((len(corners), lines.size), np.inf)
+    for side, ((x0, y0), (x1, y1)) in enumerate(zip(corners, np.roll(corners, -1, axis=0), strict=True)):
+        meets = (y0 <= lines) != (y1 <= lines)
+        crossings[side, meets] = x0 + (lines[meets] - y0) * (x1 - x0) / (y1 - y0) if meets.any() else np.inf
+    edges = np.append(x - 0.5 * grid.dx, x[-1:] + 0.5 * grid.dx)
+    length = np.zeros((lines.size, edges.size))
+    for turn, crossing in enumerate(np.sort(crossings, axis=0)):
+        length += (-1.0) ** turn * np.maximum(edges - crossing[:, None], 0.0)
+    within = np.diff(length, axis=1).reshape(y.size, LINES_IN_ROW, x.size) / grid.dx
+    share = np.zeros((grid.x.size, grid.y.size))
+    share[columns, rows] = within.mean(axis=1).T
+    return np.round(share, SHARE_DIGITS)
+
+
+def _share_in_range(held: Interval | None, centres: Array, step: float) -> Array:
+    """Share of each cell (n,) in a range [m]; all of it where none is given."""
+    if held is None:
+        return np.ones(centres.size)
+    low, high = np.maximum(held[0], centres - 0.5 * step), np.minimum(held[1], centres + 0.5 * step)
+    return np.maximum(high - low, 0.0) / step
+
+
+def _met(values: Array, centres: Array, step: float) -> slice:
+    """The cells (n,) between the least and the largest of some places [m]."""
+    first = int(np.searchsorted(centres + 0.5 * step, values.min(), "right"))
+    last = int(np.searchsorted(centres - 0.5 * step, values.max(), "left"))
+    return slice(min(first, last), last)
+
 
 # Slope of a cross-section beyond which cells are taken for bank where nothing else is said [-]. Chosen, not measured:
 # floors are flatter and banks of streams mostly steeper.
@@ -42,31 +147,24 @@ def friction_classes(case: Case, grid: Grid, bed: Array) -> NDArray[np.int64]:
     index = np.full(bed.shape, names.index(case.friction.default), dtype=np.int64)
     for zone in case.friction.zones:
         if zone.raster is not None and zone.values is not None:
-            number = _class_numbers(zone.raster, zone.values, grid)
+            number = nearest_at(read_raster(zone.raster), *places_on_map(grid))
+            strange = number[~np.isnan(number) & ~np.isin(number, list(zone.values))]
+            if strange.size:
+                known = ", ".join(map(str, zone.values))
+                raise InputError(
+                    f"{zone.raster}: expected the numbers {known}, got {strange[0]:g}: add it to `values` of this zone."
+                )
             for value, name in zone.values.items():
                 index[number == value] = names.index(name)
         elif zone.friction_class is not None:
-            index[_zone_cells(zone, grid, bed)] = names.index(zone.friction_class)
+            if zone.steeper_than is not None:
+                held = slope(bed, grid) > zone.steeper_than
+            elif zone.beyond_slope_break is not None:
+                held = beyond_slope_break(slope(bed, grid) > zone.beyond_slope_break, bed)
+            else:
+                held = in_polygon(zone.polygon, grid) if zone.polygon is not None else _in_range(zone.x, zone.y, grid)
+            index[held] = names.index(zone.friction_class)
     return index
-
-
-def _class_numbers(path: Path, values: Mapping[int, str], grid: Grid) -> Array:
-    number = nearest_at(read_raster(path), *places_on_map(grid))
-    strange = number[~np.isnan(number) & ~np.isin(number, list(values))]
-    if strange.size:
-        known = ", ".join(map(str, values))
-        raise InputError(f"{path}: expected the numbers {known}, got {strange[0]:g}: add it to `values` of this zone.")
-    return number
-
-
-def _zone_cells(zone: Zone, grid: Grid, bed: Array) -> Mask:
-    if zone.steeper_than is not None:
-        return slope(bed, grid) > zone.steeper_than
-    if zone.beyond_slope_break is not None:
-        return beyond_slope_break(slope(bed, grid) > zone.beyond_slope_break, bed)
-    if zone.polygon is not None:
-        return in_polygon(zone.polygon, grid)
-    return _in_range(zone.x, zone.y, grid)
 
 
 def beyond_slope_break(steep: Mask, bed: Array) -> Mask:

@@ -12,13 +12,11 @@ import pandas as pd
 from vegglue.arrays import Array
 from vegglue.case.case_effects import effect_of
 from vegglue.case.channel_geometry import expected_depth, patches_present
-from vegglue.case.consistency import values
+from vegglue.case.config import values
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds, prior_range, value_at
-from vegglue.case.plant_cover import share_in_patch
-from vegglue.case.polygons import area_of, corners_of
 from vegglue.case.schema import Case
-from vegglue.case.zones import BANK_SLOPE, slope
+from vegglue.case.zones import BANK_SLOPE, area_of, corners_of, share_in_patch, slope
 from vegglue.diagnosis.flow_check import dry_outlets
 from vegglue.measurements.kinds import UnstatedErrors, unstated_errors
 from vegglue.measurements.observations import OUTSIDE, Observations

@@ -15,9 +15,8 @@ from vegglue.calibration.noise import Noise, covariance_of_data, with_correlatio
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named
 from vegglue.case.case_effects import effect_of, parameters_of_effects
-from vegglue.case.centreline import on_map
 from vegglue.case.channel_geometry import channel_geometry, half_width
-from vegglue.case.grid import centreline_in
+from vegglue.case.grid import centreline_in, on_map
 from vegglue.case.gridded_site import cells_at
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants

@@ -11,8 +11,8 @@ import pandas as pd
 
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import Site, in_experiment
-from vegglue.case.polygons import corners_of, distance_to_outline
 from vegglue.case.schema import Case
+from vegglue.case.zones import corners_of, distance_to_outline
 from vegglue.diagnosis.flow_check import dry_outlets, exchanged_components
 from vegglue.measurements.kinds import kind_of, velocity_rows
 from vegglue.measurements.observations import OUTSIDE, Observations

@@ -35,11 +35,10 @@ import psutil
 from vegglue.arrays import Array
 from vegglue.case.case_effects import value_of
 from vegglue.case.channel_geometry import patches_present
-from vegglue.case.consistency import values
-from vegglue.case.engine_schema import CommandEngine
-from vegglue.case.parts import Value
+from vegglue.case.config import values
 from vegglue.case.resolved_config import digest_of, last_changes
-from vegglue.case.schema import Case
+from vegglue.case.schema import Case, CommandEngine
+from vegglue.case.site_schema import Value
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.kinds import kind_of

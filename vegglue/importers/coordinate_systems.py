@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from vegglue.case.frame import Frame
+from vegglue.case.site_schema import Frame
 from vegglue.errors import InputError, shown_path
 
 # Letters and digits of names of systems, in lower case, and their numbers of EPSG; {z} is a zone, added to the number.

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.frame import Frame
 from vegglue.case.resolved_config import Tree
+from vegglue.case.site_schema import Frame
 from vegglue.case.text_files import case_name, told_apart
 from vegglue.case.zones import BANK_SLOPE
 from vegglue.errors import InputError, shown_path

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.arrays import Array, Mask
-from vegglue.case.centreline import Centreline, along_and_across, heading_at, on_map
-from vegglue.case.frame import Frame
+from vegglue.case.grid import Centreline, along_and_across, heading_at, on_map
+from vegglue.case.site_schema import Frame
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import ROLES, known_name
 from vegglue.importers.column_roles import (

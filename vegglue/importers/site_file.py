@@ -10,10 +10,8 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from vegglue.case.config import read_tree
-from vegglue.case.frame import Frame, in_metres
 from vegglue.case.messages import dotted, expected_in_words
-from vegglue.case.parts import Interval, Number, Polygon, Positive
-from vegglue.case.site_schema import CentrelineShape
+from vegglue.case.site_schema import CentrelineShape, Frame, Interval, Number, Polygon, Positive, in_metres
 from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text, unprintable
 from vegglue.errors import InputError, shown_path

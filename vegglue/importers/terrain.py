@@ -11,11 +11,11 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, Regul
 from scipy.spatial import QhullError
 
 from vegglue.arrays import Array, Mask
-from vegglue.case.frame import Frame
+from vegglue.case.bed import Raster, read_raster
 from vegglue.case.grid import Grid, centres
 from vegglue.case.resolved_config import Tree
+from vegglue.case.site_schema import Frame
 from vegglue.case.size_limits import MOST_CELLS
-from vegglue.case.terrain import Raster, read_raster
 from vegglue.case.text_files import case_name
 from vegglue.case.zones import beyond_slope_break, slope
 from vegglue.errors import InputError, shown_path

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.centreline import Centreline, centreline_of
-from vegglue.case.frame import Frame
+from vegglue.case.grid import Centreline, centreline_of
 from vegglue.case.resolved_config import Tree
-from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape
+from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape, Frame
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import UNITS, names_without_unit, role_of, words_of
 from vegglue.importers.column_roles import columns_of_table, taken_as_si

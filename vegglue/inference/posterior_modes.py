@@ -16,8 +16,7 @@ from vegglue.calibration.fit import MapEstimate, determined, fit
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_scale
 from vegglue.calibration.residual_screening import noise_given_all
 from vegglue.case.channel_geometry import cells_across
-from vegglue.case.parameter_space import refuse_without_parameters, z_at
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import refuse_without_parameters, sample_prior, z_at
 from vegglue.engine.interface import Model, Point, linearise, linearise_from, predict
 from vegglue.engine.model import coarser, ever_coarser
 from vegglue.errors import InputError, shown_command

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.case.prior import probability, quantile
+from vegglue.case.parameter_space import probability, quantile
 from vegglue.case.schema import Case, Parameter
 from vegglue.effects.physical_constants import GRAVITY
 from vegglue.effects.plant_laws import above_canopy, baptist_chezy

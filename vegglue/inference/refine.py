@@ -16,8 +16,7 @@ from scipy.special import ndtr
 from vegglue.arrays import Array
 from vegglue.calibration.fit import chance_of_misfit, freedom_of_misfit, squared_misfit
 from vegglue.calibration.noise import Noise, covariance_of
-from vegglue.case.parameter_space import theta_at
-from vegglue.case.prior import sample_prior
+from vegglue.case.parameter_space import sample_prior, theta_at
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, predict
 from vegglue.inference.glue import check_stations, efficiency

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from vegglue.case.centreline import along_and_across
-from vegglue.case.grid import centreline_in
+from vegglue.case.grid import along_and_across, centreline_in
 from vegglue.case.messages import nearest
 from vegglue.case.schema import Case, Observation
 from vegglue.case.size_limits import MOST_STATIONS

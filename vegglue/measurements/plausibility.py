@@ -327,7 +327,7 @@ def _judge_values(flow: PlausibleFlow, group: pd.DataFrame) -> list[Judgement]:
         least, most = flow.discharge
         if least <= 0.0:
             return [PLAUSIBLE] * len(value)
-        found = []
+        found: list[Judgement] = []
         for ratio, one in zip(np.abs(value) / most, value, strict=True):
             if ratio > FURTHEST_MEAN:
                 large = (Symptom.LARGE_DISCHARGE, float(ratio), _unit_of(ratio, DISCHARGE_UNITS))

@@ -16,8 +16,8 @@ from vegglue.arrays import Array
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds
-from vegglue.case.polygons import corners_of
 from vegglue.case.schema import Case
+from vegglue.case.zones import corners_of
 from vegglue.measurements.observations import Observations
 from vegglue.pages.style import COLOUR, SMALL, canvas, label, save, styled
 

@@ -13,8 +13,8 @@ import pandas as pd
 from matplotlib.image import imsave
 
 from vegglue.arrays import Array
-from vegglue.case.polygons import corners_of
 from vegglue.case.text_files import told_apart
+from vegglue.case.zones import corners_of
 from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.normal_range import NORMAL95

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon
 
 from vegglue.arrays import Array
-from vegglue.case.polygons import corners_of
 from vegglue.case.schema import Case
+from vegglue.case.zones import corners_of
 from vegglue.pages.cause_words import (
     FIELD_WORDS,
     TERM_SIGNS,

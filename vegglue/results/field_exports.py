@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.centreline import heading_at, on_map
-from vegglue.case.frame import Frame
-from vegglue.case.grid import Grid
+from vegglue.case.grid import Grid, heading_at, on_map
+from vegglue.case.site_schema import Frame
 from vegglue.case.text_files import names_in_files, write_text
 from vegglue.errors import InputError
 from vegglue.flow.sensor import FlowFields

@@ -6,9 +6,8 @@ from pathlib import Path
 
 from vegglue.calibration.candidates import Candidate
 from vegglue.case.config import load_case
-from vegglue.case.made_files import refuse_parent, write_made
 from vegglue.case.messages import nearest_effect
-from vegglue.case.resolved_config import as_yaml
+from vegglue.case.resolved_config import as_yaml, refuse_parent, write_made
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import child_tree
 from vegglue.diagnosis.comparison import excluding, exclusion_in_words

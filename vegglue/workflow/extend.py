@@ -10,9 +10,8 @@ import pandas as pd
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import Candidate, start_amplitude
 from vegglue.case.config import load_case
-from vegglue.case.made_files import refuse_parent, write_made
 from vegglue.case.parameter_space import z_at
-from vegglue.case.resolved_config import as_yaml, case_hash
+from vegglue.case.resolved_config import as_yaml, case_hash, refuse_parent, write_made
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
 from vegglue.diagnosis.comparison import excluded_by, model_score

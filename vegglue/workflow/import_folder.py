@@ -11,8 +11,7 @@ from typing import Any
 
 from vegglue.case.config import PATHS, load_case
 from vegglue.case.gridded_site import build_site
-from vegglue.case.made_files import refuse_not_made, write_made
-from vegglue.case.resolved_config import Tree, as_yaml
+from vegglue.case.resolved_config import Tree, as_yaml, refuse_not_made, write_made
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
 from vegglue.diagnosis.channel_check import refused_for_errors, remarks_on_unnamed_banks

@@ -13,12 +13,10 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from vegglue.case.centreline import on_map
 from vegglue.case.config import load_case
-from vegglue.case.grid import centreline_in
-from vegglue.case.made_files import write_made
+from vegglue.case.grid import centreline_in, on_map
 from vegglue.case.parameter_space import refuse_without_parameters
-from vegglue.case.resolved_config import as_yaml, case_hash
+from vegglue.case.resolved_config import as_yaml, case_hash, write_made
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, case_name, read_text
 from vegglue.effects.grammar import LAWS
