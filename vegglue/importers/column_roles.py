@@ -64,7 +64,7 @@ NAMES_OF_EAST = {"e", "east", "easting", "rechtswert", "utm x", "utm e"}
 # Headings of a flag, and what in it marks a row as no measurement; by numbers, those of IOC and QARTOD: 3 suspect, 4
 # failed, 9 missing. Of 0 and 1 the heading decides which is good.
 OF_FLAGS = re.compile(
-    r"(data )?(quality|qc|qa|qaqc|flag|valid|ok|use|used|status|check|good|bad|reject|rejected|outlier|spike|error)"
+    r"(data )?(quality|qc|qa|qaqc|flag|valid|ok|use|used|status|good|bad|reject|rejected|outlier)"
     r"( (flag|code|check|control|qc))*"
 )
 BAD = re.compile(
@@ -75,7 +75,7 @@ BAD = re.compile(
 NO = {"no", "n", "false", "0", "nein", "non", "nee", "f"}
 BAD_CODES, GOOD_CODES = {3.0, 4.0, 9.0}, {1.0, 2.0}
 MEANS_GOOD = {"valid", "ok", "use", "used", "good"}
-MEANS_BAD = {"bad", "reject", "rejected", "outlier", "spike", "error"}
+MEANS_BAD = {"bad", "reject", "rejected", "outlier"}
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 # What no reading of a quantity or a role exceeds [SI]: no stream among plants runs at 7 m/s, a direction is less than
 # two turns, plants grow in no 50 m of water, and no river lies 7 km above the sea. 7777 mm is a level in a flume, 7777
@@ -173,7 +173,7 @@ def without_flagged(path: Path, table: ParsedTable, columns: Mapping[str, int]) 
         texts = [text.strip() for text in table.texts(place)]
         known = {text for text in texts if text}
         codes = {float(text) for text in known if is_number(text) and "," not in text}
-        if len(codes) == len(known) and len(known) > 1 and set(words.split()) & (MEANS_GOOD | MEANS_BAD):
+        if len(codes) == len(known) and codes == {0.0, 1.0} and set(words.split()) & (MEANS_GOOD | MEANS_BAD):
             good = bool(set(words.split()) & MEANS_GOOD)
             flagged = {i for i, text in enumerate(texts) if text and (float(text) != 0.0) != good}
         elif len(codes) == len(known) and codes <= BAD_CODES | GOOD_CODES:

@@ -160,7 +160,8 @@ def _riversurveyor_table(path: Path, text: str) -> ParsedTable:
         raise InputError(
             f"{shown_path(path)}: expected `Measurement Results` of a RiverSurveyor, got none; export it anew."
         )
-    stated = dict(re.findall(r"^(Distance|Velocity);\s*(\S+)", text, re.MULTILINE))
+    part = re.search(r"^Units\s*$(.*?)^\s*$", text, re.MULTILINE | re.DOTALL)
+    stated = dict(re.findall(r"^(Distance|Velocity);\s*(\S+)", part[1] if part else "", re.MULTILINE))
     length, velocity = stated.get("Distance", "m"), stated.get("Velocity", "m/s")
     headings = tuple(field.strip() for field in lines[head].rstrip("\t ").split("\t"))
     units = tuple({"Location": length, "Depth": length, "Mean Velocity": velocity}.get(one, "") for one in headings)

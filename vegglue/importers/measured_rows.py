@@ -180,7 +180,9 @@ def read_rows(path: Path, options: FileOptions) -> MeasuredRows:
             f"{shown_path(path)}: expected no `{idle}` in its entry of `files`, which is for {OF_RECORDS[idle]}, got a "
             "table with places and directions of its own; take it out."
         )
-    taken = rows_of_table(path, without_copies(parse_table(path, options.sheet)), options)
+    table = parse_table(path, options.sheet)
+    table = without_copies(without_flagged(path, table, columns_of_table(path, table, options)))
+    taken = rows_of_table(path, table, options)
     if (of_none := next((role for role in options.units if role not in taken.numbers), None)) is not None:
         raise InputError(
             f"{shown_path(path)}: expected in `units` what its columns hold, {', '.join(taken.numbers)}, got "
@@ -192,7 +194,6 @@ def read_rows(path: Path, options: FileOptions) -> MeasuredRows:
 def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> MeasuredRows:
     """What a table holds, in SI: columns by `options`, else by their usual names; units likewise."""
     columns = columns_of_table(path, table, options)
-    table = without_flagged(path, table, columns)
     numbers: dict[str, Array] = {}
     units: dict[str, str] = {}
     assumed = taken_as_si(table, columns, options)
