@@ -242,6 +242,21 @@ def test_a_0_in_a_table_of_the_usual_name_is_refused_as_well(tmp_path: Path) -> 
         imported(tmp_path, velocities__csv="\n".join(["experiment,section,x,y,u", *rows]))
 
 
+@pytest.mark.parametrize(("flag", "mark"), [("bad", "0.40"), ("good", "-999"), ("good", "9999")])
+def test_a_table_of_the_usual_name_is_read_like_others(tmp_path: Path, flag: str, mark: str) -> None:
+    """Flags and marks in it counted as measurements."""
+    rows = [f"June,A,8,{y},{mark if y == 0 else 0.4},{flag if y == 0 else 'good'}" for y in (-1, 0, 1)]
+    table, _ = imported(tmp_path, velocities__csv="\n".join(["experiment,section,x,y,u,quality", *rows]))
+    assert table["value"].tolist() == [0.4, 0.4]
+
+
+def test_edges_of_a_gauging_are_no_velocities(tmp_path: Path) -> None:
+    site = CHANNEL + JUNE + "files: {g.csv: {line: [[12, 2], [12, -2]]}}\n"
+    rows = ["0,0,0", "1,0.5,0.3", "2,0.6,0.5", "3,0.5,0.4", "4,0,0"]
+    table, _ = imported(tmp_path, site, g__csv="\n".join(["Distance (m),Depth (m),Velocity (m/s)", *rows]))
+    assert table["value"].tolist() == [0.3, 0.5, 0.4]
+
+
 @pytest.mark.parametrize(
     "summary",
     ["Mean;8;0;41", "Average;;;41", "Mittelwert;8;0;41", "Total:;;;1800", "moyenne;8;0;41", "St dev;;;3", "Max;8;0;44"],

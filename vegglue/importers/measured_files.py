@@ -18,7 +18,8 @@ from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import unused as unused_name
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES
+from vegglue.importers.column_names import ROLES, words_of
+from vegglue.importers.column_roles import OF_FLAGS
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
@@ -29,6 +30,7 @@ from vegglue.importers.stations import EXPERIMENTS, KnownExperiments, StationTab
 from vegglue.importers.table_parser import WORKBOOKS
 from vegglue.measurements.csv_table import read_table
 from vegglue.measurements.kinds import KINDS, STREAMWISE, kind_of
+from vegglue.measurements.plausibility import is_mark
 
 # Endings of files that may hold measurements; others need an entry in `files`.
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".dis")
@@ -250,7 +252,7 @@ def _refuse_same_stations(
 
 def _plain_rows(path: Path, known: KnownExperiments) -> list[list[str]] | None:
     """Experiment, x, y and value of a table that a case names as it is: commas, all columns by their own names, one
-    kind, numbers without a D for their exponent; None for another table.
+    kind, no flags, marks or velocities of 0, no D in exponents; None for another table.
 
     InputError if such a table lacks a value, or is of another experiment.
     """
@@ -262,14 +264,16 @@ def _plain_rows(path: Path, known: KnownExperiments) -> list[list[str]] | None:
     names = ("experiment", *(["section"] if kind.velocity else []))
     place = ("x", *(["y"] if kind.at_point else []))
     of_others = {other.column for other in KINDS.values()} - {kind.column}
-    if not {kind.column, *names, *place} <= heading or of_others & heading or OF_FORTRAN.search(text):
+    flagged = any(OF_FLAGS.fullmatch(words_of(name)) for name in heading)
+    if not {kind.column, *names, *place} <= heading or of_others & heading or flagged or OF_FORTRAN.search(text):
         return None
     rows = read_table(path, names, (*place, kind.column), (kind.error_column,))
     known.refuse_unknown(shown_path(path), rows.index.tolist(), rows["experiment"].tolist())
     y = rows["y"] if "y" in rows.columns else np.zeros(len(rows))
-    if kind.name in DOUBTED_KINDS and (rows[kind.column] == 0.0).any():  # which may be none: read on
+    values = rows[kind.column]
+    if any(map(is_mark, values)) or (kind.name in DOUBTED_KINDS and (values == 0.0).any()):  # may be none: converted
         return None
-    columns = (rows["experiment"], rows["x"], y, rows[kind.column])
+    columns = (rows["experiment"], rows["x"], y, values)
     return [[str(one) for one in row] for row in zip(*columns, strict=True)]
 
 

@@ -230,6 +230,11 @@ def read_placed_rows(path: Path, options: FileOptions) -> MeasuredRows:
     if {"below", "depth"} <= taken.numbers.keys() and vertical_role(taken) is None:
         height = taken.numbers["depth"] - taken.numbers["below"]
         taken = taken.having({"height": height}, "height above the bed from both depths")
+    if {"u", "depth"} <= taken.numbers.keys():  # edges of a gauging, where the bank meets the water
+        edges = (taken.numbers["u"] == 0.0) & (taken.numbers["depth"] <= 0.0)
+        if edges.any():
+            u = np.where(edges, np.nan, taken.numbers["u"])
+            taken = taken.having({"u": u}, f"{so_many(int(edges.sum()), 'edge')} without a depth left out")
     if options.line is not None:
         places = [taken.columns[role] for role in ("x", "y") if role in taken.numbers]
         if places:
