@@ -1,15 +1,11 @@
 """Chances of what competes: as often true as told, tempered by what fingerprints may be wrong, and told anew."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from vegglue.calibration import score_test
-from vegglue.diagnosis import competition
-from vegglue.diagnosis.competition import hypotheses_of, tempered_odds, tempered_probabilities
+from vegglue.diagnosis.competition import tempered_odds, tempered_probabilities, worth_refitting
 from vegglue.diagnosis.search_state import followed_further, with_chances
-from vegglue.progress import silent
 from vegglue.results.causes import Step
 
 ROWS, SLOPES, PRINTS = 60, 3, 8
@@ -69,44 +65,11 @@ def test_what_was_accepted_on_trial_stands_in_its_set() -> None:
     assert (told.accepted, told.rivals, told.groups) == ("c", ("a", "b", "c"), (("a", "b"), ("c",)))
 
 
-@pytest.mark.parametrize(("kept", "refitted"), [(None, "ab"), (2.0, "ab"), (18.0, "a")])
-def test_what_promised_most_and_keeps_less_leaves_room_for_others(
-    monkeypatch: pytest.MonkeyPatch, kept: float | None, refitted: str
-) -> None:
-    """To first order a promises 20, b 3 and c -30; c is out of reach of what is left. kept: by a once it is refitted,
-    or no flow.
-    """
-    promise, tried = np.array([20.0, 3.0, -30.0]), []
-
-    def refits(_search: object, trials: list[str], _watch: object) -> list[SimpleNamespace | None]:
-        tried.extend(trials)
-        ends = {"a": kept, "b": 3.0, "c": -30.0}
-        return [
-            None
-            if (end := ends[name]) is None
-            else SimpleNamespace(log_factor=end, candidate=SimpleNamespace(name=name))
-            for name in trials
-        ]
-
-    monkeypatch.setattr(competition, "refits_of", refits)
-    monkeypatch.setattr(competition, "conditional_screenings", lambda _: ())
-    monkeypatch.setattr(competition, "_effect_trial", lambda _screening, j, *_: "abc"[j])
-    kind = SimpleNamespace(name="effect", total=20.0, log_evidence=promise, log_prior=np.zeros(3))
-    columns, candidates = [np.array([j]) for j in range(3)], [SimpleNamespace(name=name) for name in "abc"]
-    fingerprints = SimpleNamespace(candidates=candidates, columns=columns, places=())
-    screening = SimpleNamespace(kinds=(kind,), fingerprints=fingerprints, instruments={}, search=None)
-    found = hypotheses_of(screening, silent)
-    assert "".join(tried) == refitted
-    assert {one.name for one in found} == set(refitted) - ({"a"} if kept is None else set())
-
-
-def test_without_a_listed_effect_all_else_competes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(competition, "conditional_screenings", lambda _: ())
-    monkeypatch.setattr(competition, "refits_of", lambda *_: [])
-    none = SimpleNamespace(name="effect", total=-np.inf, log_evidence=np.zeros(0), log_prior=np.zeros(0))
-    gauge = SimpleNamespace(name="gauge", total=2.0, best=0)
-    fingerprints = SimpleNamespace(candidates=[], columns=[], places=())
-    screening = SimpleNamespace(
-        kinds=(none, gauge), fingerprints=fingerprints, instruments={"gauge": ("the gauge",)}, search=None
-    )
-    assert [one.what for one in hypotheses_of(screening, silent)] == ["the gauge"]
+def test_effects_are_refitted_while_they_are_within_reach_of_what_is_kept() -> None:
+    """To first order a promises 20, b 3 and c -30. If a keeps less, or has no flow, b is within reach, and c never."""
+    promised = np.array([20.0, 3.0, -30.0])
+    assert worth_refitting(promised, 20.0) == [0]
+    assert worth_refitting(promised, 18.0) == [0]
+    assert worth_refitting(promised, 3.0) == [0, 1]
+    assert worth_refitting(promised, 100.0) == [0], "one at least"
+    assert worth_refitting(np.zeros(0), -np.inf) == []

@@ -38,7 +38,7 @@ from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Instrument, InstrumentKind, place_candidate, with_effect
 from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Places, places_around
-from vegglue.calibration.residual_screening import ConditionalScreening, Screening, conditional_screenings, refit_start
+from vegglue.calibration.residual_screening import Screening, conditional_screenings, refit_start
 from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
@@ -104,46 +104,40 @@ class FoundPlace:
 
 def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot: int, refit: Refit) -> FoundPlace:
     """Something refitted at a spot, moved to where it explains most."""
-    moved, window = _moved(search, places, refit, MOST_MOVES)
-    near = _is_near(places, spot, window)
+    moved, window = refit, _window(search, places, refit)
+    for _ in range(MOST_MOVES):
+        best = int(np.argmax(window.log_factor))
+        if window.log_factor[best] < moved.log_factor + LEAST_RISE:
+            break
+        shapes = {**moved.shapes, "x": round(float(window.x[best]), 2), "y": round(float(window.y[best]), 2)}
+        candidate = place_candidate(moved.candidate.effect, shapes, places.plausible)
+        if candidate.key in search.model.case.effects:  # it would take the place of what acts there
+            break
+        start = start_with(search.model.case, candidate, shapes, moved.fitted.point.z[:-1], float(window.gain[best]))
+        (there,) = refits_of(search, [RefitTrial(candidate, shapes, (start,))])
+        if there is None or there.log_factor < moved.log_factor + LEAST_RISE:
+            break
+        moved, window = there, _window(search, places, there)
+    # Spots of the size of that one which the window has seen again are replaced by it.
+    half = SHARE_OF_SPACING * np.array([places.length[spot], places.width[spot]])
+    within = (places.x >= window.x.min() - half[0]) & (places.x <= window.x.max() + half[0])
+    within &= (places.y >= window.y.min() - half[1]) & (places.y <= window.y.max() + half[1])
+    far = ~((places.length == places.length[spot]) & within)
     # Elsewhere first-order evidence promises as much too much as at the spot that was refitted.
     kept = refit.log_factor - float(log_factors(kind.scores, kind.size)[spot])
     weight = np.concatenate([
-        kind.log_evidence[~near] + kept,
+        kind.log_evidence[far] + kept,
         window.log_factor + kind.log_prior[spot] + 2.0 * np.log(SHARE_OF_SPACING),
     ])  # fmt: skip
     away = np.stack([
-        np.concatenate([places.x[~near], window.x]) - moved.shapes["x"],
-        np.concatenate([places.y[~near], window.y]) - moved.shapes["y"],
+        np.concatenate([places.x[far], window.x]) - moved.shapes["x"],
+        np.concatenate([places.y[far], window.y]) - moved.shapes["y"],
     ])  # fmt: skip
     total = float(logsumexp(weight))
     errors, spread = (
-        _root_mean_square(away, chance) for chance in (tempered_probabilities(weight), np.exp(weight - total))
+        np.sqrt(away**2 @ chance).tolist() for chance in (tempered_probabilities(weight), np.exp(weight - total))
     )
-    return FoundPlace(moved, total, errors, spread)
-
-
-def _root_mean_square(away: Array, chance: Array) -> tuple[float, float]:
-    """Of distances in x and y (2, spot), each with its chance (spot,)."""
-    along, across = np.sqrt(away**2 @ chance)
-    return float(along), float(across)
-
-
-def _moved(search: SearchModel, places: Places, refit: Refit, moves: int) -> tuple[Refit, Window]:
-    """The refit at the best place that it leads to, and the window around that."""
-    window = _window(search, places, refit)
-    best = int(np.argmax(window.log_factor))
-    if moves == 0 or window.log_factor[best] < refit.log_factor + LEAST_RISE:
-        return refit, window
-    shapes = {**refit.shapes, "x": round(float(window.x[best]), 2), "y": round(float(window.y[best]), 2)}
-    candidate = place_candidate(refit.candidate.effect, shapes, places.plausible)
-    if candidate.key in search.model.case.effects:  # it would take the place of what acts there
-        return refit, window
-    start = start_with(search.model.case, candidate, shapes, refit.fitted.point.z[:-1], float(window.gain[best]))
-    (there,) = refits_of(search, [RefitTrial(candidate, shapes, (start,))])
-    if there is None or there.log_factor < refit.log_factor + LEAST_RISE:
-        return refit, window
-    return _moved(search, places, there, moves - 1)
+    return FoundPlace(moved, total, tuple(errors), tuple(spread))
 
 
 def _window(search: SearchModel, places: Places, refit: Refit) -> Window:
@@ -162,15 +156,6 @@ def _window(search: SearchModel, places: Places, refit: Refit) -> Window:
     gain = expected_gain(score, projected.length, size)
     first_order = log_factors(score, size)
     return Window(around.x, around.y, first_order - first_order[own] + refit.log_factor, gain)
-
-
-def _is_near(places: Places, spot: int, window: Window) -> np.ndarray:
-    """Which spots of the size of that one the window has seen again (spot,)."""
-    alike = places.length == places.length[spot]
-    half = SHARE_OF_SPACING * np.array([places.length[spot], places.width[spot]])
-    within = (places.x >= window.x.min() - half[0]) & (places.x <= window.x.max() + half[0])
-    within &= (places.y >= window.y.min() - half[1]) & (places.y <= window.y.max() + half[1])
-    return np.asarray(alike & within)
 
 
 # Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
@@ -204,85 +189,67 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
     rest is refitted, too, until nothing is.
     """
     kind, looks = screening.kinds[0], conditional_screenings(screening)
-    linear = _linear_evidence(kind, looks)
-    best = max(*(kind.total for kind in screening.kinds), float(linear.max(initial=-np.inf)), elsewhere)
-    found, tried = _instrument_hypotheses(screening), set[str]()
-    while True:
-        of_round = _round(screening, linear, best, tried)
-        if not of_round.effects and not of_round.places:
-            return sorted(found, key=lambda one: -one.log_evidence)
-        watch(Progress(f"comparing {', '.join(of_round.names(screening))}"))
-        found += _refitted(screening, of_round, (linear, looks), watch)
-        tried |= set(of_round.names(screening))
-        kept = [one.log_evidence for one in found]
-        best = max(elsewhere, *kept, *_promises(screening, linear, tried))
-
-
-@dataclass(frozen=True)
-class _Round:
-    """What is refitted together: effects by their indices, and terms at places with the spots to start from."""
-
-    effects: list[int]
-    places: list[tuple[Places, list[int]]]
-
-    def names(self, screening: Screening) -> list[str]:
-        candidates = screening.fingerprints.candidates
-        return [candidates[j].name for j in self.effects] + [one.name for one, _ in self.places]
-
-
-def _round(screening: Screening, linear: Array, best: float, tried: set[str]) -> _Round:
-    """What is within reach of the best and was not tried."""
-    candidates = screening.fingerprints.candidates
-    effects = [j for j in _worth_refitting(screening, linear, best) if candidates[j].name not in tried]
-    places = [
-        (one, promising_spots(screening, one, best))
-        for one in screening.fingerprints.places
-        if one.name not in tried and _within_reach(kind_named(screening.kinds, one.term).total, best)
+    prints, search, case = screening.fingerprints, screening.search, screening.search.model.case
+    # E of every column of the listed effects, from the place that promises most, and the best column of each effect.
+    linear = np.asarray(np.max([kind.log_evidence, *(one.log_factor + kind.log_prior for one in looks)], axis=0))
+    columns = [int(some[np.argmax(linear[some])]) for some in prints.columns]
+    of_each = np.array([linear[column] for column in columns])
+    best = max(*(one.total for one in screening.kinds), float(linear.max(initial=-np.inf)), elsewhere)
+    found = [
+        Hypothesis(one.name, one.name, one.total, one.best, screening.instruments[one.name][one.best])
+        for one in screening.kinds
+        if one.name in screening.instruments
     ]
-    return _Round(effects, places)
-
-
-def _promises(screening: Screening, linear: Array, tried: set[str]) -> list[float]:
-    """ln evidence to first order of what may be refitted and was not tried."""
-    candidates = screening.fingerprints.candidates
-    of_each = _of_each(screening, linear)
-    effects = [float(of_each[j]) for j in _most_promising(of_each) if candidates[j].name not in tried]
-    terms = [one.term for one in screening.fingerprints.places if one.name not in tried]
-    return effects + [kind_named(screening.kinds, term).total for term in terms]
-
-
-def _refitted(
-    screening: Screening, of_round: _Round, promised: tuple[Array, Sequence[ConditionalScreening]], watch: Watch
-) -> list[Hypothesis]:
-    """Hypotheses of one round that found a flow; promised: evidence to first order, and conditional screenings."""
-    linear = promised[0]
-    effects, spots = of_round.effects, [(one, spot) for one, some in of_round.places for spot in some]
-    trials = [_effect_trial(screening, j, *promised) for j in effects]
-    trials += [_place_trial(screening, one, spot) for one, spot in spots]
-    refits = refits_of(screening.search, trials, watch)
-    found = []
-    for j, refit in zip(effects, refits, strict=False):
-        if refit is not None:
-            column = _column_of(screening, j, linear)
-            evidence = refit.log_factor + _settings_charge(screening, j, column)
-            found.append(Hypothesis("effect", refit.candidate.name, evidence, column, refit))
-    for one, _ in of_round.places:
-        of_term = zip(spots, refits[len(effects) :], strict=True)
-        ended = [(spot, refit) for (where, spot), refit in of_term if where is one and refit is not None]
-        found += _place_hypothesis(screening.search, one, kind_named(screening.kinds, one.term), ended)
-    return found
-
-
-def _place_hypothesis(
-    search: SearchModel, places: Places, kind: HypothesisKind, refits: Sequence[tuple[int, Refit]]
-) -> list[Hypothesis]:
-    """Something at the place where it explains most, see `place_search`; none if no flow was found at any spot."""
-    if not refits:
-        return []
-    spot, best = max(refits, key=lambda one: one[1].log_factor)
-    there = found_place(search, places, kind, spot, best)
-    found = there.refit
-    return [Hypothesis(kind.name, found.candidate.name, there.log_evidence, spot, found, there.errors, there.spread)]
+    tried: set[str] = set()
+    while True:
+        effects = [j for j in worth_refitting(of_each, best) if prints.candidates[j].name not in tried]
+        places = [
+            (one, promising_spots(screening, one, best))
+            for one in prints.places
+            if one.name not in tried and _within_reach(kind_named(screening.kinds, one.term).total, best)
+        ]
+        names = [prints.candidates[j].name for j in effects] + [one.name for one, _ in places]
+        if not names:
+            return sorted(found, key=lambda one: -one.log_evidence)
+        watch(Progress(f"comparing {', '.join(names)}"))
+        trials = []
+        for j in effects:  # at its best setting, from the best place, and from others that promise more there
+            column, candidate = columns[j], prints.candidates[j]
+            shapes, by_score = prints.settings[column], kind.log_evidence[column] - kind.log_prior[column]
+            others = (
+                start_with(case, candidate, shapes, look.point.z, float(look.gain[column]))
+                for look in looks
+                if look.log_factor[column] > by_score
+            )
+            trials.append(RefitTrial(candidate, shapes, (refit_start(screening, j, column), *others)))
+        spots = [(one, spot) for one, some in places for spot in some]
+        for one, spot in spots:  # from the best place and shares of the size of its score
+            shapes, gain = one.shapes(spot), float(kind_named(screening.kinds, one.term).gain[spot])
+            candidate = place_candidate(library(case.effect_file)[EFFECT_AT_PLACE[one.term]], shapes, one.plausible)
+            starts = (start_with(case, candidate, shapes, search.point.z, share * gain) for share in START_SHARES)
+            trials.append(RefitTrial(candidate, shapes, tuple(starts)))
+        refits = refits_of(search, trials, watch)
+        for j, refit in zip(effects, refits, strict=False):
+            if refit is not None:  # ln prior of the setting, and what the other settings add to first order
+                some, evidence = prints.columns[j], kind.log_evidence
+                others_add = float(np.logaddexp.reduce(evidence[some]) - evidence[some].max())
+                total = refit.log_factor + (float(kind.log_prior[columns[j]]) + others_add)
+                found.append(Hypothesis("effect", refit.candidate.name, total, columns[j], refit))
+        for one, _ in places:
+            of_term = zip(spots, refits[len(effects) :], strict=True)
+            ended = [(spot, refit) for (of, spot), refit in of_term if of is one and refit is not None]
+            if ended:
+                of_kind = kind_named(screening.kinds, one.term)
+                spot, refit = max(ended, key=lambda end: end[1].log_factor)
+                there = found_place(search, one, of_kind, spot, refit)
+                name = there.refit.candidate.name
+                found.append(
+                    Hypothesis(of_kind.name, name, there.log_evidence, spot, there.refit, there.errors, there.spread)
+                )
+        tried |= set(names)
+        promising = [float(of_each[j]) for j in _promising(of_each) if prints.candidates[j].name not in tried]
+        promising += [kind_named(screening.kinds, one.term).total for one in prints.places if one.name not in tried]
+        best = max(elsewhere, *(one.log_evidence for one in found), *promising)
 
 
 def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
@@ -290,30 +257,20 @@ def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
     return tempered_probabilities(np.array([one.log_evidence for one in hypotheses]))
 
 
+def worth_refitting(evidence: Array, best: float) -> list[int]:
+    """Listed effects, of which the ln evidence to first order is given (candidate,), that are not far behind the best:
+    the best first, one of them at least.
+    """
+    ranked = _promising(evidence)
+    return [j for j in ranked if _within_reach(float(evidence[j]), best)] or ranked[:1]
+
+
+def _promising(evidence: Array) -> list[int]:
+    return [int(j) for j in np.argsort(-evidence)[:MOST_REFITTED]]
+
+
 def _within_reach(evidence: float, best: float) -> bool:
     return bool((best - evidence) / tempering(np.array(best)) < REACH)
-
-
-def _linear_evidence(kind: HypothesisKind, looks: Sequence[ConditionalScreening]) -> Array:
-    """E of every column of the listed effects (c,), from the place that promises most."""
-    promised = [kind.log_evidence, *(one.log_factor + kind.log_prior for one in looks)]
-    return np.asarray(np.max(promised, axis=0))
-
-
-def _worth_refitting(screening: Screening, linear: Array, best: float) -> list[int]:
-    """Listed effects whose evidence is not far behind the best, the best first, one of them at least."""
-    of_each = _of_each(screening, linear)
-    ranked = _most_promising(of_each)
-    return [j for j in ranked if _within_reach(float(of_each[j]), best)] or ranked[:1]
-
-
-def _of_each(screening: Screening, linear: Array) -> Array:
-    """E of the best column of each listed effect (candidate,)."""
-    return np.array([linear[columns].max() for columns in screening.fingerprints.columns])
-
-
-def _most_promising(of_each: Array) -> list[int]:
-    return [int(j) for j in np.argsort(-of_each)[:MOST_REFITTED]]
 
 
 def promising_spots(screening: Screening, places: Places, best: float) -> list[int]:
@@ -328,54 +285,6 @@ def promising_spots(screening: Screening, places: Places, best: float) -> list[i
     spots = [int(columns[np.argmax(evidence[columns])]) for columns in of_length]
     charge = kind.total - float(kind.log_evidence.max())
     return [spot for spot in spots if _within_reach(float(evidence[spot]) + charge, best)]
-
-
-def _column_of(screening: Screening, candidate: int, linear: Array) -> int:
-    columns = screening.fingerprints.columns[candidate]
-    return int(columns[np.argmax(linear[columns])])
-
-
-def _effect_trial(
-    screening: Screening, candidate: int, linear: Array, looks: Sequence[ConditionalScreening]
-) -> RefitTrial:
-    """A listed effect at its best setting, from the best place, and from others that promise more there."""
-    column, one = _column_of(screening, candidate, linear), screening.fingerprints.candidates[candidate]
-    shapes, case = screening.fingerprints.settings[column], screening.search.model.case
-    by_score = screening.kinds[0].log_evidence[column] - screening.kinds[0].log_prior[column]
-    others = tuple(
-        start_with(case, one, shapes, look.point.z, float(look.gain[column]))
-        for look in looks
-        if look.log_factor[column] > by_score
-    )
-    return RefitTrial(one, shapes, (refit_start(screening, candidate, column), *others))
-
-
-def _place_trial(screening: Screening, places: Places, spot: int) -> RefitTrial:
-    """Something unlisted at one spot, from the best place and the size of its score."""
-    case, search = screening.search.model.case, screening.search
-    kind = kind_named(screening.kinds, places.term)
-    shapes = places.shapes(spot)
-    candidate = place_candidate(library(case.effect_file)[EFFECT_AT_PLACE[places.term]], shapes, places.plausible)
-    gain = float(kind.gain[spot])
-    starts = (start_with(case, candidate, shapes, search.point.z, share * gain) for share in START_SHARES)
-    return RefitTrial(candidate, shapes, tuple(starts))
-
-
-def _settings_charge(screening: Screening, candidate: int, column: int) -> float:
-    """ln prior of an effect whose setting `column` was refitted, and what its other settings add to first order."""
-    columns, kind = screening.fingerprints.columns[candidate], screening.kinds[0]
-    evidence = kind.log_evidence
-    others = float(np.logaddexp.reduce(evidence[columns]) - evidence[columns].max())
-    return float(kind.log_prior[column]) + others
-
-
-def _instrument_hypotheses(screening: Screening) -> list[Hypothesis]:
-    """The best instrument of each kind, with the evidence of its kind."""
-    return [
-        Hypothesis(kind.name, kind.name, kind.total, kind.best, screening.instruments[kind.name][kind.best])
-        for kind in screening.kinds
-        if kind.name in screening.instruments
-    ]
 
 
 # Hypotheses of different kinds that are followed a step further at most: each costs a calibration and a screening.
