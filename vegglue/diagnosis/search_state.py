@@ -110,6 +110,25 @@ class SearchState:
         """How many effects and places."""
         return len(self.steps) + len(self.places)
 
+    def with_place(self, place: LocalAnomaly, weight: PriorWeight, lost: float) -> "SearchState":
+        """Something at a place more; lost: ln evidence that the error of its shape takes."""
+        weights = (*self.prior_weights, weight)
+        return replace(self, places=(*self.places, place), prior_weights=weights, of_shape=self.of_shape + lost)
+
+    def with_step(self, step: Step, unneeded: Sequence[str], explained: float, log_prior: float) -> "SearchState":
+        """A listed effect more, which explains besides what those explained that it makes unneeded."""
+        kept = tuple(one for one in self.steps if one.accepted not in unneeded)
+        weights = [one for one in self.prior_weights if one.name not in unneeded]
+        earlier = sum(one.explained for one in self.prior_weights if one.name in unneeded)
+        weight = PriorWeight(step.accepted, explained + earlier, log_prior)
+        return replace(self, steps=(*kept, step), prior_weights=(*weights, weight))
+
+    def with_steps(self, steps: tuple[Step, ...]) -> "SearchState":
+        """The same steps with other rivals in the model, which keep the prior weights of those that they replace."""
+        now = {before.accepted: after.accepted for before, after in zip(self.steps, steps, strict=True)}
+        weights = tuple(replace(one, name=now.get(one.name, one.name)) for one in self.prior_weights)
+        return replace(self, steps=steps, prior_weights=weights)
+
 
 # Share of the squared fingerprint of a spot above which an experiment is said to point at it.
 POINTS_AT_IT = 0.1
