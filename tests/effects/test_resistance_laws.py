@@ -11,6 +11,7 @@ from channels import make_problem, planted, sloping, solved
 
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
+from vegglue.case.site_schema import VegetationType
 from vegglue.diagnosis.effect_contract import CHANNEL
 from vegglue.effects.bed_laws import CHEZY, KEULEGAN, MANNING, cube_root, logarithm, wall_coefficient
 from vegglue.effects.plant_laws import PLANT_LAWS

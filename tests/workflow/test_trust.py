@@ -11,7 +11,7 @@ from house import FILES
 from reach import COARSE, said_to, write_reach
 
 import vegglue
-from vegglue.case import consistency
+from vegglue.case import config as case_config
 from vegglue.case.config import load_case
 from vegglue.errors import InputError
 
@@ -98,7 +98,7 @@ def test_a_file_without_end_or_name_is_refused_at_once(tmp_path: Path, monkeypat
     for name in ("loop.csv", "pipe.csv", "x" * 300):
         with pytest.raises(InputError, match="cannot be read"):
             load_case(name)
-    monkeypatch.setattr(consistency, "LARGEST_DATA", 10)
+    monkeypatch.setattr(case_config, "LARGEST_DATA", 10)
     with pytest.raises(InputError, match="expected a file of at most 10 bytes"):
         load_case(write_reach(tmp_path))
 
