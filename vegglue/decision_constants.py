@@ -50,8 +50,8 @@ class DecisionConstants:
         "beside whose spot two more places were accepted without it",
     )  # fmt: skip
     law_fingerprint_error: float = _constant(
-        0.07, "-", CHOSEN, "relative error of the fingerprint of a law, most of it being common to the quantities of "
-        "one term; after 76 sets of the study of laws with 0, 0.07 and 0.15",
+        0.07, "-", CHOSEN, "relative error of the fingerprint of a law in `discover`, most of it being common to the "
+        "quantities of one term; after 76 sets of the study of laws with 0, 0.07 and 0.15",
     )  # fmt: skip
     misplaced_share: float = _constant(
         0.1, "-", MEASURED, "share of an accepted fingerprint that the model may place wrongly; on open-c and open-e",
@@ -117,8 +117,9 @@ class DecisionConstants:
         "3.6 where two codes differed",
     )  # fmt: skip
     mostly_elsewhere: float = _constant(
-        3.0, "-", CHOSEN, "largest change halfway between the sections over that at the stations from which a place is "
-        "not added; after one object of 6.0 among 68 of the blind study, 0.1 to 2.2 in others",
+        3.0, "-", CHOSEN, "largest change halfway between the sections over that at the stations from which `extend` "
+        "adds no place (`diagnose` does not use it); after one object of 6.0 among 68 of the blind study, 0.1 to 2.2 in "
+        "others",
     )  # fmt: skip
     held_out_ratio: float = _constant(
         1.3, "-", CHOSEN, "held-out errors over expected ones above which the model disagrees with the data",
