@@ -118,8 +118,8 @@ class DecisionConstants:
     )  # fmt: skip
     mostly_elsewhere: float = _constant(
         3.0, "-", CHOSEN, "largest change halfway between the sections over that at the stations from which `extend` "
-        "adds no place (`diagnose` does not use it); after one object of 6.0 among 68 of the blind study, 0.1 to 2.2 in "
-        "others",
+        "adds no place (`diagnose` does not use it); after one object of 6.0 among 68 of the blind study, 0.1 to 2.2 "
+        "in others",
     )  # fmt: skip
     held_out_ratio: float = _constant(
         1.3, "-", CHOSEN, "held-out errors over expected ones above which the model disagrees with the data",
