@@ -88,7 +88,17 @@ def read_file_options(given: Any, where: str) -> FileOptions:
             raise InputError(f"{where} does not know `{key}`: {nearest(str(key), known)}")
     found: dict[str, Any] = {key: str(given[key]) for key in ("experiment", "section", "sheet") if key in given}
     for key in ("columns", "units"):
-        found[key] = _by_role(given.get(key, {}), f"{where}.{key}")
+        entries = given.get(key, {})
+        if not isinstance(entries, Mapping):
+            raise InputError(f"{where}.{key} expected entries such as `u: V_mean`, got {entries!r}.")
+        for name, value in entries.items():
+            if name not in ROLES and str(value) in ROLES:
+                raise InputError(
+                    f"{where}.{key} expected what is measured first, `{value}: {name}`, got `{name}: {value}`."
+                )
+            if name not in ROLES:
+                raise InputError(f"{where}.{key} does not know `{name}`: {nearest(str(name), ROLES)}")
+        found[key] = {str(name): str(value) for name, value in entries.items()}
     for role, unit in found["units"].items():
         si_factor(unit, ROLES[role].quantity or "length", f"{where}.units.{role}")
     for key, quantity in LENGTHS_AND_ANGLES.items():
@@ -145,17 +155,6 @@ def _errors_by_unit(given: Any, where: str) -> dict[str, float]:
     if min(found.values()) < 0.0:
         raise InputError(f"{where} expected a number of 0 or above, got {given!r}; correct it.")
     return found
-
-
-def _by_role(given: Any, where: str) -> dict[str, str]:
-    if not isinstance(given, Mapping):
-        raise InputError(f"{where} expected entries such as `u: V_mean`, got {given!r}.")
-    for name, value in given.items():
-        if name not in ROLES and str(value) in ROLES:
-            raise InputError(f"{where} expected what is measured first, `{value}: {name}`, got `{name}: {value}`.")
-        if name not in ROLES:
-            raise InputError(f"{where} does not know `{name}`: {nearest(str(name), ROLES)}")
-    return {str(name): str(value) for name, value in given.items()}
 
 
 def _lengths(given: Any, count: int, where: str) -> tuple[float, ...]:

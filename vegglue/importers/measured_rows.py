@@ -291,7 +291,20 @@ def in_the_channel(taken: MeasuredRows, place: Placement, options: FileOptions) 
         roles = [role for role in taken.numbers if ROLES[role].quantity == "velocity"]
         scaled = {role: options.factor * taken.numbers[role] for role in roles}
         taken = taken.having(scaled, f"velocities times {options.factor:g}")
-    taken = _without_speed_again(_components_of_speed(taken))
+    numbers = taken.numbers
+    known = [roles for roles in (("east_velocity", "north_velocity"), ("u",)) if set(roles) <= numbers.keys()]
+    if {"speed", "direction"} <= numbers.keys() and "u" not in numbers and "east_velocity" not in numbers:
+        # u_E = s sin d and u_N = s cos d, with the direction d from north, clockwise, that the water flows to.
+        to = np.radians(numbers["direction"])
+        parts = {"east_velocity": numbers["speed"] * np.sin(to), "north_velocity": numbers["speed"] * np.cos(to)}
+        if (error := numbers.get("speed_se")) is not None:  # one error for a velocity is that of both components
+            parts |= {"u_se": error, "v_se": error}
+        taken = taken.having(parts, "components from speed and direction").without("speed", "direction", "speed_se")
+    elif "speed" in numbers and known:  # beside a component it is the same reading, and would count twice
+        again = np.any([np.isfinite([numbers[role] for role in roles]).all(axis=0) for roles in known], axis=0)
+        if again.any():
+            left = np.where(again, np.nan, numbers["speed"])
+            taken = taken.having({"speed": left}, "speed not taken again beside its components")
     if place.turned and options.coordinates != "channel" and {"x", "y"} <= taken.numbers.keys():
         x, y = place.to_channel(taken.numbers["x"], taken.numbers["y"])
         into = "the channel" if place.line is None else "lengths along and across the centreline"
@@ -305,32 +318,6 @@ def in_the_channel(taken: MeasuredRows, place: Placement, options: FileOptions) 
     x0, y0 = options.zero
     moved = {axis: taken.numbers[axis] + at for axis, at in (("x", x0), ("y", y0)) if axis in taken.numbers}
     return taken.having(moved, f"zero at x = {x0:g}, y = {y0:g} m")
-
-
-def _components_of_speed(taken: MeasuredRows) -> MeasuredRows:
-    """u_E = s sin d and u_N = s cos d, with the direction d from north, clockwise, that the water flows to.
-
-    One error for a velocity is that of both components.
-    """
-    numbers = taken.numbers
-    if not {"speed", "direction"} <= numbers.keys() or "u" in numbers or "east_velocity" in numbers:
-        return taken
-    to = np.radians(numbers["direction"])
-    parts = {"east_velocity": numbers["speed"] * np.sin(to), "north_velocity": numbers["speed"] * np.cos(to)}
-    if (error := numbers.get("speed_se")) is not None:
-        parts |= {"u_se": error, "v_se": error}
-    return taken.having(parts, "components from speed and direction").without("speed", "direction", "speed_se")
-
-
-def _without_speed_again(taken: MeasuredRows) -> MeasuredRows:
-    """The speed only without a component: beside one it is the same reading, and would count twice."""
-    numbers = taken.numbers
-    known = [roles for roles in (("east_velocity", "north_velocity"), ("u",)) if set(roles) <= numbers.keys()]
-    if "speed" not in numbers or not known:
-        return taken
-    again = np.any([np.isfinite([numbers[role] for role in roles]).all(axis=0) for roles in known], axis=0)
-    left = np.where(again, np.nan, numbers["speed"])
-    return taken.having({"speed": left}, "speed not taken again beside its components") if again.any() else taken
 
 
 def _along_and_across(taken: MeasuredRows, place: Placement, options: FileOptions) -> MeasuredRows:

@@ -189,11 +189,6 @@ class SiteFrame(_SitePart):
         return Frame(origin=self.origin, angle=angle or 0.0, crs=self.crs)
 
 
-def _as_list(given: Any) -> Any:
-    """A single file of patches as a list of one."""
-    return [given] if isinstance(given, dict) else given
-
-
 class FieldSite(_SitePart):
     """All that a site file states; SI."""
 
@@ -206,7 +201,9 @@ class FieldSite(_SitePart):
     files: dict[PrintableName, dict[str, Any] | None] = {}
     experiments: Annotated[dict[PrintableName, MeasuredFlow], AfterValidator(_one_or_more)]
     holdout: dict[PrintableName, MeasuredFlow] = {}
-    patches: Annotated[tuple[PlantedPatch, ...], BeforeValidator(_as_list)] = ()
+    patches: Annotated[
+        tuple[PlantedPatch, ...], BeforeValidator(lambda given: [given] if isinstance(given, dict) else given)
+    ] = ()
     canopy_height_guess_m: Annotated[Number, Field(ge=0.01, le=100)] = 0.8
     eddy_viscosity_m2_s: Annotated[Number, Field(gt=0, le=1e3)] = 0.01
     eddy_viscosity_factor: Annotated[Number, Field(ge=1, le=100)] | None = None

@@ -128,8 +128,7 @@ def station_tables(
         lacking = "1 row lacks its name" if unnamed == 1 else f"{unnamed:,} rows lack their names"
         without_place = (*without_place, f"sections told by x, as {lacking}")
     named = _named(taken, options, known.names, f"{file}:")
-    taken, shares = _whole_discharges(named)
-    taken, once = _levels_once(taken)
+    taken, once = _once_in_a_section(named)
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else ("y = 0 for want of a column",)
     if options.experiment is not None and options.experiment not in known.names:
@@ -148,7 +147,7 @@ def station_tables(
     refuse_confounded_replicates(named, _places(named), file)
     found = [_stations(taken, stem, options, kind, place) for kind in kinds]
     without_value = _lacking(taken, [kind.column for kind in kinds], np.any)
-    left_out = (*on_axis, *without_place, *without_value, *shares, *once, *_at_one_height(taken))
+    left_out = (*on_axis, *without_place, *without_value, *once, *_at_one_height(taken))
     return StationTables([table for table in found if table.rows], left_out)
 
 
@@ -348,40 +347,36 @@ def _rows_of_sections(taken: MeasuredRows, role: str) -> list[list[int]]:
     return list(rows.values())
 
 
-def _whole_discharges(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ...]]:
-    """The rows with the discharge of a section once, without shares of it by verticals, and a note on these.
+def _once_in_a_section(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ...]]:
+    """The rows with the discharge of a section once, without shares of it by verticals, and with a level that all
+    verticals repeat once; and notes on these.
 
-    Several values at one y are repeats, and stay.
+    Several discharges at one y are repeats, and stay; gauges on both banks are two readings, even if they agree.
     """
-    if not {"y", "discharge"} <= taken.numbers.keys():
-        return taken, ()
-    found = taken.numbers["discharge"].copy()
-    shares = 0
-    for rows in _rows_of_sections(taken, "discharge"):
-        if np.ptp(taken.numbers["y"][rows]) == 0.0:
-            continue
-        values = found[rows]
-        alike = np.allclose(values, values[0], rtol=COPIED, atol=0.0)
-        found[rows[1:] if alike else rows] = np.nan
-        shares += 0 if alike else len(rows)
-    note = f"{so_many(shares, 'discharge')} left out, as those of one section differ: shares of its verticals"
-    return taken.having({"discharge": found}), (note,) if shares else ()
-
-
-def _levels_once(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ...]]:
-    """The rows with a level that all verticals of a section repeat once, and a note on it.
-
-    Gauges on both banks are two readings, even if they agree.
-    """
-    if not {"y", "level"} <= taken.numbers.keys() or not taken.numbers.keys() & set(VELOCITIES):
-        return taken, ()
-    found, across = taken.numbers["level"].copy(), taken.numbers["y"]
-    sections = [rows for rows in _rows_of_sections(taken, "level") if len(set(across[rows])) > 2]
-    repeated = [rows for rows in sections if np.ptp(found[rows]) == 0.0]
-    for rows in repeated:
-        found[rows[1:]] = np.nan
-    note = f"levels of {so_many(len(repeated), 'section')} once, as all rows repeat them"
-    return taken.having({"level": found}), (note,) if repeated else ()
+    notes: list[str] = []
+    across = taken.numbers.get("y", np.zeros(taken.size))
+    if {"y", "discharge"} <= taken.numbers.keys():
+        found, shares = taken.numbers["discharge"].copy(), 0
+        for rows in _rows_of_sections(taken, "discharge"):
+            if np.ptp(across[rows]) == 0.0:
+                continue
+            alike = np.allclose(found[rows], found[rows[0]], rtol=COPIED, atol=0.0)
+            found[rows[1:] if alike else rows] = np.nan
+            shares += 0 if alike else len(rows)
+        taken = taken.having({"discharge": found})
+        if shares:
+            left_out = f"{so_many(shares, 'discharge')} left out"
+            notes.append(f"{left_out}, as those of one section differ: shares of its verticals")
+    if {"y", "level"} <= taken.numbers.keys() and taken.numbers.keys() & set(VELOCITIES):
+        found = taken.numbers["level"].copy()
+        sections = [rows for rows in _rows_of_sections(taken, "level") if len(set(across[rows])) > 2]
+        repeated = [rows for rows in sections if np.ptp(found[rows]) == 0.0]
+        for rows in repeated:
+            found[rows[1:]] = np.nan
+        taken = taken.having({"level": found})
+        if repeated:
+            notes.append(f"levels of {so_many(len(repeated), 'section')} once, as all rows repeat them")
+    return taken, tuple(notes)
 
 
 def _in_verticals(taken: MeasuredRows) -> bool:

@@ -374,7 +374,14 @@ def _lines_of_sheet(path: Path, name: str | None) -> tuple[list[Line], str]:
                 elif any(cell is not None for cell in row):
                     size += BYTES_OF_CELL * len(row)  # few bytes may have a last column 16,384 cells to the right
                     refuse_larger(path, size)
-                    lines.append((number, ["" if cell is None else _text_of_cell(cell) for cell in row]))
+                    # A date has no time of day, which a workbook adds; a number typed as text has a point.
+                    texts = ["" if cell is None else str(cell).strip() for cell in row]
+                    for place, cell in enumerate(row):
+                        if isinstance(cell, datetime):
+                            texts[place] = texts[place].removesuffix(" 00:00:00")
+                        elif isinstance(cell, str) and is_number(texts[place]) and "." not in texts[place]:
+                            texts[place] = texts[place].replace(",", ".")
+                    lines.append((number, texts))
             form = "workbook" + (only if others and name is None else "")
             if skipped:
                 more = [f"{len(skipped) - MOST_ROWS_NAMED} more"] if len(skipped) > MOST_ROWS_NAMED else []
@@ -395,14 +402,6 @@ def _hidden_rows(packed: ZipFile, sheet: object) -> set[int]:
         if attributes.get(b"hidden") in (b"1", b"true"):
             hidden.add(number)
     return hidden
-
-
-def _text_of_cell(cell: object) -> str:
-    """A cell as text: a date without the time of day that a workbook adds, a number typed as text with a point."""
-    text = str(cell).strip()
-    if isinstance(cell, datetime):
-        return text.removesuffix(" 00:00:00")
-    return text.replace(",", ".") if isinstance(cell, str) and is_number(text) and "." not in text else text
 
 
 def without_copies(table: ParsedTable) -> ParsedTable:

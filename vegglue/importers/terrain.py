@@ -240,7 +240,9 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
     """The bed in a file. sections: whether its points stand in cross-sections. InputError."""
     ending = path.suffix.lower()
     if ending in RASTERS:
-        raster = read_geotiff(path, place.frame) if ending in (".tif", ".tiff") else _read_grid(path, place.frame)
+        if ending not in (".tif", ".tiff") and (system := path.with_suffix(".prj")).is_file():
+            refuse_other_system(path, system_of_wkt(readable_text(system)), place.frame)
+        raster = read_geotiff(path, place.frame) if ending in (".tif", ".tiff") else read_raster(path)
         raster, filled_up = _without_fill(raster)
         reader = RegularGridInterpolator((raster.x, raster.y), raster.values, bounds_error=False, fill_value=np.nan)
         known = np.argwhere(~np.isnan(raster.values))
@@ -274,13 +276,6 @@ def _extent(x: Array, y: Array) -> tuple[float, float, float, float]:
     return float(x.min()), float(x.max()), float(y.min()), float(y.max())
 
 
-def _read_grid(path: Path, frame: Frame | None) -> Raster:
-    """An ESRI ASCII grid, and the system in the .prj beside it. InputError."""
-    if (system := path.with_suffix(".prj")).is_file():
-        refuse_other_system(path, system_of_wkt(readable_text(system)), frame)
-    return read_raster(path)
-
-
 def _without_fill(raster: Raster) -> tuple[Raster, str]:
     """The raster without levels that are none, declared or not, and a note on them.
 
@@ -310,7 +305,10 @@ def read_geotiff(path: Path, frame: Frame | None = None) -> Raster:
     with importing("tifffile", path, "GeoTIFFs", "field", "save it as an ESRI ASCII grid"):
         import tifffile
     with read_by_library(path, "a GeoTIFF", "tifffile"), tifffile.TiffFile(path) as file:
-        _teach_lzw(tifffile.tifffile.imagecodecs)
+        codecs = tifffile.tifffile.imagecodecs
+        for name, decoder in (("lzw_decode", lzw_decode), ("floatpred_decode", floatpred_decode)):
+            if not hasattr(codecs, name):  # as without the library imagecodecs
+                setattr(codecs, name, decoder)
         page = file.pages.first
         refuse_larger(path, page.nbytes)  # before they are unpacked
         known = (PIXEL_SCALE, TIE_POINT, KEYS, NO_DATA, GDAL_METADATA)
@@ -332,7 +330,10 @@ def read_geotiff(path: Path, frame: Frame | None = None) -> Raster:
             levels = np.where(levels == mark, np.nan, levels)
         directory = tags.get(KEYS, ())
         keys = dict(zip(directory[4::4], directory[7::4], strict=False))
-        _refuse_system_of_keys(path, keys, frame)
+        number = keys.get(PROJECTED_SYSTEM, 0)
+        metres = FEET.get(keys.get(LENGTH_UNITS, 0), 1.0) if keys.get(KIND_OF_SYSTEM) != OF_DEGREES else 0.0
+        number = 0 if number == USER_DEFINED else number
+        refuse_other_system(path, StatedSystem(number, "its GeoTIFF keys", metres), frame)
         band = dict(
             re.findall(r'<Item[^>]*sample="0"[^>]*role="(\w+)"[^>]*>([^<]*)<', str(tags.get(GDAL_METADATA, "")))
         )
@@ -348,20 +349,6 @@ def read_geotiff(path: Path, frame: Frame | None = None) -> Raster:
         if not (np.diff(x) > 0.0).all() or not (np.diff(y) < 0.0).all():
             raise ValueError(f"pixels of {size:g} m at {east:g}, {north:g} m have no places of their own")
         return Raster(x, y[::-1].copy(), size, levels[::-1].T)
-
-
-def _refuse_system_of_keys(path: Path, keys: Mapping[int, int], frame: Frame | None) -> None:
-    number = keys.get(PROJECTED_SYSTEM, 0)
-    metres = FEET.get(keys.get(LENGTH_UNITS, 0), 1.0) if keys.get(KIND_OF_SYSTEM) != OF_DEGREES else 0.0
-    refuse_other_system(path, StatedSystem(0 if number == USER_DEFINED else number, "its GeoTIFF keys", metres), frame)
-
-
-def _teach_lzw(codecs: Any) -> None:
-    """Give tifffile decoders of LZW and of predicted floating-point numbers if it has none, as without imagecodecs."""
-    if not hasattr(codecs, "lzw_decode"):
-        codecs.lzw_decode = lzw_decode
-    if not hasattr(codecs, "floatpred_decode"):
-        codecs.floatpred_decode = floatpred_decode
 
 
 def lzw_decode(data: bytes, out: object = None) -> bytes:

@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -90,6 +90,7 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
         For another file, for degrees, and for a heading that is not there.
     """
     unitless: tuple[str, ...] = ()
+    features: list[tuple[Ring, Properties]]
     if path.suffix.lower() in TABLES:
         features, unitless = _polygons_of_table(path, columns)
     elif path.suffix.lower() == ".shp":
@@ -98,7 +99,18 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
                 (ring, one.record.as_dict()) for one in found for ring in _outlines(one.shape.__geo_interface__)
             ]
     else:
-        features = _polygons_of_geojson(path, frame)
+        features = []
+        with geojson_features(path, "polygons", frame) as mapped:
+            for number, feature in enumerate(mapped, 1):
+                own = dict(feature.get("properties") or {})
+                geometry = feature["geometry"]
+                if geometry is None or geometry["type"] not in ("Polygon", "MultiPolygon"):
+                    got = "one of no place" if geometry is None else f"a {str(geometry['type'])[:40]}"
+                    raise InputError(
+                        f"{shown_path(path)}: expected polygons alone, got {got} as feature {number}; take it out, or "
+                        "save it as the area that it stands for."
+                    )
+                features += [(ring, own) for ring in _outlines(geometry)]
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
     _refuse_degrees(path, frame, [ring for ring, _ in features])
@@ -119,7 +131,11 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
             of_name = named["name"] if _holds(properties.get(named["name"])) else None
         of_class = _first_heading(properties, CLASSES)
         unread = {str(one): value for one, value in properties.items() if one not in (of_density, of_class, of_name)}
-        words = {heading: words_of(heading) for heading, value in unread.items() if _is_number(value)}
+        words = {
+            heading: words_of(heading)
+            for heading, value in unread.items()
+            if isinstance(value, int | float) or (isinstance(value, str) and is_number(value))
+        }
         density = None
         if of_density is not None:
             try:
@@ -191,10 +207,6 @@ def _area_named(heading: str) -> str:
     return last if last in ("m2", "ft2") else ""
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) or (isinstance(value, str) and is_number(value))
-
-
 def _holds(value: Any) -> bool:
     return value not in (None, "")
 
@@ -255,22 +267,6 @@ def _polygons_of_table(path: Path, columns: Mapping[str, str]) -> tuple[list[tup
     return list(found.values()), tuple(one for one in ("x", "y") if one in assumed)
 
 
-def _polygons_of_geojson(path: Path, frame: Frame | None) -> list[tuple[Ring, Properties]]:
-    with geojson_features(path, "polygons", frame) as features:
-        found: list[tuple[Ring, Properties]] = []
-        for number, feature in enumerate(features, 1):
-            properties = dict(feature.get("properties") or {})
-            geometry = feature["geometry"]
-            if geometry is None or geometry["type"] not in ("Polygon", "MultiPolygon"):
-                got = "one of no place" if geometry is None else f"a {str(geometry['type'])[:40]}"
-                raise InputError(
-                    f"{shown_path(path)}: expected polygons alone, got {got} as feature {number}; take it out, or save "
-                    "it as the area that it stands for."
-                )
-            found += [(ring, properties) for ring in _outlines(geometry)]
-        return found
-
-
 def _outlines(geometry: Mapping[str, Any]) -> Iterator[Ring]:
     """One outline of each part of a geometry of GeoJSON, with its holes; nothing of what is no area.
 
@@ -326,8 +322,10 @@ def shapes_and_records(path: Path, kind: str, frame: Frame | None) -> Iterator[l
         refuse_other_system(path, system_of_wkt(readable_text(beside[".prj"])), frame)
     with importing("pyshp", path, "shapefiles", "field", "save it as GeoJSON"):
         import shapefile
-    stated = readable_text(beside[".cpg"]).strip() if ".cpg" in beside else ""
-    encoding = stated if stated and _is_encoding(stated) else "utf-8"
+    encoding = "utf-8"
+    if ".cpg" in beside:
+        with suppress(LookupError, ValueError):  # of a name that is no encoding
+            encoding = codecs.lookup(readable_text(beside[".cpg"]).strip()).name
     with read_by_library(path, "a shapefile"):
         try:
             with shapefile.Reader(str(path), encoding=encoding) as reader:
@@ -338,14 +336,6 @@ def shapes_and_records(path: Path, kind: str, frame: Frame | None) -> Iterator[l
             with shapefile.Reader(str(path), encoding="cp1252", encodingErrors="replace") as reader:
                 found = list(reader.shapeRecords())
         yield [one for one in found if one.shape.shapeTypeName.startswith(kind)]
-
-
-def _is_encoding(name: str) -> bool:
-    try:
-        codecs.lookup(name)
-    except (LookupError, ValueError):
-        return False
-    return True
 
 
 def refuse_crossing(where: str, ring: Sequence[tuple[float, float]]) -> None:
@@ -440,7 +430,22 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
         reverse = bool(keys.pop("reverse", False))
         options = read_file_options(keys, f"{shown_path(folder)}: `grid.centreline`")
         taken = read_line(path, frame) if path.suffix.lower() in MAP_FILES else read_rows(path, options)
-        points = _points_of_line(path, in_the_channel(taken, Placement(frame), options))
+        turned = in_the_channel(taken, Placement(frame), options)
+        if not {"x", "y"} <= turned.numbers.keys():
+            raise InputError(
+                f"{shown_path(path)}: expected columns of x and y, got {', '.join(turned.columns.values())}; name them "
+                "by `columns` of `grid.centreline`."
+            )
+        at = np.column_stack([turned.numbers["x"], turned.numbers["y"]])
+        points: list[tuple[float, float]] = []
+        for point in (_rounded(*place) for place in at[np.isfinite(at).all(axis=1)].tolist()):
+            if not points or math.dist(point, points[-1]) >= NEAREST_POINTS:
+                points.append(point)
+        if not 2 <= len(points) <= MOST_POINTS:
+            raise InputError(
+                f"{shown_path(path)}: expected a line of 2 to {MOST_POINTS:,} points, got {len(points):,}; a few dozen "
+                "do, simplify it in the map program."
+            )
         places = list(zip(taken.numbers["x"].tolist(), taken.numbers["y"].tolist(), strict=True))
         _refuse_degrees(path, frame, [places])
         shape = CentrelineShape(points=tuple(points[::-1] if reverse else points))
@@ -462,27 +467,6 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
     radius = f", radius {in_digits(1.0 / sharpest)} m at least" if sharpest > 0.0 else ""
     summary = f"centreline of {in_digits(line.s[-1], 4)} m, {abs(turn):.0f} degrees to the {side}{radius}: {how}"
     return DrawnCentreline(kept, line, columns, units, summary)
-
-
-def _points_of_line(path: Path, taken: MeasuredRows) -> list[tuple[float, float]]:
-    """Places of the line, each once. InputError without two of them, or with too many."""
-    if not {"x", "y"} <= taken.numbers.keys():
-        raise InputError(
-            f"{shown_path(path)}: expected columns of x and y, got {', '.join(taken.columns.values())}; name them by "
-            "`columns` of `grid.centreline`."
-        )
-    places = np.column_stack([taken.numbers["x"], taken.numbers["y"]])
-    found: list[tuple[float, float]] = []
-    for place in places[np.isfinite(places).all(axis=1)].tolist():
-        point = _rounded(*place)
-        if not found or math.dist(point, found[-1]) >= NEAREST_POINTS:
-            found.append(point)
-    if not 2 <= len(found) <= MOST_POINTS:
-        raise InputError(
-            f"{shown_path(path)}: expected a line of 2 to {MOST_POINTS:,} points, got {len(found):,}; a few dozen do, "
-            "simplify it in the map program."
-        )
-    return found
 
 
 def read_line(path: Path, frame: Frame | None = None) -> MeasuredRows:
