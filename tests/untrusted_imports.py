@@ -37,6 +37,11 @@ SUMMARY = (
     b'<?xml version="1.0"?><Channel QRevFilename="a"><ChannelSummary><Discharge><Total unitsCode="cms">2</Total>'
     b"</Discharge><Uncertainty><Total>8</Total></Uncertainty></ChannelSummary></Channel>"
 )
+AQUACALC = (
+    b"<csv>\nAquaCalc Pro (tm)\n\nMeasure standard:, SAE\n\nVERT,DIST,TDPTH,OBS,TIME,VVEL\n"
+    b"1,0,0,E,,0\n2,1,0.5,o6,40,0.4\n3,2,0.6,o6,41,0.5\n"
+)
+PRJ = b'PROJCS["RD_New",GEOGCS["GCS_Amersfoort",UNIT["Degree",0.0174532925199433]],UNIT["Meter",1.0]]'
 
 
 def _workbook() -> bytes:
@@ -118,6 +123,8 @@ IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("profiler.mat", _made(lambda path: profiler_mat(path, np.full(2, 0.3))), _measured),
     ("summary.xml", SUMMARY, _measured),
     ("maps.mat", _matlab(), lambda path: load_matlab(path, "a file of the set", ("X", "Y"))),
+    ("mill.csv", AQUACALC, _measured),
+    ("patches.prj", PRJ, _beside),
     ("tracker.dis", flowtracker(PLACES, DEPTHS, VELOCITIES).encode(), _measured),
     ("surveyor.dis", riversurveyor(PLACES, DEPTHS, VELOCITIES).encode(), _measured),
     ("probe.dat", vectrino((0.3, 0.0, 0.0), 0.02, 40, 2).encode(), _measured),

@@ -166,7 +166,17 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
             guess, round(BY_EYE * guess, 4), "m", "h_d", "height of the canopy, estimated by eye",
             low=round(0.4 * guess, 4), high=round(1.8 * guess, 4),
         )  # fmt: skip
-        tree["plants"] = _plants(patches)
+        numbered = {f"p{number}": patch for number, patch in enumerate(patches, 1)}
+        names = told_apart({number: case_name(patch.name or number, number) for number, patch in numbered.items()})
+        rows = []
+        for number, patch in numbered.items():
+            shape: Tree = {"x": list(patch.x or ()), "y": list(patch.y or ())}
+            if patch.polygon is not None:
+                shape = {"polygon": [list(corner) for corner in patch.polygon]}
+            rows.append({"name": names[number], "stand": "plants", **shape, "stems": patch.stems_per_m2})
+        densest = max(patch.stems_per_m2 for patch in patches)
+        stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
+        tree["plants"] = {"stands": {"plants": stand}, "patches": rows}
         tree["parameters"] |= {"phi": PHI, "canopy_height": canopy}
     texts = {**ground.texts, **texts_of_tables(target, [*measured.tables, *held_out.tables])}
     kept = {"frame": frame.model_dump(exclude_none=True) | {"origin": list(frame.origin)}} if frame is not None else {}
@@ -261,17 +271,3 @@ def _straight_ground(folder: Path, site: FieldSite, channel: Channel, place: Pla
 
 def _experiment(given: MeasuredFlow) -> Tree:
     return {"discharge": given.discharge_m3_s, "level": given.downstream_level_m}
-
-
-def _plants(patches: Sequence[PlantedPatch]) -> Tree:
-    densest = max(patch.stems_per_m2 for patch in patches)
-    numbered = {f"p{number}": patch for number, patch in enumerate(patches, 1)}
-    names = told_apart({number: case_name(patch.name or number, number) for number, patch in numbered.items()})
-    rows = []
-    for number, patch in numbered.items():
-        shape: Tree = {"x": list(patch.x or ()), "y": list(patch.y or ())}
-        if patch.polygon is not None:
-            shape = {"polygon": [list(corner) for corner in patch.polygon]}
-        rows.append({"name": names[number], "stand": "plants", **shape, "stems": patch.stems_per_m2})
-    stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
-    return {"stands": {"plants": stand}, "patches": rows}

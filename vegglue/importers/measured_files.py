@@ -45,6 +45,7 @@ DOUBTED_KINDS = (STREAMWISE, "speed")
 OF_FORTRAN = re.compile(r"\d[dD][-+]?\d")
 # Values of another file at places so near are the same measurements, if there are so many of them [m], [-].
 SAME_PLACE, FEWEST_COPIED = 0.5, 4
+MEASURED_COLUMNS = {kind.column for kind in KINDS.values()}
 # Level of the bed [m] at places along and across the channel (n,) [m].
 BedLevel = Callable[[Array, Array], Array]
 # Headings that a message lists of each kind of measurement: the commonest stand first.
@@ -277,20 +278,6 @@ def _plain_rows(path: Path, known: KnownExperiments) -> list[list[str]] | None:
     return [[str(one) for one in row] for row in zip(*columns, strict=True)]
 
 
-def _levels_of_depths(taken: MeasuredRows, bed: BedLevel) -> MeasuredRows:
-    """Levels z = z_b + h of a table of depths h alone, z_b of its own column or of the bed of the case."""
-    numbers = taken.numbers
-    if not {"x", "depth"} <= numbers.keys() or {kind.column for kind in KINDS.values()} & numbers.keys():
-        return taken
-    floor, of = numbers.get("z_bed"), "of the bed in the table"
-    if floor is None:
-        floor, of = bed(numbers["x"], numbers.get("y", np.zeros(taken.size))), "of the bed of the case"
-    found = {"level": floor + numbers["depth"]}
-    if "below" in numbers:
-        return taken
-    return taken.having(found, f"levels from depths, above that {of}")
-
-
 def _converted(
     group: Sequence[tuple[Path, FileOptions]], place: Placement, known: KnownExperiments, bed: BedLevel
 ) -> tuple[list[StationTable], list[Tree]]:
@@ -303,7 +290,14 @@ def _converted(
             )
     read = [with_experiments(reader_of(path)(path, options), known.names) for path, options in group]
     placed = [in_the_channel(one, place, options) for one, (_, options) in zip(read, group, strict=True)]
-    placed = [_levels_of_depths(one, bed) for one in placed]
+    for number, one in enumerate(placed):  # depths h alone are levels z_b + h, z_b of their table, else of the case
+        numbers = one.numbers
+        if {"x", "depth"} <= numbers.keys() and not (MEASURED_COLUMNS | {"below"}) & numbers.keys():
+            floor, of = numbers.get("z_bed"), "in the table"
+            if floor is None:
+                floor, of = bed(numbers["x"], numbers.get("y", np.zeros(one.size))), "of the case"
+            note = f"levels from depths, above that of the bed {of}"
+            placed[number] = one.having({"level": floor + numbers["depth"]}, note)
     path, options = group[0]
     if len(group) > 1:  # each file keeps standard errors of its own, NaN if neither it nor the site file has one
         options = replace(options, standard_error={})

@@ -309,8 +309,14 @@ def read_site(path: Path) -> FieldSite:
             f"got {what}; `vegglue new NAME` makes one to begin with."
         )
     given = _read_keys(path)
-    if (misspelt := _misspelt_key(given)) is not None:
-        raise InputError(f"{shown_path(path)}: `{misspelt[0]}` is not a known key: did you mean `{misspelt[1]}`?")
+    for place, key, missing in _unknown_keys(given):  # the first that is all but a known one which is not given
+        close = next(iter(difflib.get_close_matches(key, missing, n=1, cutoff=MISSPELT)), None)
+        if close is None and OTHER_WORDS.get(key.lower()) in missing:
+            close = OTHER_WORDS[key.lower()]
+        if close is None and len(key) >= CUT_SHORT:
+            close = next((known for known in missing if known.startswith(key)), None)
+        if close is not None:
+            raise InputError(f"{shown_path(path)}: `{place + key}` is not a known key: did you mean `{close}`?")
     try:
         site = FieldSite.model_validate(given)
     except ValidationError as error:
@@ -380,19 +386,6 @@ def _read_keys(path: Path) -> Any:
         raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
     except ValueError as error:
         raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
-
-
-def _misspelt_key(given: Any) -> tuple[str, str] | None:
-    """The first unknown key, with its place, that is all but a known one which is not given, and that one."""
-    for place, key, missing in _unknown_keys(given):
-        close = next(iter(difflib.get_close_matches(key, missing, n=1, cutoff=MISSPELT)), None)
-        if close is None and OTHER_WORDS.get(key.lower()) in missing:
-            close = OTHER_WORDS[key.lower()]
-        if close is None and len(key) >= CUT_SHORT:
-            close = next((known for known in missing if known.startswith(key)), None)
-        if close is not None:
-            return place + key, close
-    return None
 
 
 def _unknown_keys(given: Any) -> Iterator[tuple[str, str, list[str]]]:

@@ -147,7 +147,17 @@ def station_tables(
     refuse_confounded_replicates(named, _places(named), file)
     found = [_stations(taken, stem, options, kind, place) for kind in kinds]
     without_value = _lacking(taken, [kind.column for kind in kinds], np.any)
-    left_out = (*on_axis, *without_place, *without_value, *once, *_at_one_height(taken))
+    role = vertical_role(taken)
+    at_height: tuple[str, ...] = ()
+    if role is not None and "u" in taken.numbers and np.isfinite(taken.numbers[role]).any():
+        share = taken.numbers[role] / taken.numbers["depth"] if {"height", "depth"} <= taken.numbers.keys() else None
+        if share is not None and (np.abs(share[np.isfinite(share)] - OF_AVERAGE) < NEAR_AVERAGE).all():
+            as_rule = f"at about {OF_AVERAGE:g} of the depth above the bed, and so taken for averages over the depth"
+            at_height = (as_rule,)
+        else:
+            unused = f"few places have several heights ({role} not used): {NOT_AVERAGES}"
+            at_height = (f"taken for averages over the depth, as {unused}",)
+    left_out = (*on_axis, *without_place, *without_value, *once, *at_height)
     return StationTables([table for table in found if table.rows], left_out)
 
 
@@ -391,18 +401,6 @@ def _in_verticals(taken: MeasuredRows) -> bool:
             heights.setdefault(place, set()).add(z)
     several = sum(len(some) > 1 for some in heights.values())
     return several > 0 and several >= VERTICALS * len(heights)
-
-
-def _at_one_height(taken: MeasuredRows) -> tuple[str, ...]:
-    """That heights of velocities are not used, as few places have several, and what that asks of them."""
-    role = vertical_role(taken)
-    if role is None or "u" not in taken.numbers or not np.isfinite(taken.numbers[role]).any():
-        return ()
-    if role == "height" and "depth" in taken.numbers:
-        share = taken.numbers[role] / taken.numbers["depth"]
-        if (np.abs(share[np.isfinite(share)] - OF_AVERAGE) < NEAR_AVERAGE).all():
-            return (f"at about {OF_AVERAGE:g} of the depth above the bed, and so taken for averages over the depth",)
-    return (f"taken for averages over the depth, as few places have several heights ({role} not used): {NOT_AVERAGES}",)
 
 
 def _places(taken: MeasuredRows) -> list[PlaceKey]:
