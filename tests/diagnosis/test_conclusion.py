@@ -7,18 +7,22 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 import pytest
-from diagnoses import NOTHING, a_candidate_effect, an_anomaly, candidate_laws_of
+from coarse_twin import coarse_twin
+from diagnoses import a_candidate_effect, an_anomaly, candidate_laws_of
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 from verdicts import step
 
+from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import with_effect
-from vegglue.calibration.noise import with_correlation, with_grid_error
-from vegglue.calibration.residual_screening import Screening
+from vegglue.calibration.fit import fit
+from vegglue.calibration.noise import noise_of, with_correlation, with_grid_error
+from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, EffectEntry
 from vegglue.case.site_schema import CentrelineShape, Frame
 from vegglue.decision_constants import constants
 from vegglue.diagnosis import conclusion
+from vegglue.diagnosis.candidate_effects import candidate_effects_of
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.conclusion import (
     estimated_errors,
@@ -143,27 +147,18 @@ def test_the_measured_stretch_is_noted_if_it_is_a_small_part(
     assert list(measured_stretch(case, unused)) == []
 
 
+@pytest.mark.slow
 def test_with_a_law_instead_of_a_place_effects_are_those_of_the_model_without_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """They were those of the model with the place, beside scores, misfit and parameters of the one without."""
-    station = stations_of(CASE_OF_TWINS, ("A",), 4)
-    bases = [at_best(CASE_OF_TWINS, station, np.full(12, value), np.zeros((12, 4))) for value in (0.1, 0.2)]
-    first, last = (cast("Screening", SimpleNamespace(base=base)) for base in bases)
-    laws, used = candidate_laws_of("law_bank_speed_step", chance=0.99), []
-    tested = {
-        True: a_candidate_effect("wind", test={"score": 0.3}),
-        False: a_candidate_effect("wind", test={"score": 4.0}),
-    }
-    stubs = {
-        "candidate_laws": lambda *_: laws, "candidate_effects_of": lambda one: {"wind": tested[one is first]},
-        "misfit_of": lambda *_: NOTHING.misfit, "_field": lambda *_: (None, None), "_first_screening": lambda _: None,
-        "_place_map": lambda *_: None, "_verdict": lambda *of, **_: used.append(of[:2]) or NOTHING.verdict,
-        "estimated_errors": lambda *_: NOTHING.errors, "_model_error": lambda *_: None,
-    }  # fmt: skip
-    for name, stub in stubs.items():
-        monkeypatch.setattr(conclusion, name, stub)
+    model, point = coarse_twin()
+    noise = noise_of(model.station)
+    first = screen(Baseline(model, noise, fit(model, noise, point), None, None))
+    laws = candidate_laws_of("law_bank_speed_step", chance=0.99)
+    monkeypatch.setattr(conclusion, "candidate_laws", lambda *_: laws)
     held = SearchState(places=(an_anomaly(),), undecided=Undecided((), ()))
-    found = conclusion.assemble_diagnosis(first, last, held, {"wind": tested[False]}, None, lambda: None)
-    assert used == [(first, SearchState())]  # what competed beside the place was named beside the law
-    assert (found.places, found.candidate_effects) == ((), (tested[True],))
+    with_place = {one: a_candidate_effect(one) for one in candidate_effects_of(first)}
+    found = conclusion.assemble_diagnosis(first, first, held, with_place, None, lambda: None)
+    assert (found.places, found.verdict.places, found.verdict.undecided) == ((), (), ())
+    assert {one.name: one for one in found.candidate_effects} == candidate_effects_of(first)

@@ -46,10 +46,59 @@ TESTABLE = 2.0
 
 
 def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
-    """All effects of a screening by name, none of them refitted."""
-    threshold = screening.effects.threshold(constants().effect_alarm_rate)
-    candidates = screening.fingerprints.candidates
-    return {one.name: _candidate_effect(screening, j, threshold) for j, one in enumerate(candidates)}
+    """All effects of a screening by name, none of them refitted, to first order.
+
+    gain = T / |S_perp| a^2 / (1 + a^2) with a standard error of s / (1 + a^2)^(1/2), s and a of `evidence`; objective
+    F - T^2 a^2 / (1 + a^2), F under the errors as they are now: the prior of the amplitude is in all of them, as in
+    those of a refit.
+    """
+    threshold, base, kind = (
+        screening.effects.threshold(constants().effect_alarm_rate),
+        screening.base,
+        screening.kinds[0],
+    )
+    projected, prints = screening.projected, screening.fingerprints
+    least_squares = objective(base.noise, base.fitted.point)
+
+    def unit(columns: np.ndarray) -> np.ndarray:
+        return columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+
+    found = {}
+    for j, one in enumerate(prints.candidates):
+        column, score = screening.best_column(j), screening.best_score(j)
+        amplitude, gain = prints.amplitudes[column], float(kind.gain[column])
+        reach = NORMAL95 * amplitude.plausible_gain / float(np.hypot(1.0, kind.size[column]))
+        taken = float(screening.effects.scores[column] ** 2 * prior_shrinkage(kind.size[column]))
+        smallest = amplitude.size((threshold + POWER_QUANTILE) / max(float(projected.length[column]), 1e-300))
+        confounder, cosine = "", 0.0  # the parameter whose slope is most like the fingerprint
+        if base.model.names:
+            cosines = unit(screening.whitened_fingerprints[:, column]) @ unit(screening.whitened_slopes)
+            nearest = int(np.argmax(np.abs(cosines)))
+            confounder, cosine = base.model.names[nearest], float(cosines[nearest])
+        found[one.name] = CandidateEffect(
+            name=one.name,
+            title=one.effect.title,
+            shapes=prints.settings[column],
+            amplitude=AmplitudeEstimate(
+                value=amplitude.at(gain),
+                interval95=(amplitude.at(gain - reach), amplitude.at(gain + reach)),
+                unit=amplitude.unit,
+                off=amplitude.off,
+                scale=amplitude.scale,
+                refitted=False,
+                support=(amplitude.low, amplitude.high),
+                objective=least_squares - taken,
+            ),
+            test=ScoreTest(score, screening.effects.p_of(score)),
+            detectability=Detectability(
+                visibility=float(projected.visible[column]),
+                smallest=smallest,
+                testable=smallest < min(TESTABLE * amplitude.scale, amplitude.furthest),
+                confounder=confounder,
+                cosine=cosine,
+            ),
+        )
+    return found
 
 
 def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
@@ -63,70 +112,6 @@ def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
     chance = score_test.chances(screening.projected, families, possible)
     groups = score_test.likeliest_families(screening.projected, families, chance, NOT_EXCLUDED_CHANCE)
     return tuple(tuple(names[j] for j in group) for group in groups)
-
-
-def _candidate_effect(screening: Screening, candidate: int, threshold: float) -> CandidateEffect:
-    one, column = screening.fingerprints.candidates[candidate], screening.best_column(candidate)
-    score = screening.best_score(candidate)
-    return CandidateEffect(
-        name=one.name,
-        title=one.effect.title,
-        shapes=screening.fingerprints.settings[column],
-        amplitude=_first_order_estimate(screening, column),
-        test=ScoreTest(score, screening.effects.p_of(score)),
-        detectability=_detectability(screening, column, threshold),
-    )
-
-
-def _first_order_estimate(screening: Screening, column: int) -> AmplitudeEstimate:
-    """gain = T / |S_perp| a^2 / (1 + a^2) with a standard error of s / (1 + a^2)^(1/2), s and a of `evidence`;
-    objective F - T^2 a^2 / (1 + a^2), F under the errors as they are told now: the prior of the amplitude is in all of
-    them, as in those of a refit.
-    """
-    base, kind, score = screening.base, screening.kinds[0], screening.effects.scores[column]
-    amplitude, gain = screening.fingerprints.amplitudes[column], float(kind.gain[column])
-    reach = NORMAL95 * amplitude.plausible_gain / float(np.hypot(1.0, kind.size[column]))
-    return AmplitudeEstimate(
-        value=amplitude.at(gain),
-        interval95=(amplitude.at(gain - reach), amplitude.at(gain + reach)),
-        unit=amplitude.unit,
-        off=amplitude.off,
-        scale=amplitude.scale,
-        refitted=False,
-        support=(amplitude.low, amplitude.high),
-        objective=objective(base.noise, base.fitted.point) - float(score**2 * prior_shrinkage(kind.size[column])),
-    )
-
-
-def _detectability(screening: Screening, column: int, threshold: float) -> Detectability:
-    amplitude = screening.fingerprints.amplitudes[column]
-    smallest = amplitude.size((threshold + POWER_QUANTILE) / _length(screening, column))
-    confounder, cosine = _confounder(screening, column)
-    return Detectability(
-        visibility=float(screening.projected.visible[column]),
-        smallest=smallest,
-        testable=smallest < min(TESTABLE * amplitude.scale, amplitude.furthest),
-        confounder=confounder,
-        cosine=cosine,
-    )
-
-
-def _length(screening: Screening, column: int) -> float:
-    return max(float(screening.projected.length[column]), 1e-300)
-
-
-def _confounder(screening: Screening, column: int) -> tuple[str, float]:
-    """The parameter whose slope is most like a fingerprint, and the cosine between both."""
-    names = screening.base.model.names
-    if not names:
-        return "", 0.0
-    cosines = _unit(screening.whitened_fingerprints[:, column]) @ _unit(screening.whitened_slopes)
-    nearest = int(np.argmax(np.abs(cosines)))
-    return names[nearest], float(cosines[nearest])
-
-
-def _unit(columns: np.ndarray) -> np.ndarray:
-    return columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
 
 
 # Share of the chance of all laws that those told hold together.
@@ -154,42 +139,37 @@ def candidate_laws(
     screening = beside_first() if found.accepted or last is first else laws_beside(last)
     if screening is None or screening.p >= constants().law_alarm_rate:
         return None
+    # What laws are compared with: what was accepted, else what was calibrated, else all that was tested.
+    if found.accepted:
+        against = [found.gained(log_evidence(first.base), log_evidence(last.base))]
+    elif found.undecided:
+        against = [one.log_evidence for one in found.undecided.hypotheses]
+    else:
+        against = [kind.total for kind in last.kinds]
     of_laws = screening.of_each
-    chances = tempered_probabilities(np.append(of_laws, _against(first, last, found)))[: of_laws.size]
+    chances = tempered_probabilities(np.append(of_laws, against))[: of_laws.size]
     order = np.argsort(-chances)
     count = int(np.searchsorted(np.cumsum(chances[order]), LAWS_HELD * chances.sum())) + 1
-    laws = tuple(_law(screening, int(j), float(chances[j])) for j in order[:count])
-    suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), laws)
+    laws = []
+    for j in map(int, order[:count]):
+        one, reference = screening.laws[j], screening.settings[screening.best_column(j)].get("reference")
+        laws.append(
+            CandidateLaw(
+                name=one.law.name,
+                term=one.law.term.words,
+                quantity=one.law.quantity.words,
+                title=one.law.title,
+                equation=one.law.equation(reference),
+                reference=reference,
+                scale=one.candidate.amplitude.scale,
+                strength=screening.gain(j),
+                chance=float(chances[j]),
+            )
+        )
+    suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), tuple(laws))
     return None if found.steps and not clearly_a_law(suspected) else suspected
 
 
 def clearly_a_law(laws: CandidateLaws | None) -> bool:
     """Whether laws are strong_odds times as likely as all else together: a place then stands in for one."""
     return laws is not None and laws.chance > constants().strong_odds * (1.0 - laws.chance)
-
-
-def _against(first: Screening, last: Screening, found: SearchState) -> list[float]:
-    """ln evidence of what laws are compared with: what was accepted, else what was calibrated, else all that was
-    tested.
-    """
-    if found.accepted:
-        return [found.gained(log_evidence(first.base), log_evidence(last.base))]
-    if found.undecided:
-        return [one.log_evidence for one in found.undecided.hypotheses]
-    return [kind.total for kind in last.kinds]
-
-
-def _law(screening: LawScreening, law: int, chance: float) -> CandidateLaw:
-    one = screening.laws[law]
-    reference = screening.settings[screening.best_column(law)].get("reference")
-    return CandidateLaw(
-        name=one.law.name,
-        term=one.law.term.words,
-        quantity=one.law.quantity.words,
-        title=one.law.title,
-        equation=one.law.equation(reference),
-        reference=reference,
-        scale=one.candidate.amplitude.scale,
-        strength=screening.gain(law),
-        chance=chance,
-    )

@@ -18,10 +18,10 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
-from vegglue.arrays import Array, Mask
+from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
-from vegglue.calibration.noise import Noise, covariance_of
+from vegglue.calibration.noise import covariance_of
 from vegglue.engine.interface import Model, linearise
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
@@ -29,7 +29,7 @@ from vegglue.measurements.kinds import KINDS, leading_velocities
 from vegglue.measurements.observations import SET_ASIDE
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
-from vegglue.wording.numbers import in_digits, so_many
+from vegglue.wording.sentences import phrase
 
 # What makes a measurement the same in a case and in those that extend it.
 MEASUREMENT = ["experiment", "kind", "section", "x", "y", "value"]
@@ -57,15 +57,9 @@ def without_stations(station: pd.DataFrame, aside: pd.DataFrame) -> pd.DataFrame
 
 
 def exclusion_in_words(aside: pd.DataFrame) -> str:
-    """One sentence for a reader of what was compared, '' when nothing was set aside."""
-    if aside.empty:
-        return ""
-    places = "; ".join(
-        f"{' '.join(filter(None, (row.experiment, row.section)))} at x = {row.x:g}, y = {row.y:g} m"
-        for row in aside.itertuples()
-    )
-    many, they = ("1 station is", "it") if len(aside) == 1 else (f"{len(aside)} stations are", "them")
-    return f"{many} left out of every model, as the diagnosis set {they} aside: {places}."
+    """What no compared model uses, in words; '' for nothing."""
+    rows = [(f"{row.experiment} {row.section}".strip(), row.x, row.y) for row in aside.itertuples()]
+    return phrase("excluded_from_comparison", rows) if rows else ""
 
 
 # What is left out in turn.
@@ -73,23 +67,55 @@ By = Literal["sections", "experiments"]
 
 
 def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
-    """What there is to say of one calibrated model; validation: the same at stations it has not seen."""
+    """What a calibrated model misses.
+
+    Parameters
+    ----------
+    base
+        The calibrated model.
+    validation
+        The same model at stations that no calibration uses.
+
+    Returns
+    -------
+    ModelScore
+        Errors at calibrated, held-out and validation stations, and whether parameters are the same in all experiments.
+    """
     model, noise, point = base.model, base.noise, base.fitted.point
-    used = model.station.iloc[noise.rows]
-    velocity = leading_velocities(used)
+    used, left = model.station.iloc[noise.rows], noise.residual(point.prediction)
+    kind, velocity = used["kind"].to_numpy(), leading_velocities(used)
     section, spread = _held_out(base, used["section"].to_numpy())
     experiment, _ = _held_out(base, used["experiment"].to_numpy())
-    clusters = tuple((str(e), str(s)) for e, s in zip(used["experiment"], used["section"], strict=True))
+    error, surprise = section[velocity] / spread[velocity], np.abs(section[velocity] / spread[velocity])
+    density = -0.5 * error**2 - np.log(spread[velocity]) - 0.5 * np.log(2.0 * np.pi)
+    known = surprise[np.isfinite(surprise)]
+    inside = [float(np.mean(known < ndtri(0.5 + 0.5 * level))) if known.size else float("nan") for level in (0.5, 0.95)]
+    validated = float("nan")
+    if validation is not None and (there := linearise(validation, point.z)) is not None:
+        rows = leading_velocities(validation.station)
+        validated = root_mean_square(validation.station["value"].to_numpy(float)[rows] - there.prediction[rows])
     return ModelScore(
         name=model.case.name,
         title=model.case.title,
         effects=tuple(model.case.effects),
         values={name: interval95(model, base.fitted, name) for name in model.names},
-        in_sample=_in_sample(noise, noise.residual(point.prediction), used["kind"].to_numpy(), velocity),
-        held_out=HeldOut(section, experiment, velocity, clusters),
-        predictive=_predictive_scores(section[velocity], spread[velocity]),
+        in_sample=InSample(
+            rmse={name: root_mean_square(left[kind == name]) for name in KINDS},
+            chi2=float(np.sum((left / noise.error) ** 2)),
+            stations=int(noise.rows.size),
+            noise_floor=root_mean_square(noise.error[velocity]),
+        ),
+        held_out=HeldOut(
+            section,
+            experiment,
+            velocity,
+            tuple((str(e), str(s)) for e, s in zip(used["experiment"], used["section"], strict=True)),
+        ),
+        predictive=PredictiveScores(
+            float(np.nanmean(density)) if np.isfinite(density).any() else float("nan"), *inside
+        ),
         homogeneity=homogeneity(base),
-        validation=float("nan") if validation is None else _validated(base, validation),
+        validation=validated,
     )
 
 
@@ -100,16 +126,8 @@ def held_out_rmse(score: ModelScore, by: By = "sections", untold: Collection[str
 
 
 def model_score_in_short(score: ModelScore) -> str:
-    """One line: errors of velocity [m/s] at what the model has seen, and at what was held out or never seen."""
-    told = {
-        "seen": score.in_sample.velocity,
-        "section held out": held_out_rmse(score),
-        "experiment held out": held_out_rmse(score, "experiments"),
-        "never seen": score.validation,
-        "noise floor": score.in_sample.noise_floor,
-    }
-    known = [f"{words} {in_digits(value, 2)}" for words, value in told.items() if np.isfinite(value)]
-    return f"{score.name}, {so_many(len(score.values), 'parameter')}: {', '.join(known) or 'no velocity'}"
+    """One line: errors of velocity [m/s] at calibrated, held-out and validation stations."""
+    return phrase("model_score", score, held_out_rmse(score), held_out_rmse(score, "experiments"))
 
 
 def model_score_json(score: ModelScore) -> dict[str, Any]:
@@ -183,23 +201,6 @@ def _of_velocities(score: ModelScore, by: By, untold: Collection[str]) -> Array:
     return np.where([one in untold for one in group], np.nan, error)[held_out.velocity]
 
 
-def _in_sample(noise: Noise, left: Array, kind: np.ndarray, velocity: Mask) -> InSample:
-    return InSample(
-        rmse={name: root_mean_square(left[kind == name]) for name in KINDS},
-        chi2=float(np.sum((left / noise.error) ** 2)),
-        stations=int(noise.rows.size),
-        noise_floor=root_mean_square(noise.error[velocity]),
-    )
-
-
-def _predictive_scores(error: Array, spread: Array) -> PredictiveScores:
-    """Of held-out errors (v,) that were predicted with a spread (v,)."""
-    density = -0.5 * (error / spread) ** 2 - np.log(spread) - 0.5 * np.log(2.0 * np.pi)
-    log_score = float(np.nanmean(density)) if np.isfinite(density).any() else float("nan")
-    surprise = np.abs(error / spread)
-    return PredictiveScores(log_score, _share(surprise, 0.5), _share(surprise, 0.95))
-
-
 def _held_out(base: Baseline, groups: np.ndarray) -> tuple[Array, Array]:
     """Errors of stations when their group is left out, and the spread they were predicted with (n,), see above."""
     noise, point = base.noise, base.fitted.point
@@ -225,16 +226,3 @@ def _step(errors: Array, slope: Array, left: Array, z: Array, kept: np.ndarray) 
     white, right = np.linalg.solve(lower, slope[kept]), np.linalg.solve(lower, left[kept])
     matrix = white.T @ white + np.eye(z.size)
     return np.asarray(np.linalg.solve(matrix, white.T @ right - z)), np.asarray(np.linalg.inv(matrix))
-
-
-def _validated(base: Baseline, validation: Model) -> float:
-    point = linearise(validation, base.fitted.point.z)
-    if point is None:
-        return float("nan")
-    station, rows = validation.station, leading_velocities(validation.station)
-    return root_mean_square(station["value"].to_numpy(float)[rows] - point.prediction[rows])
-
-
-def _share(surprise: Array, level: float) -> float:
-    known = surprise[np.isfinite(surprise)]
-    return float(np.mean(known < ndtri(0.5 + 0.5 * level))) if known.size else float("nan")

@@ -27,10 +27,9 @@ from vegglue.diagnosis.errors_elsewhere import HeldOutErrors, held_out_errors, l
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.search_state import SearchState, rivals_in
 from vegglue.effects.definition import Stage
-from vegglue.effects.surroundings import ChannelGeometry
 from vegglue.engine.interface import Model, Point
 from vegglue.inference.weighted_statistics import root_mean_square
-from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
+from vegglue.measurements.kinds import STREAMWISE, kind_of, velocity_rows
 from vegglue.measurements.section_discharge import mismatched_discharges
 from vegglue.results.causes import (
     TERMS_AT_PLACES,
@@ -60,24 +59,34 @@ from vegglue.version import VERSION
 AT_EDGE = 0.2
 
 
-def misfit_zones(model: Model, noise: Noise, point: Point, aside: Sequence[int] = ()) -> pd.DataFrame:
+def misfit_zones(model: Model, noise: Noise, point: Point, excluded: Sequence[int] = ()) -> pd.DataFrame:
     """Mean misfit with its standard error, and chi2, by experiment, section and zone (floor, bank, plants, edge), of
-    all used stations but those set aside.
+    all used stations but the excluded ones.
 
-    Zones of velocities across and of speeds are told apart from those of velocities along x: `floor (v)`.
+    Gauges are one group; a discharge may have a section of its own. Zones of velocities across and of speeds have names
+    of their own, `floor (v)`, beside those of velocities along x.
     """
     used = model.station.iloc[noise.rows]
-    kinds = [kind_of(str(name)) for name in used["kind"]]
-    table = pd.DataFrame(
-        {
-            "experiment": used["experiment"].to_numpy(),
-            "section": [_section(kind, str(name)) for kind, name in zip(kinds, used["section"], strict=True)],
-            "zone": _zones(model, used, kinds),
-            "left": noise.residual(point.prediction),
-            "error": noise.data_error,
-        }
-    )
-    table = table.drop(index=list(aside))
+    kinds, sections, zones = [kind_of(str(name)) for name in used["kind"]], [], []
+    cells = zip(*cells_at(model.site, used["x"].to_numpy(float), used["y"].to_numpy(float)), strict=True)
+    for experiment, section, kind, (i, j) in zip(used["experiment"], used["section"], kinds, cells, strict=True):
+        gauge = "gauges" if kind.instrument == "gauge" else str(section) or "discharges"
+        sections.append(str(section) if kind.velocity else gauge)
+        if not kind.velocity:
+            zones.append(kind.name)
+            continue
+        ground = channel_geometry(model.case, model.site, str(experiment))
+        if abs(ground.edge[i, j, 0]) < AT_EDGE * ground.half_width[i, j, 0]:
+            zone = "edge"
+        elif ground.planted[i, j, 0] >= 0.5:
+            zone = "plants"
+        else:
+            zone = "bank" if ground.bank[i, j, 0] else "floor"
+        zones.append(zone if kind.name == STREAMWISE else f"{zone} ({kind.column})")
+    table = pd.DataFrame({
+        "experiment": used["experiment"].to_numpy(), "section": sections, "zone": zones,
+        "left": noise.residual(point.prediction), "error": noise.data_error,
+    }).drop(index=list(excluded))  # fmt: skip
     rows = []
     covariance = covariance_of_data(noise)
     for (experiment, section, zone), part in table.groupby(["experiment", "section", "zone"], sort=False):
@@ -94,35 +103,6 @@ def misfit_zones(model: Model, noise: Noise, point: Point, aside: Sequence[int] 
             }
         )
     return pd.DataFrame(rows)
-
-
-def _section(kind: Kind, section: str) -> str:
-    """Gauges are one group; a discharge may have a section of its own."""
-    return section if kind.velocity else "gauges" if kind.instrument == "gauge" else section or "discharges"
-
-
-def _zones(model: Model, used: pd.DataFrame, kinds: Sequence[Kind]) -> list[str]:
-    x, y = used["x"].to_numpy(float), used["y"].to_numpy(float)
-    cells = zip(*cells_at(model.site, x, y), strict=True)
-    return [
-        _named(kind, channel_geometry(model.case, model.site, str(experiment)), *cell)
-        for experiment, kind, cell in zip(used["experiment"], kinds, cells, strict=True)
-    ]
-
-
-def _named(kind: Kind, ground: ChannelGeometry, i: int, j: int) -> str:
-    if not kind.velocity:
-        return kind.name
-    zone = _zone(ground, i, j)
-    return zone if kind.name == STREAMWISE else f"{zone} ({kind.column})"
-
-
-def _zone(geometry: ChannelGeometry, i: int, j: int) -> str:
-    if abs(geometry.edge[i, j, 0]) < AT_EDGE * geometry.half_width[i, j, 0]:
-        return "edge"
-    if geometry.planted[i, j, 0] >= 0.5:
-        return "plants"
-    return "bank" if geometry.bank[i, j, 0] else "floor"
 
 
 # Chance that errors alone make any effect look as strong, below which one is significant: the rate of the alarm beside
@@ -164,6 +144,11 @@ def assemble_diagnosis(
     base, before = last.base, first.base
     model_error = _model_error(last)
     verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, held_out)
+    strongest = first.ranking[:COMPARED]
+    columns = [first.best_column(j) for j in strongest]
+    # Scores of the term of the first place that was found, else of drag, before anything was accepted.
+    term = found.places[0].term if found.places else "drag"
+    spots = next(one for one in first.fingerprints.places if one.term == term)
     return Diagnosis(
         name=before.model.case.name,
         version=VERSION,
@@ -172,7 +157,12 @@ def assemble_diagnosis(
         steps=found.steps,
         misfit=misfit,
         errors=errors,
-        first_screening=_first_screening(first),
+        first_screening=FirstScreening(
+            threshold=first.effects.threshold(constants().effect_alarm_rate),
+            scores={one.name: first.best_score(j) for j, one in enumerate(first.fingerprints.candidates)},
+            compared=tuple(first.fingerprints.candidates[j].name for j in strongest),
+            cosine=score_test.cosines(first.projected)[np.ix_(columns, columns)],
+        ),
         parameters=ParameterEstimates(
             {name: interval95(before.model, before.fitted, name)[0] for name in before.model.names},
             {name: interval95(base.model, base.fitted, name) for name in base.model.names},
@@ -183,7 +173,7 @@ def assemble_diagnosis(
             last=base.fitted.point.prediction,
             error=base.noise.among_all(base.noise.data_error, len(base.model.station)),
         ),
-        place_map=_place_map(first, found),
+        place_map=PlaceMap(term, spots.x, spots.y, kind_named(first.kinds, term).scores),
         places=found.places,
         instruments=found.instruments,
         field=field,
@@ -205,13 +195,25 @@ def _verdict(
     held_out: Model | None,
 ) -> Verdict:
     """The verdict on what was found, once all that it rests on is computed."""
+    base, model, z = last.base, last.base.model, last.base.fitted.point.z
     # Whether silence is earned is a question only if nothing was found.
     silent = not (found.steps or found.places or found.undecided)
     unseen = HeldOutErrors(float("nan"), 1.0)
     if silent and held_out is not None:
-        unseen = held_out_errors(last.base, held_out)
+        unseen = held_out_errors(base, held_out)
+    # The calibrated parameter, other than the amplitude of an effect, that is furthest off the middle of its prior.
+    of_effects = parameters_of_effects(model.case)
+    own = [(abs(float(z[j])), name) for j, name in enumerate(model.names) if name not in of_effects]
+    far, strained = max(own, default=(0.0, ""))
+    # Whether two single readings are excluded that stand side by side in one section.
+    single = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
+    rows = [int(np.flatnonzero(base.noise.rows == station)[0]) for station in single]
+    neighbours = any(0.0 < base.noise.separation[a, b] < NEIGHBOURS_WITHIN for a in rows for b in rows)
     beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
-    model = last.base.model
+    surroundings: list[Note] = [*mapped_places(model.case, named_places(found.places, undecided))]
+    surroundings += measured_stretch(model.case, model.station)
+    if not any(one.x.size for one in last.fingerprints.places):
+        surroundings.append(TooShallow(LEAST_DEPTH))
     return make_verdict(
         VerdictInputs(
             candidates=ranked,
@@ -228,13 +230,13 @@ def _verdict(
             not_excluded=() if found.implausible else not_excluded(last),
             held_out=unseen.ratio,
             by_chance=unseen.by_chance,
-            neighbours=_neighbours_excluded(last, found),
-            strained=_strained(last),
-            between=largest_error_between(last.base) if silent else 1.0,
+            neighbours=neighbours,
+            strained=(strained, far),
+            between=largest_error_between(base) if silent else 1.0,
             carried=tuple(mismatched_discharges(model.case, model.site, model.station)),
             significant_effects=beside,
             remainder=bool(beside) and not significant_effects(last, found, found.slack),
-            surroundings=tuple(_surroundings(last, found, undecided)),
+            surroundings=tuple(surroundings),
         )
     )
 
@@ -244,15 +246,6 @@ def as_calibrated(place: LocalAnomaly, base: Baseline) -> LocalAnomaly:
     parameter = candidate_at(base.model.case, place).parameter
     value, low, high = interval95(base.model, base.fitted, parameter)
     return replace(place, amplitude=value, interval95=(low, high))
-
-
-def _surroundings(last: Screening, found: SearchState, undecided: Sequence[Rival]) -> Iterator[Note]:
-    """Where the named places lie on the map, which part of the channel was measured, and whether it is too shallow."""
-    case, station = last.base.model.case, last.base.model.station
-    yield from mapped_places(case, named_places(found.places, undecided))
-    yield from measured_stretch(case, station)
-    if not any(one.x.size for one in last.fingerprints.places):
-        yield TooShallow(LEAST_DEPTH)
 
 
 def named_places(places: Sequence[LocalAnomaly], undecided: Sequence[Rival]) -> list[tuple[float, float]]:
@@ -375,41 +368,3 @@ def field_goes_first(log_factor: float, gained: float) -> bool:
     """Whether a field beats nothing, and all that was accepted, by field_odds; both as ln evidence [-]."""
     ahead = (log_factor - max(gained, 0.0)) / tempering(np.array(log_factor))
     return bool(ahead > np.log(constants().field_odds))
-
-
-def _neighbours_excluded(screening: Screening, found: SearchState) -> bool:
-    """Whether two single readings were set aside that stand side by side in one section."""
-    single = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
-    noise = screening.base.noise
-    rows = [int(np.flatnonzero(noise.rows == station)[0]) for station in single]
-    return any(0.0 < noise.separation[a, b] < NEIGHBOURS_WITHIN for a in rows for b in rows)
-
-
-def _strained(screening: Screening) -> tuple[str, float]:
-    """The calibrated parameter, other than the amplitude of an effect, that lies furthest from the middle of its prior,
-    and how far [standard deviations].
-    """
-    model, z = screening.base.model, screening.base.fitted.point.z
-    of_effects = parameters_of_effects(model.case)
-    own = [(abs(float(z[j])), name) for j, name in enumerate(model.names) if name not in of_effects]
-    far, name = max(own, default=(0.0, ""))
-    return name, far
-
-
-def _first_screening(screening: Screening) -> FirstScreening:
-    candidates, strongest = screening.fingerprints.candidates, screening.ranking[:COMPARED]
-    columns = [screening.best_column(j) for j in strongest]
-    return FirstScreening(
-        threshold=screening.effects.threshold(constants().effect_alarm_rate),
-        scores={one.name: screening.best_score(j) for j, one in enumerate(candidates)},
-        compared=tuple(candidates[j].name for j in strongest),
-        cosine=score_test.cosines(screening.projected)[np.ix_(columns, columns)],
-    )
-
-
-def _place_map(screening: Screening, found: SearchState) -> PlaceMap:
-    """Scores of the term of the first place that was found, else of drag, before anything was accepted."""
-    term = found.places[0].term if found.places else "drag"
-    places = next(one for one in screening.fingerprints.places if one.term == term)
-    scores = kind_named(screening.kinds, term).scores
-    return PlaceMap(term, places.x, places.y, scores)
