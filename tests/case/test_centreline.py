@@ -135,10 +135,10 @@ def test_a_twin_writes_its_stations_on_the_map(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("radius: 25", "radius: 6", "turns with a radius of 6 m at x = "),
-        ("{length: 20}, {radius", "{length: 20, radius: 3}, {radius", "no key `radius` together with a straight part"),
-        (", angle: 90", "", "the key `angle`, which an arc needs"),
-        ("centreline: {parts", "centreline: {points: [[0, 0], [1, 1]], parts", "either `points` or `parts`"),
+        ("radius: 25", "radius: 6", "radius of 6 m at x ="),
+        ("{length: 20}, {radius", "{length: 20, radius: 3}, {radius", "`radius`"),
+        (", angle: 90", "", "`angle`"),
+        ("centreline: {parts", "centreline: {points: [[0, 0], [1, 1]], parts", "`points` or `parts`"),
     ],
 )
 def test_a_line_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:

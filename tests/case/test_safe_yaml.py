@@ -1,5 +1,6 @@
 """YAML from anybody: read as a person means it, or refused in one sentence and at once."""
 
+import re
 import time
 from pathlib import Path
 
@@ -33,36 +34,19 @@ def refused(text: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    ("text", "word"),
     [
-        (LAUGHS, "with its aliases written out it is larger than 50,000 parts"),
-        (MERGED, "with its aliases written out it is larger than 50,000 parts"),
-        (CHAIN, "40 keys within keys"),
-        ("[" + "x," * 60_000, "there are more than 50,000 parts"),
-        ("a: &a [*a]", "an alias stands within what it names"),
-        ("a: &a {<<: *a}", "an alias stands within what it names"),
-        ("[" * 5000, "more than 40 times"),
-        ("{a: " * 5000, "more than 40 times"),
-        ("- " * 5000, "more than 40 times"),
-        ("a: !!python/object/apply:os.system [echo]", "the tag `tag:yaml.org,2002:python/object/apply:os.system`"),
-        ("a: !!timestamp x", "is not known here: leave it out"),
-        ("a: !!int x", "is not known here"),
-        ("a: !!binary x", "is not known here"),
-        ("a: !mine {b: 1}", "the tag `!mine`"),
-        (f"a: {'9' * 400}", "a number has 400 digits"),
-        (f"a: {'9' * 5000}", "a number has 5000 digits"),
-        ("a: 010", "`010` may mean two numbers: write it without the 0 in front, or text in quotes"),
-        ("a: -007", "`-007` may mean two numbers"),
-        ('a: "\\ud800"', "a text holds the sign '\\ud800'"),
-        ('a: "x\\0y"', "a text holds the sign '\\x00'"),
-        ('"\\u202e": 1', "a text holds the sign '\\u202e'"),
-        ("a: *b", "a reference to nothing"),
-        ("? {a: 1}\n: 2", "unhashable key"),
+        (LAUGHS, "50,000"), (MERGED, "50,000"), (CHAIN, "40"), ("[" + "x," * 60_000, "50,000"),
+        ("a: &a [*a]", "alias"), ("a: &a {<<: *a}", "alias"), ("[" * 5000, "40"), ("{a: " * 5000, "40"),
+        ("- " * 5000, "40"), ("a: !!python/object/apply:os.system [echo]", "os.system`"), ("a: !!timestamp x", "tag"),
+        ("a: !!int x", "tag"), ("a: !!binary x", "tag"), ("a: !mine {b: 1}", "`!mine`"), (f"a: {'9' * 400}", "400"),
+        (f"a: {'9' * 5000}", "5000"), ("a: 010", "`010`"), ("a: -007", "`-007`"), ('a: "\\ud800"', "'\\ud800'"),
+        ('a: "x\\0y"', "'\\x00'"), ('"\\u202e": 1', "'\\u202e'"), ("a: *b", "`*b`"), ("? {a: 1}\n: 2", "key"),
     ],
     ids=lambda text: text[:24],
-)
-def test_what_is_meant_to_do_harm_is_refused_at_once(text: str, expected: str) -> None:
-    assert expected in refused(text)
+)  # fmt: skip
+def test_what_is_meant_to_do_harm_is_refused_at_once(text: str, word: str) -> None:
+    assert word in refused(text)
 
 
 @pytest.mark.parametrize(
@@ -87,21 +71,21 @@ def test_aliases_and_merged_keys_of_common_size_are_read() -> None:
 
 @pytest.mark.parametrize("text", ["{discharge: 2,66, level: 3}", "{a: 0,95 m}", "a: {b: {c: 7,3}}"])
 def test_a_decimal_comma_within_braces_cuts_no_number_short(text: str) -> None:
-    assert "has no value: write decimals with a point, not a comma; correct the YAML there" in refused(text)
+    assert "comma" in refused(text)
     assert safe_yaml("{a: 1, 2: '', 3: {}}") == {"a": 1, "2": "", "3": {}}
 
 
 def test_a_config_is_a_file_of_some_size() -> None:
-    assert "expected at most 1,000,000 bytes, got more" in refused("#" * (LARGEST_CONFIG + 1))
+    assert f"{LARGEST_CONFIG:,}" in refused("#" * (LARGEST_CONFIG + 1))
     for place in ("/dev/zero", "."):
-        with pytest.raises(InputError, match="is not a file"):
+        with pytest.raises(InputError, match="file"):
             load_case(place)
 
 
 def test_a_long_chain_of_extends_is_refused() -> None:
     for number in range(LONGEST_CHAIN + 1):
         Path(f"{number}.yaml").write_text(f"extends: {number + 1}.yaml\n", encoding="utf-8")
-    with pytest.raises(InputError, match="more than 50 files in a row"):
+    with pytest.raises(InputError, match="50"):
         load_case("0.yaml")
 
 
@@ -109,3 +93,32 @@ def test_a_long_chain_of_extends_is_refused() -> None:
 def test_a_key_is_called_as_it_is_written(name: str) -> None:
     """Runs 1, 2 and 3 were refused, as no text, and `on` was called True."""
     assert safe_yaml(f"{{{name}: {{a: 1}}}}") == {name: {"a": 1}}
+
+
+# Words of a parser, which the author of a config does not know.
+JARGON = re.compile(r"<|token|scalar|stream|block|flow|mapping|node|sequence|#x")
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "word"),
+    [
+        ("a: {b: 1\n", "line 2, column 1", "`}`"), ("a: {b: 1\nc: 2\n", "line 2, column 2", "`}`"),
+        ("a:\n  - [1, 2\n", "line 3", "`]`"), ("a: {b: [1, 2}\n", "line 1", "`]`"),
+        ("a: {b: 1}}\n", "line 1, column 10", "`}`"), ("a: 1\n\tb: 2\n", "line 2, column 1", "tab"),
+        ("a:\tb\n", "line 1, column 3", "tab"), ("a: b: c\n", "line 1", "colon"),
+        ("a: 1\nb\nc: 2\n", "line 3", "colon"),
+        ("a:\n  b: 1\n c: 2\n", "line 3, column 2", "spaces"), ('a: "x" y\n', "line 1", "quotes"),
+        ("a: 'x\nb: 2\n", "line 3", "quote"), ('a: "C:\\data"\n', "line 1", "`\\d`"), ("a: @x\n", "line 1", "`@`"),
+        ("a: *x\n", "line 1", "`*x`"), ("a: &\n", "line 1", "quotes"), ("a: - b\n", "line 1", "`-`"),
+        ("{a: 1}\nb: 2\n", "line 2", "more"), ("a: 1\n---\nb: 2\n", "line 2", "`---`"), ("a: }\n", "line 1", "`}`"),
+        ("a: 1\nb: \x07\n", "line 2", "'\\x07'"),
+    ],
+)  # fmt: skip
+def test_a_problem_of_yaml_is_one_plain_sentence_with_its_place(text: str, place: str, word: str) -> None:
+    """It was what the parser says: expected ',' or '}', but got '<stream end>'."""
+    said = refused(text)
+    assert said.startswith(f"a.yaml, {place}")
+    assert word in said
+    assert not JARGON.search(said)
+    assert said.endswith(".")
+    assert "\n" not in said

@@ -1,9 +1,14 @@
-"""The limits that docs/limits.md states are those in force."""
+"""What a config may say goes with the laws there are, and its limits are those that docs/limits.md states."""
+
+from typing import get_args
 
 from reach import ROOT
 
 from vegglue.case import size_limits
+from vegglue.case.site_schema import COEFFICIENT_OF, FrictionClass, VegetationType
 from vegglue.case.size_limits import factor_bytes
+from vegglue.effects.bed_laws import BED_LAWS
+from vegglue.effects.plant_laws import PLANT_LAWS
 
 STATED = (
     "LARGEST_CONFIG", "LARGEST_DATA", "DEEPEST_KEYS", "MOST_PARTS", "LONGEST_CHAIN", "MOST_CELLS", "MOST_MEMBERS",
@@ -22,3 +27,13 @@ def test_every_limit_is_stated() -> None:
 def test_factors_take_three_blocks_a_column() -> None:
     nx, ny = 1142, 40  # the grid of the paper's case
     assert factor_bytes(nx, ny) == 108 * nx * ny**2 == nx * 3 * (3 * ny) ** 2 * 4
+
+
+def test_a_config_knows_the_laws_there_are() -> None:
+    assert get_args(FrictionClass.model_fields["law"].annotation) == BED_LAWS == tuple(COEFFICIENT_OF)
+    assert get_args(VegetationType.model_fields["law"].annotation) == PLANT_LAWS
+
+
+def test_each_law_of_the_bed_has_a_coefficient_of_its_own() -> None:
+    for law, key in COEFFICIENT_OF.items():
+        assert FrictionClass.model_validate({"law": law, key: 0.5}).coefficient == 0.5
