@@ -401,3 +401,16 @@ def test_velocities_of_the_surface_take_a_factor(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "other", site.replace("0.85", "-1"), a__csv="x,y,surface velocity\n8,0,0.4\n")
     with pytest.raises(InputError, match="factor"):
         vegglue.import_folder(folder, tmp_path / "other.yaml")
+
+
+@pytest.mark.slow
+def test_a_floor_of_seven_cells_comes_to_a_verdict(tmp_path: Path) -> None:
+    """A seventh of the cells lies on the axis, from which laws of the offset count."""
+    site = "channel: {length_m: 20, bottom_width_m: 3.5, bank_slope_v_per_h: 0.5, bed_slope: 0.001}\n"
+    site += "grid: {x: [0, 20], y: [-3.75, 3.75], cell: [1, 0.5]}\nfiles: {v.csv: {standard_error: 1 cm/s}}\n"
+    site += "experiments: {low: {discharge: 0.7 m3/s, level: 0.48 m}}\n"
+    profile = dict(zip((-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5), (0.25, 0.31, 0.35, 0.39, 0.43, 0.36, 0.3), strict=True))
+    rows = [f"{name},{x},{y},{u}" for name, x in (("A", 6), ("B", 10), ("C", 14)) for y, u in profile.items()]
+    table = "\n".join(["section,x [m],y [m],u [m/s]", *rows])
+    case = vegglue.import_folder(folder_of(tmp_path / "brook", site, v__csv=table), tmp_path / "brook.yaml")
+    vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1)

@@ -118,6 +118,11 @@ def _in_case(law: Law, water: _Water, first: float | None = None, change: float 
     if high - low < LEAST_SPREAD * abs(middle):
         return None
     tried = sorted({float(f"{value:.{DIGITS}g}") for value in np.quantile(values, law.form.quantiles)})
+    if 0.0 in tried:  # on an odd number of cells across the floor a tenth or more lies on the axis: there is no q / 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tried = [one for one in tried if one != 0.0 or np.isfinite(law.form.of(np.array([low, high]), one)).all()]
+        if not tried:
+            return None
     effect = replace(law.effect, shapes=tuple(map(with_references, law.shapes)))
     default = next((shape.default for shape in effect.shapes if shape.name == "reference"), None)
     whole = max(change * _change_of(law, (low, high), default), 1e-9)
