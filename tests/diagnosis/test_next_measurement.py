@@ -10,7 +10,7 @@ import pytest
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import in_experiment
-from vegglue.diagnosis.next_measurement import HIGHER, HOURS, LEVEL_POWER, _with_other_discharges, planned
+from vegglue.diagnosis.next_measurement import HIGHER, HOURS, LEVEL_POWER, planned, with_other_discharges
 from vegglue.engine.interface import Model
 from vegglue.workflow.case_run import CaseRun
 
@@ -45,7 +45,7 @@ def test_small_discharges_have_names_of_their_own(model: Model) -> None:
         for name, one in list(model.case.experiments.items())[:1]
     }
     shallow = replace(model, case=model.case.model_copy(update={"experiments": small}))
-    further = [name for name in _with_other_discharges(shallow, (0.25, 0.5)).experiments if name not in small]
+    further = [name for name in with_other_discharges(shallow, (0.25, 0.5)).experiments if name not in small]
     assert [name.split(" (")[0] for name in further] == ["at 0.001 m3/s", "at 0.002 m3/s", "at 0.0056 m3/s"]
     assert re.fullmatch(r"at 0.001 m3/s \(level at the outlet about 0\.\d\d m\)", further[0]), further[0]
 
@@ -78,7 +78,7 @@ def test_other_discharges_are_thought_of_on_the_site_at_hand(model: Model) -> No
     deeper = replace(model, site=replace(model.site, bed=model.site.bed - 0.5))
     levels = [
         [float(one.level) for name, one in found.experiments.items() if name not in model.case.experiments]
-        for found in (_with_other_discharges(one, (0.5,)) for one in (model, deeper))
+        for found in (with_other_discharges(one, (0.5,)) for one in (model, deeper))
     ]
     assert levels[1][0] < levels[0][0]
 
@@ -89,7 +89,7 @@ def test_another_discharge_flows_over_the_bed_of_the_experiment_it_is_like(model
     scoured = model.case.experiments[low].model_copy(update={"bed": model.case.bed})
     case = model.case.model_copy(update={"experiments": {**model.case.experiments, low: scoured}})
     site = replace(model.site, own={low: replace(model.site, bed=model.site.bed - 0.3)})
-    wide, _ = planned(here := replace(model, case=case, site=site), _with_other_discharges(here, (0.25,)))
+    wide, _ = planned(here := replace(model, case=case, site=site), with_other_discharges(here, (0.25,)))
     lower, higher = (name for name in wide.case.experiments if name not in case.experiments)
 
     def depth(name: str) -> float:
@@ -101,7 +101,7 @@ def test_another_discharge_flows_over_the_bed_of_the_experiment_it_is_like(model
 
 def test_no_vertical_is_planned_where_a_lower_discharge_leaves_it_dry(model: Model) -> None:
     """A section was planned, and its hours counted, as at the highest discharge, beside the water too."""
-    wide, plans = planned(model, _with_other_discharges(model, (0.25,)))
+    wide, plans = planned(model, with_other_discharges(model, (0.25,)))
     lower, higher = (
         [plan for plan in plans if "the section" in plan.name and plan.experiment == name]
         for name in wide.case.experiments

@@ -15,10 +15,10 @@ from vegglue.diagnosis.candidate_effects import candidate_effects_of
 from vegglue.diagnosis.child_config import candidate_named, with_additions
 from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.diagnose import diagnose_model
-from vegglue.diagnosis.search_state import Again, with_rivals_again
+from vegglue.diagnosis.search_state import with_rivals_again
 from vegglue.engine.interface import Model, linearise
 from vegglue.progress import silent
-from vegglue.results.causes import Step
+from vegglue.results.causes import CandidateEffect, Step
 
 # What is hidden, what was taken for the first of both, and amplitudes that are clearly seen.
 TRUE, LATER, TAKEN = "viscosity", "discharge_error[high]", "edge_mixing"
@@ -59,6 +59,9 @@ def of_width(model: Model, name: str, width: float) -> Model:
 @pytest.fixture(scope="module")
 def measured() -> Model:
     return measured_with(HIDDEN)
+
+
+Again = tuple[Baseline, tuple[Step, ...], dict[str, CandidateEffect]]
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnoses import IMPLAUSIBLE, a_diagnosis
 
-from vegglue.diagnosis.next_measurement import MeasurementWorth, _least
+from vegglue.diagnosis.next_measurement import MeasurementWorth, least_distances
 from vegglue.results.open_questions import OneOfRivals, RivalEffects
 from vegglue.workflow.next_measurement import _answers, _questions
 
@@ -50,6 +50,6 @@ def test_a_question_that_is_answered_is_one_and_so_is_one_of_two_rivals() -> Non
 def test_each_rival_is_as_far_as_from_the_nearest_either_way() -> None:
     """Traces 3, 4 and 0 standard errors long in measurements that no parameter changes, and no prior holds."""
     traces, slope = np.array([[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]]), np.zeros((2, 1))
-    assert _least(slope, traces) == pytest.approx([0.0, 0.0, 0.0]), "the last is nothing, which each may be"
-    assert _least(slope, traces[:, :2]) == pytest.approx([9.0, 9.0])
-    assert _least(slope, traces[:, :1]) == pytest.approx([9.0])
+    assert least_distances(slope, traces) == pytest.approx([0.0, 0.0, 0.0]), "the last is nothing, which each may be"
+    assert least_distances(slope, traces[:, :2]) == pytest.approx([9.0, 9.0])
+    assert least_distances(slope, traces[:, :1]) == pytest.approx([9.0])

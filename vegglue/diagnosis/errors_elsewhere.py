@@ -29,12 +29,11 @@ import scipy.linalg
 from scipy.special import chdtri
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs
+from vegglue.calibration.baseline import Baseline, model_that_errs
 from vegglue.calibration.model_error import model_error_columns
-from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.field_scan import free_of_prior
-from vegglue.engine.interface import Model, Point, linearise, predict
+from vegglue.engine.interface import Model, linearise, predict
 from vegglue.measurements.kinds import leading_velocities
 from vegglue.measurements.observations import section_places, station_table
 
@@ -53,41 +52,32 @@ class HeldOutErrors:
     by_chance: float
 
 
-def held_out_errors(base: Baseline, unseen: Model) -> HeldOutErrors:
-    """Those of a calibrated model; unseen: the model at stations it has not seen."""
-    there = Model(_case_there(base, unseen), unseen.site, unseen.station, unseen.engine)
+def held_out_errors(base: Baseline, held_out: Model) -> HeldOutErrors:
+    """Those of a calibrated model, effects included; held_out: the model at stations that no calibration uses."""
+    case = base.model.case.model_copy(
+        update={"experiments": held_out.case.experiments, "observations": held_out.case.observations}
+    )
+    there = Model(case, held_out.site, held_out.station, held_out.engine)
     point = linearise(there, base.fitted.point.z)
     rows = np.flatnonzero(leading_velocities(there.station))
     if not rows.size or point is None:
         return HeldOutErrors(float("inf") if rows.size else float("nan"), 1.0)
     error = there.station["value"].to_numpy(float)[rows] - point.prediction[rows]
-    own, alike = _expected(base, there, point, rows)
-    squares = (alike**2).sum(axis=1)
-    total = float((own + squares).sum())
-    degrees = total**2 / float((own**2 + 2.0 * own * squares).sum() + ((alike.T @ alike) ** 2).sum())
-    by_chance = float(np.sqrt(chdtri(degrees, BY_CHANCE) / degrees))
-    return HeldOutErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
-
-
-def _expected(base: Baseline, there: Model, point: Point, rows: np.ndarray) -> tuple[Array, Array]:
-    """The diagonal that each station has of its own (n,) [m2/s2] and A (n, k) [m/s], see the head of this file."""
     noise, seen = base.noise, leading_velocities(base.model.station)[base.noise.rows]
     floor, grid = (
-        float(np.mean(error[seen] ** 2)) if seen.any() else 0.0 for error in (noise.data_error, noise.grid_error)
+        float(np.mean(one[seen] ** 2)) if seen.any() else 0.0 for one in (noise.data_error, noise.grid_error)
     )
     stated = there.station["standard_error"].to_numpy(float)[rows] ** 2
     of_model = model_error_columns(there, point, there.case.model_error)[rows]
     of_grid = np.full((rows.size, 1), np.sqrt(noise.grid_correlation * grid))
     of_parameters = point.slope[rows] @ np.linalg.cholesky(base.fitted.covariance)
     own = np.where(stated > 0, stated, floor) + (1.0 - noise.grid_correlation) * grid
-    return own, np.hstack([of_model, of_grid, of_parameters])
-
-
-def _case_there(base: Baseline, unseen: Model) -> Case:
-    """The case as it was calibrated, effects included, with the experiments that were not seen."""
-    return base.model.case.model_copy(
-        update={"experiments": unseen.case.experiments, "observations": unseen.case.observations}
-    )
+    alike = np.hstack([of_model, of_grid, of_parameters])
+    squares = (alike**2).sum(axis=1)
+    total = float((own + squares).sum())
+    degrees = total**2 / float((own**2 + 2.0 * own * squares).sum() + ((alike.T @ alike) ** 2).sum())
+    by_chance = float(np.sqrt(chdtri(degrees, BY_CHANCE) / degrees))
+    return HeldOutErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
 
 
 # Share of the cases in which the errors are to be smaller than what is told, and draws of them: the 95 % point of 2,000
@@ -100,11 +90,22 @@ def largest_error_between(base: Baseline) -> float:
     cases. NaN where there are no velocities, or the flow is not found.
     """
     where = model_that_errs(base)
+    model, noise = where.model, where.noise
     seen = leading_velocities(base.model.station)[base.noise.rows]
-    found = _errors_between(where)
-    if found is None or not seen.any():
+    both = station_table(model.station, halfway(model.station, model.case.grid.x[1]))
+    wide, count = replace(model, station=both), len(model.station)
+    point = linearise(wide, where.point.z, where.point)
+    if point is None or len(both) == count or not seen.any():
         return float("nan")
-    mean, covariance = found
+    # A probe beside its place reads another place, and is no error of the model there.
+    allowed = model.case.model_error.model_copy(update={"probes": 0.0})
+    columns = np.hstack([point.slope, model_error_columns(wide, point, allowed)])
+    at_stations, there = columns[:count][noise.rows], columns[count:]
+    whole, residual = free_of_prior(where)
+    factor = scipy.linalg.cho_factor(whole, lower=True)
+    shared = at_stations @ there.T
+    mean = shared.T @ scipy.linalg.cho_solve(factor, residual) - point.slope[count:] @ point.z
+    covariance = there @ there.T - shared.T @ scipy.linalg.cho_solve(factor, shared)
     random = np.random.default_rng(1)
     drawn = random.multivariate_normal(mean, covariance, DRAWN_ERRORS, check_valid="ignore", method="eigh")
     squares = (drawn**2).mean(axis=1) / float(np.mean(base.noise.data_error[seen] ** 2))
@@ -159,23 +160,3 @@ def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
 
     moved = velocity["x"] + middle.groupby(velocity["experiment"]).transform(ahead)
     return velocity.assign(x=np.minimum(moved, end), used=False)
-
-
-def _errors_between(where: SearchModel) -> tuple[Array, Array] | None:
-    """Mean (m,) and covariance (m, m) of e [m/s], None where no flow is found."""
-    model, noise = where.model, where.noise
-    both = station_table(model.station, halfway(model.station, model.case.grid.x[1]))
-    wide, count = replace(model, station=both), len(model.station)
-    point = linearise(wide, where.point.z, where.point)
-    if point is None or len(both) == count:
-        return None
-    # A probe beside its place reads another place, and is no error of the model there.
-    allowed = model.case.model_error.model_copy(update={"probes": 0.0})
-    columns = np.hstack([point.slope, model_error_columns(wide, point, allowed)])
-    at_stations, there = columns[:count][noise.rows], columns[count:]
-    whole, residual = free_of_prior(where)
-    factor = scipy.linalg.cho_factor(whole, lower=True)
-    shared = at_stations @ there.T
-    mean = shared.T @ scipy.linalg.cho_solve(factor, residual) - point.slope[count:] @ point.z
-    covariance = there @ there.T - shared.T @ scipy.linalg.cho_solve(factor, shared)
-    return np.asarray(mean), np.asarray(covariance)

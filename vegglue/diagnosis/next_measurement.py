@@ -23,8 +23,8 @@ from vegglue.calibration.candidates import Candidate, cause_of
 from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import Noise
 from vegglue.case.channel_geometry import expected_depth
-from vegglue.case.gridded_site import Site, in_experiment
-from vegglue.case.schema import Case, Experiment
+from vegglue.case.gridded_site import in_experiment
+from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.observations import section_places, station_table
@@ -73,7 +73,7 @@ def worth_of_measurements(
     """For each question the worth of all plans; a question is a few rivals to be told apart, or one effect to be told
     from calibration: (effect, shapes, gain (amplitude - off)^power). here: the calibrated model.
     """
-    for case in (*(_with_other_discharges(model, lower) for lower in (LOWER, ())), model.case):
+    for case in (*(with_other_discharges(model, lower) for lower in (LOWER, ())), model.case):
         wide, plans = planned(model, case)
         point = linearise_from(wide, here.z, here)
         if point is not None:
@@ -83,53 +83,55 @@ def worth_of_measurements(
     every = [rival for question in questions for rival in question]
     changed = [cause_of(wide.case, one, shapes) for one, shapes, _ in every]
     own_error = model_error_columns(wide, point, wide.case.model_error)
-    covariance = np.diag(_errors(wide.station, noise) ** 2) + own_error @ own_error.T
+    # Measurements to come are as good as the usual one of their kind.
+    errors, kinds = noise.among_all(noise.data_error, len(wide.station)), wide.station["kind"].to_numpy()
+    for kind in dict.fromkeys(kinds):
+        there = errors[(kinds == kind) & np.isfinite(errors)]
+        usual = np.median(there) if there.size else kind_of(str(kind)).usual_error
+        errors[(kinds == kind) & ~np.isfinite(errors)] = usual
+    covariance = np.diag(errors**2) + own_error @ own_error.T
     traces = responses(wide, point, changed) * np.array([gain for _, _, gain in every])
     known = np.zeros(len(wide.station), dtype=bool)
     known[: len(model.station)] = model.station["used"].to_numpy()
     ends = np.cumsum([len(question) for question in questions])
-    own = [traces[:, end - len(question) : end] for end, question in zip(ends, questions, strict=True)]
-    return [_worths(plans, known, covariance, point.slope, part) for part in own]
+    found = []
+    for end, question in zip(ends, questions, strict=True):
+        columns, slopes = np.hstack([point.slope, traces[:, end - len(question) : end]]), point.slope.shape[1]
 
+        def least(rows: np.ndarray, columns: Array = columns, slopes: int = slopes) -> Array:
+            lower = np.linalg.cholesky(covariance[np.ix_(rows, rows)])
+            white = scipy.linalg.solve_triangular(lower, columns[rows], lower=True)
+            return least_distances(white[:, :slopes], white[:, slopes:])
 
-def _worths(
-    plans: Sequence[MeasurementPlan], known: np.ndarray, covariance: Array, slope: Array, traces: Array
-) -> list[MeasurementWorth]:
-    def least(rows: np.ndarray) -> Array:
-        lower = np.linalg.cholesky(covariance[np.ix_(rows, rows)])
-        white = scipy.linalg.solve_triangular(lower, np.hstack([slope, traces])[rows], lower=True)
-        return _least(white[:, : slope.shape[1]], white[:, slope.shape[1] :])
-
-    now, found = least(known), []
-    for plan in plans:
-        rows = known.copy()
-        rows[plan.rows] = True
-        found.append(MeasurementWorth(plan, now, least(rows)))
+        now, worths = least(known), []
+        for plan in plans:
+            rows = known.copy()
+            rows[plan.rows] = True
+            worths.append(MeasurementWorth(plan, now, least(rows)))
+        found.append(worths)
     return found
 
 
 def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
     """The model with every station that could be measured behind those that were, and the plans they make; case: the
-    model's with further experiments.
+    model's with further experiments, each with the bed of the one it is like, which may have its own.
     """
     tables, plans, count = [model.station], [], len(model.station)
     velocity = model.station[velocity_rows(model.station) & model.station["used"]]
     velocity = velocity.assign(x=section_places(velocity))
-    wide = replace(model, case=case, site=_with_beds(model, case))
+    known = [(model.case.experiments[name].bed, there) for name, there in model.site.own.items()]
+    own = {name: there for name, one in case.experiments.items() for bed, there in known if bed == one.bed}
+    wide = replace(model, case=case, site=replace(model.site, own={**own, **model.site.own}))
     for plan_name, experiment, x, y, kind, hours in _ideas(wide, list(model.case.experiments), velocity):
-        table = _stations(experiment, plan_name, x, y, kind)
+        table = pd.DataFrame(
+            {"experiment": experiment, "kind": kind, "section": plan_name, "x": x, "y": y, "value": 0.0,
+             "standard_error": np.nan, "used": False, "reason": "", "depth": np.nan, "device": ""}
+        )  # fmt: skip
         rows = np.arange(count, count + len(table))
         plans.append(MeasurementPlan(plan_name, rows, table, hours, x, experiment))
         tables.append(table)
         count += len(table)
     return replace(wide, station=station_table(*tables)), plans
-
-
-def _with_beds(model: Model, case: Case) -> Site:
-    """The site with the bed of each further experiment: that of the one it is like, which may have its own."""
-    known = [(model.case.experiments[name].bed, there) for name, there in model.site.own.items()]
-    own = {name: there for name, one in case.experiments.items() for bed, there in known if bed == one.bed}
-    return replace(model.site, own={**own, **model.site.own})
 
 
 def _ideas(
@@ -138,7 +140,10 @@ def _ideas(
     """Name, experiment, x, y, kind and hours of every measurement worth a thought; sections as those that were
     measured, as far as water reaches, none where no velocity was. model: with further experiments behind those at hand.
     """
-    usual, y = at_hand[-1], _verticals(velocity)
+    usual, y = at_hand[-1], np.zeros(0)
+    if not velocity.empty:  # where verticals stand in the section that has most of them
+        counts = velocity.groupby("x")["y"].nunique()
+        y = np.sort(velocity[velocity["x"] == counts.idxmax()]["y"].unique().astype(float))
     low, high = model.case.grid.x
     places = np.linspace(low, high, SECTIONS + 2)[1:-1]
     near = AS_MEASURED * float(places[1] - places[0])
@@ -150,23 +155,20 @@ def _ideas(
         sections.append((f"{at} again ({usual})", usual, x, here, 0.0))
         others = [name for name in model.case.experiments if name not in at_hand]
         sections += [(f"{at} {experiment}", experiment, x, here, HOURS["discharge"]) for experiment in others]
-    ideas = [
-        (name, experiment, x, wet, STREAMWISE, _hours(wet) + more)
-        for name, experiment, x, y, more in sections
-        if (wet := _in_water(model, experiment, x, y)).size
-    ]
-    middle = np.array([_middle(y if y.size else np.array(model.case.grid.y))])
+    ideas = []
+    for name, experiment, x, verticals, more in sections:  # verticals that the water covers, see `expected_depth`
+        site, grid = in_experiment(model.site, experiment), model.site.grid
+        depth = expected_depth(model.case, site, model.case.experiments[experiment])[np.abs(grid.x - x).argmin()]
+        deep = depth[np.abs(grid.y[:, None] - verticals).argmin(axis=0)] > model.case.numerics.film_depth
+        if (wet := verticals[deep]).size:
+            hours = HOURS["section"] + wet.size * HOURS["vertical"] + more
+            ideas.append((name, experiment, x, wet, STREAMWISE, hours))
+    across = y if y.size else np.array(model.case.grid.y)
+    middle = np.array([float(0.5 * (across[0] + across[-1]))])
     return ideas + [
         (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), middle, WATER_LEVEL, HOURS["gauge"])
         for x in places[::2]
     ]
-
-
-def _in_water(model: Model, experiment: str, x: float, y: Array) -> Array:
-    """Those of the verticals at y that the water of an experiment covers at x [m], as `expected_depth` has it."""
-    site, grid = in_experiment(model.site, experiment), model.site.grid
-    depth = expected_depth(model.case, site, model.case.experiments[experiment])[np.abs(grid.x - x).argmin()]
-    return y[depth[np.abs(grid.y[:, None] - y).argmin(axis=0)] > model.case.numerics.film_depth]
 
 
 def _measured_sections(velocity: pd.DataFrame, experiments: Sequence[str], near: float) -> list[tuple[float, Array]]:
@@ -187,36 +189,16 @@ def _measured_sections(velocity: pd.DataFrame, experiments: Sequence[str], near:
     return [(x, y) for _, x, y in sorted(found, key=lambda one: one[1])]
 
 
-def _hours(y: Array) -> float:
-    """Hours of a section with verticals at y [m]."""
-    return HOURS["section"] + y.size * HOURS["vertical"]
-
-
-def _verticals(velocity: pd.DataFrame) -> Array:
-    """Where verticals stand in the section that has most of them [m], nowhere without velocities."""
-    if velocity.empty:
-        return np.zeros(0)
-    counts = velocity.groupby("x")["y"].nunique()
-    return np.sort(velocity[velocity["x"] == counts.idxmax()]["y"].unique().astype(float))
-
-
-def _middle(y: Array) -> float:
-    return float(0.5 * (y[0] + y[-1]))
-
-
-def _stations(experiment: str, section: str, x: float, y: Array, kind: str) -> pd.DataFrame:
-    return pd.DataFrame(
-        {"experiment": experiment, "kind": kind, "section": section, "x": x, "y": y, "value": 0.0,
-         "standard_error": np.nan, "used": False, "reason": "", "depth": np.nan, "device": ""}
-    )  # fmt: skip
-
-
-def _with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
+def with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
     """The case with experiments at discharges it has not seen, `lower` ones and HIGHER, where those at hand are
     numbers.
     """
     case = model.case
-    numbers = [(name, one) for name, one in case.experiments.items() if _plain(one)]
+    numbers = [
+        (name, one)
+        for name, one in case.experiments.items()
+        if not isinstance(one.level, str) and not any(isinstance(q, str) for q in one.discharge.values())
+    ]
     if not numbers:
         return case
     totals = {name: sum(float(q) for q in one.discharge.values()) for name, one in numbers}
@@ -234,23 +216,7 @@ def _with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
     return case.model_copy(update={"experiments": {**case.experiments, **unseen}})
 
 
-def _plain(one: Experiment) -> bool:
-    return not isinstance(one.level, str) and not any(isinstance(q, str) for q in one.discharge.values())
-
-
-def _errors(station: pd.DataFrame, noise: Noise) -> Array:
-    """Errors of measurements at hand, and those to come: as good as the usual one of their kind."""
-    errors = noise.among_all(noise.data_error, len(station))
-    kinds = station["kind"].to_numpy()
-    for kind in dict.fromkeys(kinds):
-        known = errors[(kinds == kind) & np.isfinite(errors)]
-        errors[(kinds == kind) & ~np.isfinite(errors)] = (
-            np.median(known) if known.size else kind_of(str(kind)).usual_error
-        )
-    return errors
-
-
-def _least(slope: Array, traces: Array) -> Array:
+def least_distances(slope: Array, traces: Array) -> Array:
     """The least D^2 between each rival and any other, either way, (rival,); from the model without any when there is
     only one.
     """

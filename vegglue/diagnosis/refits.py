@@ -79,9 +79,15 @@ def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = 
     nothing = fit(search.model, search.noise, search.point, REFIT_STEPS)
     finished = counted(watch, "refitting with each", len(trials), "refits")
     ends = parallel_map(partial(_best_of_starts, search), [(trial,) for trial in trials], finished)
-    return [
-        None if best is None else _refit(search, trial, best, nothing) for trial, best in zip(trials, ends, strict=True)
-    ]
+    refits: list[Refit | None] = []
+    for trial, best in zip(trials, ends, strict=True):
+        if best is None:
+            refits.append(None)
+            continue
+        amplitude, low, high = interval95(_with(search.model, trial), best, trial.candidate.parameter)
+        gained = log_evidence_under(best) - log_evidence_under(nothing)
+        refits.append(Refit(trial.candidate, trial.shapes, best, gained, amplitude, (low, high)))
+    return refits
 
 
 def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z: Array, gain: float) -> Array:
@@ -102,27 +108,15 @@ def _best_of_starts(search: SearchModel, trial: RefitTrial) -> MapEstimate | Non
 
 
 def _refitted(search: SearchModel, trial: RefitTrial, start: Array, enough: float) -> MapEstimate | None:
-    model = _with(search.model, trial)
+    """The end of one start, or of a share of the way to it from the amplitude off."""
+    model, candidate = _with(search.model, trial), trial.candidate
+    off = z_of(model.case.parameters[candidate.parameter], start_amplitude(candidate.amplitude, 0.0))
+    here = np.append(search.point.z, off)
     for share in SHARES_OF_START:
-        point = linearise_from(model, _nearer(model, trial, search.point.z, start, share), search.point)
+        point = linearise_from(model, np.asarray(here + share * (start - here)), search.point)
         if point is not None:
             return fit(model, search.noise, point, REFIT_STEPS, enough)
     return None
-
-
-def _nearer(model: Model, trial: RefitTrial, z: Array, start: Array, share: float) -> Array:
-    """A share of the way from z (p,) with the amplitude off to the start (p + 1,)."""
-    candidate = trial.candidate
-    off = z_of(model.case.parameters[candidate.parameter], start_amplitude(candidate.amplitude, 0.0))
-    here = np.append(z, off)
-    return np.asarray(here + share * (start - here))
-
-
-def _refit(search: SearchModel, trial: RefitTrial, fitted: MapEstimate, nothing: MapEstimate) -> Refit:
-    model = _with(search.model, trial)
-    amplitude, low, high = interval95(model, fitted, trial.candidate.parameter)
-    gained = log_evidence_under(fitted) - log_evidence_under(nothing)
-    return Refit(trial.candidate, trial.shapes, fitted, gained, amplitude, (low, high))
 
 
 def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:

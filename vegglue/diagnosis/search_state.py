@@ -16,7 +16,6 @@ from vegglue.calibration.candidates import Instrument, candidate_in_case, effect
 from vegglue.calibration.fit import chi2
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.calibration.score_test import kind_named, prior_shrinkage
-from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import Hypothesis, chances_of, hypotheses_of, tempered_odds
 from vegglue.diagnosis.refits import Refit, calibrated_with, without_effect
@@ -144,7 +143,11 @@ def step_found(
     columns = [hypotheses[j].column for j in listed]
     cosine = score_test.cosines(screening.projected)[np.ix_(columns, columns)]
     found, groups = rivals_among(names, chance[listed], cosine)
-    base, others = screening.base, _others(hypotheses, chance, "effect")
+    base, least = screening.base, constants().rival_share * chance.max()
+    # Of other kinds what is not negligible against the best.
+    others = {
+        one.name: float(p) for one, p in zip(hypotheses, chance, strict=True) if one.kind != "effect" and p >= least
+    }
     terms = {one.term for one in screening.fingerprints.places}
     places = {
         one.name: anomaly_found(screening, hypotheses, j, one.what)
@@ -257,7 +260,15 @@ def instrument_found(screening: Screening, best: Hypothesis, one: Instrument) ->
     length, score = float(kind.projected.length[best.column]), float(kind.scores[best.column])
     shrunk = float(prior_shrinkage(kind.size[best.column]))
     offset, spread = shrunk * score / length, np.sqrt(shrunk) / length
-    station = screening.base.model.station.iloc[noise.rows[one.readings[0]]]
+    station, columns = screening.base.model.station.iloc[noise.rows[one.readings[0]]], error_columns(one, noise.value)
+    factor = float("nan")  # what a probe reads over what is there, unless an offset explains it as well
+    if columns.shape[1] > 1:
+        point = screening.base.fitted.point
+        residual, both = noise.whiten(noise.residual(point.prediction)), noise.whiten(columns)
+        projected = score_test.project(screening.whitened_slopes, residual, point.z, both)
+        by_offset, by_factor = score_test.scores(projected, np.zeros(2))
+        if 0.5 * (by_factor**2 - by_offset**2) >= np.log(constants().strong_odds):
+            factor = float(1.0 / (1.0 - by_factor / projected.length[1]))
     return FaultyInstrument(
         kind=one.kind,
         x=one.x,
@@ -267,22 +278,8 @@ def instrument_found(screening: Screening, best: Hypothesis, one: Instrument) ->
         interval95=(offset - NORMAL95 * spread, offset + NORMAL95 * spread),
         unit=kind_of(str(station["kind"])).unit,
         log_factor=best.log_evidence,
-        factor=_factor(screening, one),
+        factor=factor,
     )
-
-
-def _factor(screening: Screening, one: Instrument) -> float:
-    """What a probe reads over what is there [-], NaN where an offset explains its readings as well, to strong_odds."""
-    noise, point = screening.base.noise, screening.base.fitted.point
-    columns = error_columns(one, noise.value)
-    if columns.shape[1] < 2:
-        return float("nan")
-    residual, both = noise.whiten(noise.residual(point.prediction)), noise.whiten(columns)
-    projected = score_test.project(screening.whitened_slopes, residual, point.z, both)
-    offset, factor = score_test.scores(projected, np.zeros(2))
-    if 0.5 * (factor**2 - offset**2) < np.log(constants().strong_odds):
-        return float("nan")
-    return float(1.0 / (1.0 - factor / projected.length[1]))
 
 
 def rivals_among(
@@ -302,78 +299,51 @@ def rivals_among(
     return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
 
 
-def _others(hypotheses: Sequence[Hypothesis], chance: Array, kind: str) -> dict[str, float]:
-    """Chance of the hypotheses of other kinds, where it is not negligible against the best."""
-    return {
-        one.name: float(p)
-        for one, p in zip(hypotheses, chance, strict=True)
-        if one.kind != kind and p >= constants().rival_share * chance.max()
-    }
-
-
-# The model, the steps and the candidate_effects, as they are now.
-Again = tuple[Baseline, tuple[Step, ...], dict[str, CandidateEffect]]
-
-
 def with_rivals_again(
     base: Baseline,
     steps: Sequence[Step],
     flagged: tuple[int, ...],
-    candidate_effects: Mapping[str, CandidateEffect],
+    effects: Mapping[str, CandidateEffect],
     watch: Watch,
-) -> Again:
-    """The model with the best rival of every step, the steps with the chances as they are now, and the effects with the
-    amplitudes of their refits.
+) -> tuple[Baseline, tuple[Step, ...], dict[str, CandidateEffect]]:
+    """The model with the best rival of every step, at the values of its shapes that it competed with, the steps with
+    the chances as they are now, and the effects with the amplitudes of their refits.
 
     steps: of effects that were accepted before what was last: an effect, something at a place, an instrument; flagged:
-    readings set aside, indices among the used stations.
+    readings excluded, indices among the used stations. A step stays as it is if no flow is found without its effect, or
+    with any.
     """
-    kept, known = list[Step](), dict(candidate_effects)
+    kept, known = list[Step](), dict(effects)
     for step in steps:
-        base, step, hypotheses = _again(base, step, flagged, watch)
-        known |= refitted(hypotheses, known)
         kept.append(step)
+        watch(Progress(f"comparing {step.accepted} again with all else"))
+        less = without_effect(base, candidate_in_case(base.model.case, step.accepted))
+        if less is None:
+            continue
+        screening = screen(less, flagged)
+        hypotheses = hypotheses_of(screening, watch)
+        listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
+        if step.accepted not in [hypotheses[j].name for j in listed]:
+            continue
+        best = hypotheses[listed[0]].what
+        assert isinstance(best, Refit)
+        one = best.candidate
+        # At other values of its shapes than those in the case an effect is another.
+        if base.model.case.effects.get(one.key) != effect_entry(one, one.parameter, best.shapes):
+            further = calibrated_with(less, best)
+            if further is None:
+                continue
+            base = further
+        again = step_found(screening, hypotheses, listed[0], base, step.p_family)
+        kept[-1] = replace(again, chi2_before=step.chi2_before, chi2_after=step.chi2_after)
+        known |= refitted(hypotheses, known)
     return base, tuple(kept), known
 
 
-def refitted(
-    hypotheses: Sequence[Hypothesis], candidate_effects: Mapping[str, CandidateEffect]
-) -> dict[str, CandidateEffect]:
+def refitted(hypotheses: Sequence[Hypothesis], effects: Mapping[str, CandidateEffect]) -> dict[str, CandidateEffect]:
     """The listed effects that were refitted, with the amplitudes of their refits."""
     return {
-        one.name: one.what.of(candidate_effects[one.name])
+        one.name: one.what.of(effects[one.name])
         for one in hypotheses
-        if one.kind == "effect" and one.name in candidate_effects and isinstance(one.what, Refit)
+        if one.kind == "effect" and one.name in effects and isinstance(one.what, Refit)
     }
-
-
-def _again(
-    base: Baseline, step: Step, flagged: tuple[int, ...], watch: Watch
-) -> tuple[Baseline, Step, Sequence[Hypothesis]]:
-    """One step and what competed, the best at the values of its shapes that it competed with; as it was where no flow
-    is found without its effect, or with any.
-    """
-    watch(Progress(f"comparing {step.accepted} again with all else"))
-    less = without_effect(base, candidate_in_case(base.model.case, step.accepted))
-    if less is None:
-        return base, step, ()
-    screening = screen(less, flagged)
-    hypotheses = hypotheses_of(screening, watch)
-    listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
-    if step.accepted not in [hypotheses[j].name for j in listed]:
-        return base, step, ()
-    best = hypotheses[listed[0]].what
-    assert isinstance(best, Refit)
-    if not _is_at_work(base.model.case, best):
-        further = calibrated_with(less, best)
-        if further is None:
-            return base, step, ()
-        base = further
-    again = step_found(screening, hypotheses, listed[0], base, step.p_family)
-    return base, replace(again, chi2_before=step.chi2_before, chi2_after=step.chi2_after), hypotheses
-
-
-def _is_at_work(case: Case, refit: Refit) -> bool:
-    """Whether an effect acts in the case as it was refitted: at other values of its shapes it is another."""
-    one = refit.candidate
-    return case.effects.get(one.key) == effect_entry(one, one.parameter, refit.shapes)
