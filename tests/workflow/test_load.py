@@ -40,6 +40,22 @@ def test_everything_in_a_folder_is_loaded(run: Path) -> None:
         assert (data.attrs["config"], data.attrs["config_hash"]) == ("name: d0\n", HASH)
 
 
+def test_arviz_of_either_generation_gives_the_same_draws(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """InferenceData before 1.0, a DataTree of xarray from then on; Python 3.11 gets the older one only."""
+    arviz, own = pytest.importorskip("arviz"), vegglue.load(run).posterior
+    monkeypatch.setattr(arviz, "__version__", "1.3.0")
+    tree = vegglue.load(run).posterior
+    assert isinstance(tree, pytest.importorskip("xarray").DataTree)
+    groups = {"posterior", "prior", "log_likelihood", "posterior_predictive", "observed_data"}
+    assert groups <= set(tree.children)
+    for group in groups:
+        for name, values in own[group].data_vars.items():
+            np.testing.assert_array_equal(tree[group][name].values, values.values)
+    assert "posterior: n_b, phi" in repr(vegglue.load(run))
+    (run / "posterior.h5").unlink()
+    assert tree.posterior["phi"].values.size == 2000, "read, and closed"
+
+
 def test_a_loaded_run_says_what_it_holds(run: Path) -> None:
     shown = repr(vegglue.load(run))
     sizes = ("ensemble: 12 members, 2 stations", "fields:", "2 rows")

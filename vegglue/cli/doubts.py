@@ -33,3 +33,18 @@ def opened_runs(configs: Sequence[Path], trust: bool) -> "list[CaseRun]":
     for text in dict.fromkeys(sentence(one) for run in several for one in critical_warnings(run)):
         print(f"Doubtful: {text}", file=sys.stderr, flush=True)
     return several
+
+
+def print_doubts_of_ensemble(run: "CaseRun") -> None:
+    """Warn that the members of a command, if they are kept, do not follow their parameters."""
+    if run.case.engine is None or not (run.folder / "ensemble.h5").exists():
+        return
+    from vegglue.case.resolved_config import simulation_hash
+    from vegglue.inference.command_ensemble import doubts_of_predictions
+    from vegglue.results.result_files import read_ensemble, stored_hash
+    from vegglue.workflow.case_run import as_solved
+
+    path = run.folder / "ensemble.h5"
+    if stored_hash(path) == simulation_hash(as_solved(run.case, run.folder)):
+        for doubt in doubts_of_predictions(read_ensemble(path)):
+            print(f"Doubtful: {sentence(doubt)}", file=sys.stderr, flush=True)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 import vegglue
-from vegglue.cli.doubts import opened_run
+from vegglue.cli.doubts import opened_run, print_doubts_of_ensemble
 from vegglue.cli.hearing import heard
 from vegglue.cli.options import RUNS, Cluster, Config, Force, Jobs, Json, Members, Quiet, Runs, Trust
 from vegglue.cli.output import command_line, print_object
@@ -41,7 +41,8 @@ def simulate_command(
     With --force, members for which the command of an `engine` failed are run again.
     """
     opened = opened_run(config, trust)
-    from vegglue.workflow.simulate import is_up_to_date, refuse_all_failed
+    from vegglue.inference.command_ensemble import refuse_useless
+    from vegglue.workflow.simulate import is_up_to_date
 
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         run = opened.with_settings(runs, jobs, watch, force).sized(members)
@@ -56,7 +57,8 @@ def simulate_command(
         print(f"{runs / case.name / 'ensemble.h5'} is up to date.")
     else:
         tell(case, runs, ensemble, as_object)
-    refuse_all_failed(case, ensemble)
+    refuse_useless(case, ensemble)
+    print_doubts_of_ensemble(run)
 
 
 def infer_command(
@@ -76,7 +78,9 @@ def infer_command(
     """Infer the parameters from the measurements and say what was found."""
     opened = opened_run(config, trust)
     with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        posterior = vegglue.infer(opened.with_settings(runs, jobs, watch), method=method, members=members)
+        run = opened.with_settings(runs, jobs, watch)
+        posterior = vegglue.infer(run, method=method, members=members)
+    print_doubts_of_ensemble(run)
     tell(opened.case, runs, posterior, as_object)
 
 
@@ -91,7 +95,9 @@ def report_command(
     """Make the page and the figures of a run."""
     opened = opened_run(config, trust)
     with heard(quiet, as_object) as watch:
-        page = vegglue.report(opened.with_settings(runs, watch=watch), members=members)
+        run = opened.with_settings(runs, watch=watch)
+        page = vegglue.report(run, members=members)
+    print_doubts_of_ensemble(run)
     tell(opened.case, runs, page, as_object)
 
 

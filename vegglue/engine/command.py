@@ -41,8 +41,9 @@ from vegglue.case.schema import Case, CommandEngine
 from vegglue.case.site_schema import Value
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.errors import InputError, shown_path
-from vegglue.measurements.kinds import kind_of
+from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL, kind_of
 from vegglue.measurements.observations import LARGEST_READING
+from vegglue.measurements.plausibility import is_mark
 from vegglue.parallel import cores_allowed, has_backend
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.resume import hold_lock
@@ -59,6 +60,13 @@ LONGEST_LOG = 1_000_000_000
 LOOK_EVERY = 0.05
 # Signs of the last line of the log that a reason quotes: enough for a path; a reason of an ensemble has room for 240.
 QUOTED = 160
+# A mark of a missing value lies further than this from what was measured [SI]; a level or a discharge may be 99.9.
+FAR_FROM_MEASURED = 5.0
+# No river is faster [m/s], and no level further from the measured one [m]. Chosen; floods in gorges reach 10 m/s.
+FASTEST_RIVER, FURTHEST_LEVEL = 20.0, 200.0
+# Size of a measured value [SI], and standard errors of it, from which a prediction of exactly 0 is none: a dry cell, or
+# a field that was never filled. Chosen: a probe reads less than 0.05 m/s at the edge of the water.
+CLEARLY_NOT_ZERO, ERRORS_FROM_ZERO = 0.05, 3.0
 OneTheta = Mapping[str, float]
 Changes = Mapping[str, tuple[tuple[str, int, int], ...]]
 
@@ -150,6 +158,36 @@ def read_predictions(path: Path, stations: int) -> Array:
         more = f" and {missing.size - 1} more" if missing.size > 1 else ""
         raise BadPredictionsError(f"{PREDICTIONS_FILE}: no prediction of station {missing[0]}{more}")
     return found
+
+
+def not_predicted(prediction: Array, station: pd.DataFrame) -> str:
+    """Why predictions (station,) of a run are none, '' if they are: what codes write for dry cells and failed runs."""
+    kinds, measured = station["kind"].to_numpy(str), station["value"].to_numpy(float)
+    error, used = station["standard_error"].to_numpy(float), station["used"].to_numpy(bool)
+    off = np.abs(prediction - measured)
+    velocity = np.isin(kinds, [name for name, kind in KINDS.items() if kind.velocity])
+    mark = np.array([is_mark(value) for value in prediction], bool) & ~(off <= FAR_FROM_MEASURED)
+    fast = velocity & (np.abs(prediction) > FASTEST_RIVER)
+    if 2 * fast.sum() > velocity.sum():  # another unit, which `check` reports
+        fast[:] = False
+    beyond = fast | (kinds == WATER_LEVEL) & (off > FURTHEST_LEVEL)
+    # A flow may be straight: only what is measured along it, and levels and discharges, cannot be exactly 0.
+    wet = np.abs(measured) > np.fmax(CLEARLY_NOT_ZERO, ERRORS_FROM_ZERO * error)
+    zero = (prediction == 0.0) & used & wet & (~velocity | (kinds == STREAMWISE) | (kinds == "speed"))
+    for wrong, what in (
+        (mark, "a mark of a missing value"),
+        (beyond, "beyond any flow"),
+        (zero, "a dry cell or a failed run, as {measured:.3g} was measured"),
+    ):
+        if wrong.any():
+            first, more = int(np.argmax(wrong)), int(wrong.sum()) - 1
+            at = ", ".join(f"{name} = {station[name].iloc[first]:g}" for name in ("x", "y"))
+            others = f" ({more} more alike)" if more else ""
+            why = what.format(measured=measured[first])
+            return f"{PREDICTIONS_FILE}: station {first} ({at} m) has {prediction[first]:g}, {why}{others}"
+    if prediction.size > 1 and not prediction.any() and measured[used].any():
+        return f"{PREDICTIONS_FILE}: all {prediction.size} predictions are 0, as of a failed run"
+    return ""
 
 
 @dataclass(frozen=True)
@@ -347,31 +385,32 @@ def ended_runs(
     keys = [hashlib.sha256("\n".join([runs.digest, *one.values()]).encode()).hexdigest()[:32] for one in given]
     first: dict[str, int] = {}
     for position, key in enumerate(keys):
-        kept = _kept(runs, key, len(station))
+        kept = _kept(runs, key, station)
         if kept is not None:
             yield position, kept
         elif key in first:  # two of the same wait for one run
             continue
         else:
             first[key] = position
-    with closing(_new_runs(runs, {key: given[at] for key, at in first.items()}, len(station))) as ends:
+    with closing(_new_runs(runs, {key: given[at] for key, at in first.items()}, station)) as ends:
         for key, end in ends:
             yield from ((position, end) for position, same in enumerate(keys) if same == key)
 
 
-def _kept(runs: CommandRuns, key: str, stations: int) -> CommandEnd | None:
+def _kept(runs: CommandRuns, key: str, station: pd.DataFrame) -> CommandEnd | None:
     """What is kept of a finished run; None if nothing is, or it is damaged."""
     try:
         found = json.loads(read_text(runs.folder / f"{key}.json", LARGEST_JSON))
         prediction, seconds = np.array(found["prediction"], dtype=float), float(found["seconds"])
     except (InputError, ValueError, KeyError, TypeError, RecursionError):
         return None
-    sound = prediction.shape == (stations,) and bool(np.isfinite(prediction).all())
+    sound = prediction.shape == (len(station),) and bool(np.isfinite(prediction).all())
+    sound = sound and not not_predicted(prediction, station)
     return CommandEnd(prediction, "", seconds) if sound else None
 
 
 def _new_runs(
-    runs: CommandRuns, given: Mapping[str, Mapping[str, str]], stations: int
+    runs: CommandRuns, given: Mapping[str, Mapping[str, str]], station: pd.DataFrame
 ) -> Generator[tuple[str, CommandEnd], None, None]:
     """The key of each run and how it ended; given: its files by key. Of two vegglue in one folder one is refused."""
     if not given:
@@ -381,9 +420,11 @@ def _new_runs(
     def run(key: str, files: Mapping[str, str]) -> CommandEnd:
         if stop.is_set():
             return CommandEnd(None, "the command was not started", 0.0)
-        end = run_command_once(runs.words, runs.folder / key, files, stations, settings.timeout, stop)
+        end = run_command_once(runs.words, runs.folder / key, files, len(station), settings.timeout, stop)
         if end.prediction is None:
             return end
+        if reason := not_predicted(end.prediction, station):
+            return CommandEnd(None, reason, end.seconds)
         now = _changes(settings)
         for name, path in settings.files.items():
             if now[name] != runs.changed[name]:

@@ -166,7 +166,8 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slope
     if names and not slope.any():
         raise InsensitiveCommandError(
             f"{name}: expected a command of `engine` whose predictions change with {' or '.join(names)}, got the same "
-            "ones at either side of each; see whether it reads parameters.json."
+            "ones at either side of each; see whether it reads parameters.json, and reads and writes more than four "
+            "digits; or set `engine.step` larger."
         )
     ahead_of, behind_of = found[1 : 1 + q], found[1 + q :]
     curve = np.sqrt(np.mean((ahead_of + behind_of - 2.0 * found[0]) ** 2, axis=1))

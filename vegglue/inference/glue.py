@@ -129,7 +129,8 @@ def efficiency(residual: Array, station: pd.DataFrame) -> Array:
     """
     value = station["value"].to_numpy(float)
     kinds = stations_by_kind(station).values()
-    variances = [float(np.var(value[rows])) or float("nan") for rows in kinds]
+    # By the range: the variance of equal values is not always 0, as their mean is rounded.
+    variances = [float(np.var(value[rows])) if np.ptp(value[rows]) > 0.0 else float("nan") for rows in kinds]
     squares = [np.mean(residual[:, rows] ** 2, axis=1) for rows in kinds]
     return 1 - np.mean([square / variance for square, variance in zip(squares, variances, strict=True)], axis=0)
 

@@ -13,6 +13,7 @@ import numpy as np
 from vegglue.case.channel_geometry import discharges_upstream_of
 from vegglue.case.schema import Case
 from vegglue.flow.status import FAILED, STATUS_WORDS, members_with
+from vegglue.inference.command_ensemble import doubts_of_predictions
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import Observations, section_place
@@ -46,6 +47,7 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.results.verdict import is_too_small
 from vegglue.wording.numbers import so_many
+from vegglue.wording.sentences import sentences
 
 # Share of failed members [-] above which it is a doubt: fewer hardly change what the others say of the prior.
 FAILED_TOLERATED = 0.01
@@ -81,6 +83,7 @@ def findings(run: Run) -> list[Finding]:
         *_discharge(case, observations),
         _weights(posterior, notation),
         *([] if run.ensemble is None else [_members(run.ensemble, posterior), *_mass(run.ensemble)]),
+        *([] if run.ensemble is None else _of_predictions(run.ensemble)),
         *_engine(case),
     ]
     return sorted(found, key=lambda finding: not finding.doubt)
@@ -263,6 +266,11 @@ def _members(ensemble: Ensemble, posterior: Posterior) -> Finding:
 def _mass(ensemble: Ensemble) -> Iterator[Finding]:
     if not ensemble.by_command:
         yield Finding("mass", mass_in_words(ensemble), doubt=largest_mass_error(ensemble) >= MASS_LIMIT)
+
+
+def _of_predictions(ensemble: Ensemble) -> Iterator[Finding]:
+    for text in sentences(doubts_of_predictions(ensemble)):
+        yield Finding("engine", _html([text]), doubt=True)
 
 
 def _engine(case: Case) -> Iterator[Finding]:

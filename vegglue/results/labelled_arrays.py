@@ -30,12 +30,18 @@ def read_labelled(path: Path, *groups: str) -> "xarray.Dataset":
     return xarray.merge(parts).assign_attrs(stated)
 
 
-def read_inference_data(path: Path) -> "arviz.InferenceData":
-    """posterior.h5 as ArviZ sees it: posterior, prior, log_likelihood and so on. Errors: as read_labelled."""
+def read_inference_data(path: Path) -> "arviz.InferenceData | xarray.DataTree":
+    """posterior.h5 as ArviZ sees it: posterior, prior, log_likelihood and so on; a DataTree from ArviZ 1.0 on.
+
+    Errors: as read_labelled.
+    """
     arviz = extra_library("arviz")
     extra_library(ENGINE)
     with open_hdf5(path, "r"):
         pass  # it is whole; closed again, since the libraries below open it with locks
+    if int(arviz.__version__.split(".")[0]) >= 1:
+        with extra_library("xarray").open_datatree(path, engine=ENGINE) as tree:
+            return tree.load()
     with arviz.rc_context({"data.load": "eager"}):
         return arviz.from_netcdf(path, engine=ENGINE)
 

@@ -15,7 +15,7 @@ from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
-from vegglue.engine.command import command_predictions, command_runs, ended_runs
+from vegglue.engine.command import CommandEnd, command_predictions, command_runs, ended_runs
 from vegglue.engine.corrected import corrected, correction_at, without_effects
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.errors import InputError, shown_path
@@ -63,10 +63,18 @@ class PredictedRange:
 
 @dataclass(frozen=True)
 class CommandTried:
-    """One run of the command of `engine` at the medians of the priors, and how long it took [s]."""
+    """Runs of the command of `engine`, at the medians of the priors and a step ahead in each parameter.
+
+    seconds: of the first [s]; unchanged: parameters whose step changes no prediction, of `parameters` in all; failed:
+    those at whose step the command fails; step: in standard deviations of the prior [-].
+    """
 
     seconds: float
     kinds: tuple[PredictedRange, ...]
+    parameters: int = 0
+    unchanged: tuple[str, ...] = ()
+    failed: tuple[str, ...] = ()
+    step: float = 0.1
 
 
 def with_command(model: Model, folder: Path, watch: Watch) -> Model:
@@ -125,17 +133,31 @@ def command_compared(
 
 
 def command_tried(model: Model, folder: Path) -> CommandTried:
-    """Run the command once, at the medians of the priors. Raises InputError when it fails."""
+    """Run the command at the medians of the priors and a step ahead in each parameter; a diagnosis uses the same runs.
+
+    Raises InputError when it fails at the medians.
+    """
     case, bare = model.case, without_effects(model)
-    middle = np.zeros(len(bare.names))
-    theta = {name: float(value[0]) for name, value in theta_at(bare.case, middle).items()}
-    runs = command_runs(case, folder)
-    ((_, end),) = ended_runs(runs, bare.case, model.station, [theta])
+    middle, runs = np.zeros(len(bare.names)), command_runs(case, folder)
+
+    def run_at(points: Array) -> dict[int, CommandEnd]:
+        thetas = theta_at(bare.case, points)
+        each = [{name: float(value[row]) for name, value in thetas.items()} for row in range(len(points))]
+        return dict(ended_runs(runs, bare.case, model.station, each))
+
+    end = run_at(middle[None])[0]
     if end.prediction is None:
         raise InputError(
             f"{shown_path(case.source)}: the command of `engine` failed at the medians of the priors: {end.reason}; "
             f"its files lie in {shown_path(runs.folder)}."
         )
+    ahead = run_at(runs.settings.step * np.eye(middle.size))
+    unchanged = tuple(
+        name
+        for row, name in enumerate(bare.names)
+        if (there := ahead[row].prediction) is not None and np.array_equal(there, end.prediction)
+    )
+    failed = tuple(name for row, name in enumerate(bare.names) if ahead[row].prediction is None)
     own, ranges = linearise(bare, middle), []
     for name, rows in stations_by_kind(model.station).items():
         kind, found = kind_of(name), end.prediction[rows]
@@ -146,7 +168,7 @@ def command_tried(model: Model, folder: Path) -> CommandTried:
             if name == STREAMWISE and built_in.any():
                 times = float(found @ built_in) / float(built_in @ built_in)
         ranges.append(PredictedRange(kind.words, float(found.min()), float(found.max()), kind.unit, apart, times))
-    return CommandTried(end.seconds, tuple(ranges))
+    return CommandTried(end.seconds, tuple(ranges), len(bare.names), unchanged, failed, runs.settings.step)
 
 
 def refuse_command(case: Case, verb: str) -> None:

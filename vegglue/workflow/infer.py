@@ -10,6 +10,7 @@ from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_ha
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import without_stations
 from vegglue.errors import InputError, shown_command
+from vegglue.inference.command_ensemble import refuse_useless
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refinable, refine
 from vegglue.parallel import at_most, one_thread
@@ -59,6 +60,8 @@ def infer(
         )
     chosen = chosen_method(sized, method)
     ensemble = own_ensemble(run, ensemble, members is not None or needs_ensemble(sized, chosen))
+    if ensemble is not None and ensemble.by_command:
+        refuse_useless(sized, ensemble)
     if chosen == "glue":
         assert ensemble is not None
         posterior = glue(ensemble, sized, observations)

@@ -28,15 +28,15 @@ class LoadedRun:
     ensemble: all members: their parameters, prediction (member, station), status, reason, mass_error and so on.
     fields: level, u and v (member, experiment, x, y), where the case keeps them. members: of the posterior, with
     theta (parameter, member), weights and what follows from them. posterior: draws of equal weight for ArviZ, with the
-    groups prior, log_likelihood, posterior_predictive and others. stations: one row for each measurement.
-    Attributes of a dataset say from which config, seed and version it is; its variables have `units`.
+    groups prior, log_likelihood, posterior_predictive and others; a DataTree with ArviZ 1.0 and later. stations: one
+    row for each measurement. Attributes of a dataset say from which config, seed and version it is; its variables have `units`.
     """
 
     folder: Path
     ensemble: "xarray.Dataset | None"
     fields: "xarray.Dataset | None"
     members: "xarray.Dataset | None"
-    posterior: "arviz.InferenceData | None"
+    posterior: "arviz.InferenceData | xarray.DataTree | None"
     diagnosis: Diagnosis | None
     stations: pd.DataFrame | None
 
@@ -48,7 +48,7 @@ class LoadedRun:
             if data is not None
         ]
         if self.posterior is not None:
-            drawn: xarray.Dataset = self.posterior["posterior"]
+            drawn = self.posterior["posterior"]
             lines.append(f"posterior: {', '.join(map(str, drawn.data_vars))}")
         if self.diagnosis is not None:
             lines.append(f"diagnosis: {self.diagnosis.verdict.kind}. {self.diagnosis.verdict.sentence}")

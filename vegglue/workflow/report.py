@@ -9,6 +9,7 @@ from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import without_stations
 from vegglue.errors import InputError, shown_command, shown_path
+from vegglue.inference.command_ensemble import refuse_useless
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
 from vegglue.pages.overview import write_overview
 from vegglue.pages.page import write_report
@@ -76,6 +77,8 @@ def results_of(sized: CaseRun, run: CaseRun, above: str = "../") -> Run:
     path, ensemble = folder / "ensemble.h5", None
     if begun_or_finished(path):
         ensemble = read_ensemble(path, simulation_hash(sized.case), case.source)
+        if ensemble.by_command:
+            refuse_useless(sized.case, ensemble)
     if not (folder / "posterior.h5").exists():
         refuse_if_the_run_went_on(run)
     posterior = read_posterior(folder / "posterior.h5", case_hash(sized.case), case.source)

@@ -2,13 +2,12 @@
 
 import os
 import shutil
-from collections import Counter
 from pathlib import Path
 
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
 from vegglue.engine.command import command_runs
-from vegglue.errors import InputError, StorageError, shown_path
+from vegglue.errors import InputError, StorageError
 from vegglue.flow.status import FAILED
 from vegglue.inference.command_ensemble import run_ensemble
 from vegglue.inference.solve_ensemble import solve_ensemble
@@ -112,15 +111,3 @@ def share_one_beside(run: CaseRun) -> None:
                     f"{here}: cannot be shared with {folder / name} ({error}); make room and run it again."
                 ) from error
         return
-
-
-def refuse_all_failed(case: Case, ensemble: Ensemble) -> None:
-    """Errors: InputError for an ensemble of which nothing can be inferred; it is kept all the same."""
-    failed = ensemble.status == FAILED
-    if failed.all():
-        reason, many = Counter(map(str, ensemble.reason[failed])).most_common(1)[0]
-        again = "" if case.engine is None else " with --force"
-        raise InputError(
-            f"{shown_path(case.source)}: expected members with a solution, got none of {failed.size:,}; {many:,} of "
-            f"them say: {reason or 'no steady flow'}. Mend that, or the priors, and simulate again{again}."
-        )
