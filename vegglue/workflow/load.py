@@ -29,7 +29,8 @@ class LoadedRun:
     fields: level, u and v (member, experiment, x, y), where the case keeps them. members: of the posterior, with
     theta (parameter, member), weights and what follows from them. posterior: draws of equal weight for ArviZ, with the
     groups prior, log_likelihood, posterior_predictive and others; a DataTree with ArviZ 1.0 and later. stations: one
-    row for each measurement. Attributes of a dataset say from which config, seed and version it is; its variables have `units`.
+    row for each measurement. Attributes of a dataset say from which config, seed and version it is; its variables
+    have `units`.
     """
 
     folder: Path
