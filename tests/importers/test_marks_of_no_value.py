@@ -259,7 +259,16 @@ def test_edges_of_a_gauging_are_no_velocities(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "summary",
-    ["Mean;8;0;41", "Average;;;41", "Mittelwert;8;0;41", "Total:;;;1800", "moyenne;8;0;41", "St dev;;;3", "Max;8;0;44"],
+    [
+        "Mean;8;0;41",
+        "Mean of section A;8;0;41",
+        "Average;;;41",
+        "Mittelwert;8;0;41",
+        "Total:;;;1800",
+        "moyenne;8;0;41",
+        "St dev;;;3",
+        "Max;8;0;44",
+    ],
 )
 def test_rows_of_summaries_are_no_measurements(tmp_path: Path, summary: str) -> None:
     rows = [f"{number};{x};{y};{40 + number}" for number, (x, y) in enumerate(ACROSS)]
@@ -290,9 +299,9 @@ def test_flags_of_0_and_1_without_a_sense_are_refused(tmp_path: Path) -> None:
         imported(tmp_path, v__txt="\n".join(["x;y;u;QC", *rows]))
 
 
-@pytest.mark.parametrize("quality", ["good", "fair", "poor"])
+@pytest.mark.parametrize("quality", ["good", "fair", "poor", "{number}"])
 def test_a_rating_is_no_flag(tmp_path: Path, quality: str) -> None:
-    rows = [f"{x};{y};0.4;{quality}" for x, y in ACROSS]
+    rows = [f"{x};{y};0.4;{quality.format(number=number % 4)}" for number, (x, y) in enumerate(ACROSS)]
     assert len(imported(tmp_path, v__txt="\n".join(["x;y;u;Quality", *rows]))[0]) == 8
 
 

@@ -74,6 +74,7 @@ BAD = re.compile(
 )
 NO = {"no", "n", "false", "0", "nein", "non", "nee", "f"}
 BAD_CODES, GOOD_CODES = {3.0, 4.0, 9.0}, {1.0, 2.0}
+OF_CODES = {"flag", "qc", "qa", "qaqc"}  # words of a heading above such numbers; others may be ratings
 MEANS_GOOD = {"valid", "ok", "use", "used", "good"}
 MEANS_BAD = {"bad", "reject", "rejected", "outlier"}
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
@@ -176,9 +177,9 @@ def without_flagged(path: Path, table: ParsedTable, columns: Mapping[str, int]) 
         if len(codes) == len(known) and codes == {0.0, 1.0} and set(words.split()) & (MEANS_GOOD | MEANS_BAD):
             good = bool(set(words.split()) & MEANS_GOOD)
             flagged = {i for i, text in enumerate(texts) if text and (float(text) != 0.0) != good}
-        elif len(codes) == len(known) and codes <= BAD_CODES | GOOD_CODES:
+        elif len(codes) == len(known) and codes <= BAD_CODES | GOOD_CODES and OF_CODES & set(words.split()):
             flagged = {i for i, text in enumerate(texts) if text and float(text) in BAD_CODES}
-        elif len(codes) == len(known) and codes == {0.0, 1.0}:
+        elif len(codes) == len(known) and codes == {0.0, 1.0} and OF_CODES & set(words.split()):
             raise InputError(
                 f"{shown_path(path)}: expected flags that say which rows are good, got 0 and 1 in column {heading!r}; "
                 "head it `valid` or `bad`, or take out the bad rows and the column."

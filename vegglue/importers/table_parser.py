@@ -46,6 +46,9 @@ SUMMARY = re.compile(
     r"(?: (?:of )?\S+)?[.:]?",
     re.IGNORECASE,
 )
+SUMMARY_OF = re.compile(
+    r"(mean|average|total|sum|mittel|moyenne|media|gemiddelde) (of|for|über|de|van) ", re.IGNORECASE
+)
 # The minus of mathematics, hyphens and dashes that word processors write.
 DASHES = str.maketrans(dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d", "-"))
 MISSING_WORDS = (
@@ -303,6 +306,7 @@ def _without_summaries(table: ParsedTable) -> ParsedTable:
         place
         for place, fields in enumerate(table.rows)
         if any(SUMMARY.fullmatch(field.strip()) for field in fields if not is_number(field))
+        or SUMMARY_OF.match(next((field for field in fields if field), ""))
     }
     if not found or len(found) == len(table.rows):
         return table
