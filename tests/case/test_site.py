@@ -120,7 +120,8 @@ TWO = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 2\n"
     [
         ("x,y\n1,2\n", ("x, y and z",)), ("x,y,z\n0,0,1\n1,0,high\n", ("data row 2", "column z", "'high'")),
         ("x,y,z\n0,0,1\n1,0\n", ("data row 2", "column z")), ("x,y,z\n0,0,1\n1,1,1\n2,2,1\n", ("three", "got 3")),
-        ("x,y,z\n", ("three", "got 0")), ("x,y,z\n0,0,1,5\n", ("data row 1",)), (f"x,y,z\n{'1' * 200_000},0,0\n", ("CSV",)),
+        ("x,y,z\n", ("three", "got 0")), ("x,y,z\n0,0,1,5\n", ("data row 1",)),
+        (f"x,y,z\n{'1' * 200_000},0,0\n", ("CSV",)),
     ],
     ids=lambda text: str(text)[:20],
 )  # fmt: skip

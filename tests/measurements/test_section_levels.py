@@ -68,7 +68,7 @@ def test_velocities_across_are_averaged_like_those_along(tmp_path: Path) -> None
 
 
 def test_without_a_column_there_is_nothing_across(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="expected a column v for `across`"):
+    with pytest.raises(InputError, match=r"adv\.csv, row 1: .* v .*`across`"):
         read_observations(section_at_8(tmp_path, ", across: true", header="x,y,z,u"))
 
 
