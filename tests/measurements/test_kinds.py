@@ -74,7 +74,7 @@ def test_a_discharge_needs_no_y(tmp_path: Path) -> None:
     table = read(tmp_path, "discharge", "section,x,y,discharge\ngauging,5,1.5,2.01\n", ", section: gauging").table
     assert list(table["y"]) == [1.5]
     assert list(table["section"]) == ["gauging"]
-    with pytest.raises(InputError, match="row 3: .*experiment, section, x"):
+    with pytest.raises(InputError, match=r"row 3: .*experiment, section, x"):
         read(tmp_path, "discharge", "x,discharge\n5,2.01\n5,1.97\n")
 
 

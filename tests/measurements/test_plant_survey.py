@@ -59,10 +59,10 @@ def test_draws_are_positive_keep_mean_and_deviation_and_repeat_with_the_seed():
     assert first.parts["undergrowth"] == pytest.approx(density * 0.004 * 0.29, rel=0.05)
 
 
-def test_the_assumed_density_is_said():
+def test_the_assumed_density_is_kept():
     choice = Survey(file=FILE, undergrowth_density=(100.0, 1000.0))
-    assert "100 and 1000 stems/m2" in rigid_cylinder(SURVEY, choice, draws=10).assumption
-    assert rigid_cylinder(SURVEY, Survey(file=FILE), draws=10).assumption == "No undergrowth."
+    assert rigid_cylinder(SURVEY, choice, draws=10).undergrowth_density == (100.0, 1000.0)
+    assert rigid_cylinder(SURVEY, Survey(file=FILE), draws=10).undergrowth_density is None
 
 
 @pytest.mark.parametrize(

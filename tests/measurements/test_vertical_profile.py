@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 from vegglue.measurements.vertical_profile import (
+    CanopyUnknown,
     Column,
     ProfileFit,
     average_weights,
@@ -143,8 +144,8 @@ def test_canopy_height_is_unknown_for_emergent_plants():
     noise = np.random.default_rng(8).normal(0.0, 0.01, HEIGHT.size)
     canopy = fit_canopy_height([Column(HEIGHT, 0.2 + noise, np.full(HEIGHT.size, 0.01), DEPTH)])
     assert np.isnan(canopy.value)
-    assert "no canopy top" in canopy.reason
-    assert "enough points" in fit_canopy_height([]).reason
+    assert canopy.unknown is CanopyUnknown.NO_TOP
+    assert fit_canopy_height([]).unknown is CanopyUnknown.FEW_POINTS
 
 
 def test_canopy_height_is_unknown_where_verticals_share_no_height():
@@ -154,4 +155,4 @@ def test_canopy_height_is_unknown_where_verticals_share_no_height():
     )
     canopy = fit_canopy_height([low, high])
     assert np.isnan(canopy.value)
-    assert "share no height" in canopy.reason
+    assert canopy.unknown is CanopyUnknown.NO_SHARED_HEIGHT

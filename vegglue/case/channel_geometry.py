@@ -64,7 +64,7 @@ def cells_across(site: Site) -> float:
     return 2.0 * half_width(site) / site.grid.dy
 
 
-@lru_cache(GEOMETRIES_KEPT)  # every problem of every member asks for the same
+@lru_cache(GEOMETRIES_KEPT)  # every problem of every member needs the same
 def _geometry(
     site: Site, filter_width: float, present: tuple[int, ...], relative_stems: tuple[float, ...]
 ) -> ChannelGeometry:

@@ -63,10 +63,10 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
         With what is wrong, where, and what to do.
     """
     path = Path(path)
-    # The compiler takes settings from the working folder, which may be a stranger's, and runs code from where they say.
+    # The compiler takes settings from the working folder, which may be a stranger's, and runs the code they name.
     if not trust and Path(COMPILER_SETTINGS).exists():
         raise InputError(
-            f"{COMPILER_SETTINGS}: can make numba run code that lies where it says: remove it, or add --trust if you "
+            f"{COMPILER_SETTINGS}: can make numba run code of a stranger: remove it, or add --trust if you "
             "trust it."
         )
     layers = _layers(path, ())
@@ -331,8 +331,8 @@ def _effects(case: Case) -> Iterator[Refusal]:
 
 
 def _values_and_ranges(case: Case) -> Iterator[Refusal]:
-    """Quantities are positive if they must be, every parameter is used, ranges lie in the grid, and a command is asked
-    for nothing that it does not give.
+    """Quantities are positive if they must be, every parameter is used, ranges lie in the grid, and a command has its
+    files and keeps no fields.
     """
     for place, value, positive in values(case):
         if isinstance(value, str):

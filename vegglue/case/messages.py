@@ -35,8 +35,8 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     if kind == "extra_forbidden":
         return Refusal(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
     expected = expected_in_words(problem)
-    for said, meant in (("greater", "a number greater"), ("less", "a number less")):
-        expected = expected.replace(said, meant)
+    for short, whole in (("greater", "a number greater"), ("less", "a number less")):
+        expected = expected.replace(short, whole)
     advice = ""
     if isinstance(got, str) and "number" in expected:
         if re.fullmatch(r"[-+]?\d+,\d+.*", got):
@@ -53,7 +53,7 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
 
 
 def expected_in_words(problem: Mapping[str, Any]) -> str:
-    """What one of pydantic's problems says was expected, without its opening words and the names of our types."""
+    """What one of pydantic's problems expected, without its opening words and the names of our types."""
     if problem["type"] == "too_long" and problem["ctx"]["max_length"] == OF_A_PAIR:
         return "two numbers (with a decimal point, as a comma parts them)"
     if problem["type"] == "tuple_type":

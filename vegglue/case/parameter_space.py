@@ -23,7 +23,19 @@ SMALLEST_PROBABILITY = 2.0**-31
 
 
 def quantile(prior: Parameter, probability: ArrayLike) -> NDArray[np.float64]:
-    """x = F^-1(probability), F(x) = P(X <= x) [unit of the prior]; at 0 and 1 its bounds, which may be infinite."""
+    """x = F^-1(probability), F(x) = P(X <= x).
+
+    Parameters
+    ----------
+    prior : Parameter
+    probability : array_like
+        Shares [-]; at 0 and 1 the result is a bound of the prior, which may be infinite.
+
+    Returns
+    -------
+    ndarray
+        Same shape [unit of the prior].
+    """
     number, share = _numbers(prior), np.asarray(probability, dtype=np.float64)
     if prior.distribution == "uniform":
         return np.asarray(number["low"] + share * (number["high"] - number["low"]))
@@ -50,7 +62,19 @@ def _truncated_normal(
 
 
 def probability(prior: Parameter, value: ArrayLike) -> NDArray[np.float64]:
-    """F(x) = P(X <= x) [-], the inverse of `quantile`; x in the unit of the prior."""
+    """F(x) = P(X <= x), the inverse of `quantile`.
+
+    Parameters
+    ----------
+    prior : Parameter
+    value : array_like
+        x [unit of the prior].
+
+    Returns
+    -------
+    ndarray
+        Same shape [-].
+    """
     number, x = _numbers(prior), np.asarray(value, dtype=np.float64)
     if prior.distribution == "uniform":
         return np.clip((x - number["low"]) / (number["high"] - number["low"]), 0.0, 1.0)
@@ -84,10 +108,20 @@ def sample_prior(parameters: Mapping[str, Parameter], members: int, seed: int) -
 
 
 def sobol_points(parameters: int, members: int, seed: int) -> NDArray[np.float64]:
-    """s_ij, the first points of the scrambled Sobol' sequence in the unit cube, (members, parameters) [-].
+    """s_ij, the first points of the scrambled Sobol' sequence in the unit cube.
 
-    The first points of a longer sequence are the same, because it is drawn up to the next power of two.
-    Source: Owen (1998), https://doi.org/10.1006/jcom.1998.0487.
+    Parameters
+    ----------
+    parameters, members, seed : int
+
+    Returns
+    -------
+    ndarray (members, parameters)
+        Shares [-]. The first points of a longer sequence are the same: it is drawn up to the next power of two.
+
+    References
+    ----------
+    Owen (1998), https://doi.org/10.1006/jcom.1998.0487.
     """
     from scipy.stats import qmc
 

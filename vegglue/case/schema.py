@@ -1,4 +1,4 @@
-"""What a config may say: its keys, their units, and which of them must agree. Nothing is read here."""
+"""The schema of a config: its keys, their units, and which of them must agree. Nothing is read here."""
 
 import math
 import re
@@ -86,7 +86,7 @@ WIDEST_LOG = 20.0
 
 
 def unusable(distribution: str, numbers: Mapping[str, float | None]) -> str | None:
-    """What a prior should have been, as the schema says it; None for one that can be drawn from.
+    """What a prior should have been; None for one that can be drawn from.
 
     numbers: low, high, mean, sd, median and log_sd, None where there is none.
     """
@@ -184,7 +184,7 @@ class Observation(Part):
     across: Literal[True] | None = Field(
         default=None, description="adv: true makes velocities across of column `v`, averaged like those along"
     )
-    synthetic: bool = Field(default=False, description="true: computed, not measured; reports and figures then say so")
+    synthetic: bool = Field(default=False, description="true: computed, not measured; marked in reports and figures")
 
     @model_validator(mode="after")
     def _keys_of_the_kind(self) -> Self:
@@ -233,7 +233,7 @@ class Numerics(Part):
     )
     # A centimetre, or a centimetre a second, is what is measured: a member that far off is not solved.
     tolerance: Annotated[Number, Field(gt=0, le=0.01)] = Field(
-        default=3e-6, description="largest correction a solved member still asks for [m, m/s], by depth in a film"
+        default=3e-6, description="largest remaining correction of a solved member [m, m/s], by depth in a film"
     )
 
 
@@ -264,7 +264,7 @@ class Infer(Part):
 
 
 class ModelError(Part):
-    """By how much the model and what is told of its site may be wrong; 0 where nothing is said."""
+    """Errors of the model and of what is known of its site; 0 unless stated."""
 
     friction: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="relative error of friction [-]")
     bed: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="error of the surveyed bed [m]")
@@ -282,7 +282,7 @@ class Validation(Part):
 
 
 class Reference(Part):
-    source: str = Field(default="", description="who found these values")
+    source: str = Field(default="", description="origin of these values")
     table: dict[str, Number | tuple[Number, Number]] = Field(default_factory=dict, description="[median, sd] or number")
     made_with: dict[str, Number] = Field(default_factory=dict, description="what a synthetic record was made from")
 

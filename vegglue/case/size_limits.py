@@ -1,6 +1,6 @@
 """How large a case and its files may be: what is larger is refused before memory is taken for it.
 
-Each limit lies far above what was ever calibrated, and low enough that a common machine can say no in a moment.
+Each limit lies far above what was ever calibrated, and low enough that a common machine refuses in a moment.
 docs/limits.md states them.
 """
 

@@ -120,7 +120,7 @@ def _met(values: Array, centres: Array, step: float) -> slice:
     return slice(min(first, last), last)
 
 
-# Slope of a cross-section beyond which cells are taken for bank where nothing else is said [-]. Chosen, not measured:
+# Slope of a cross-section beyond which cells are bank unless stated otherwise [-]. Chosen, not measured:
 # floors are flatter and banks of streams mostly steeper.
 BANK_SLOPE = 0.2
 

@@ -20,12 +20,21 @@ from vegglue.wording.numbers import so_many
 class Kind:
     """One kind of observation.
 
-    name: as in a case and in tables of stations; words: the same in prose; unit: of a value and of its standard error;
-    column: of the values in a CSV file; file: name of such a file in a folder of measurements;
-    instrument: `probe` measures a velocity at a point of a named section, `gauge` a level at a point, `section` what
-    passes a whole cross-section, so that y means nothing;
-    correlated: whether the errors of neighbours along a section are correlated;
-    usual_error: standard error of a measurement still to be made, where none of this kind is at hand [unit].
+    Attributes
+    ----------
+    name, words : str
+        As in a case and in tables of stations, and the same in prose.
+    unit : str
+        Of a value and of its standard error.
+    column, file : str
+        Column of the values in a CSV file, and name of such a file in a folder of measurements.
+    instrument : {"probe", "gauge", "section"}
+        A probe measures a velocity at a point of a named section, a gauge a level at a point, a section what passes a
+        whole cross-section, so that y has no meaning.
+    correlated : bool
+        Whether the errors of neighbours along a section are correlated.
+    usual_error : float
+        Standard error of a measurement still to be made if none of this kind is at hand [unit].
     """
 
     name: str
@@ -68,7 +77,7 @@ class UnstatedErrors:
     usual: tuple[float, str]
 
 
-# Names of the kinds that are asked for by name: velocities along x and along y, and levels.
+# Kinds that code refers to by name: velocities along x and along y, and levels.
 STREAMWISE, TRANSVERSE, WATER_LEVEL = "velocity", "velocity_across", "level"
 # Usual errors: 0.015 m/s for the mean of a vertical of ADV points, in any direction; 3 mm for a gauge read by eye;
 # 0.1 m3/s, 5 % of 2 m3/s, for a gauging by verticals.
@@ -85,7 +94,7 @@ KINDS = {
 
 
 def kind_of(name: str, where: str = "observations") -> Kind:
-    """The kind of that name. Errors: InputError, which begins with `where` and lists the kinds known."""
+    """The kind of that name. Raises InputError, which begins with `where` and lists the known kinds."""
     if name not in KINDS:
         raise InputError(f"{where}: expected a kind among {', '.join(KINDS)}, got {name!r}; correct it.")
     return KINDS[name]

@@ -215,7 +215,7 @@ def fitted_curve(profile: "pd.Series[float]") -> ProfileFit | None:
 
 
 def _averaged(section: Section, observation: Observation) -> list[pd.DataFrame]:
-    """Stations from the verticals of a section: along by the rule of the case, and across if it says so.
+    """Stations from the verticals of a section: along by the rule of the case, and across on request.
 
     standard_error^2 = own^2 + max(s^2 - mean(own^2), 0), own from the points of the vertical, s the `neighbour_error`:
     points cannot show that their vertical stands beside a stem, or 0.1 m off. An error given in the case replaces this.

@@ -39,13 +39,13 @@ class SurveyedQuantity:
 class RigidCylinder:
     """phi [-] of a stand of rigid cylinders.
 
-    draws (draws,): of phi; parts: mean contribution of stems, branches and undergrowth to phi [-]; assumption: what was
-    not surveyed, in a sentence.
+    draws (draws,): of phi; parts: mean contribution of stems, branches and undergrowth to phi [-]; undergrowth_density:
+    range assumed, as it was not surveyed [1/m2], None without undergrowth.
     """
 
     draws: Array
     parts: dict[str, float]
-    assumption: str
+    undergrowth_density: tuple[float, float] | None
 
     @property
     def mean(self) -> float:
@@ -121,8 +121,5 @@ def rigid_cylinder(
     covered = np.minimum(drawn["undergrowth_height"], deflected)
     undergrowth = DRAG_COEFFICIENT * density * drawn["undergrowth_diameter"] * covered
     parts = {"stems": stems, "branches": branches, "undergrowth": undergrowth}
-    assumed = f"is assumed log-uniform between {low:g} and {high:g} stems/m2."
-    assumption = f"The density of the undergrowth was not surveyed and {assumed}" if high > 0.0 else "No undergrowth."
-    return RigidCylinder(
-        stems + branches + undergrowth, {name: float(part.mean()) for name, part in parts.items()}, assumption
-    )
+    means = {name: float(part.mean()) for name, part in parts.items()}
+    return RigidCylinder(stems + branches + undergrowth, means, (low, high) if high > 0.0 else None)

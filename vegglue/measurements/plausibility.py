@@ -54,7 +54,7 @@ DEEPEST_CHANNEL = 2.0
 # Q / A at the outlet [m/s] below which water stands: few probes distinguish less from nothing.
 STANDING_WATER = 3e-3
 # Standard errors of a velocity over Q / A [-]. Smaller: the mean of an hour at 5 % turbulence is known to 0.2 %, and no
-# probe is calibrated better than that. Larger: the value says nothing about the flow.
+# probe is calibrated better than that. Larger: the value does not constrain the flow.
 VELOCITY_ERRORS = (1e-3, 1.0)
 # Of a level: a point gauge in a flume is read to 0.1 mm [m]; an eighth of the depth is 20 % of Manning's n [-].
 SMALLEST_LEVEL_ERROR, LARGEST_LEVEL_ERROR = 5e-5, 0.125

@@ -6,12 +6,13 @@ stands in `linear_average`, the rule `profile` in `fit_log_law` and `fit_two_lay
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
 from vegglue.arrays import Array
 
-FEWEST_POINTS = 4  # two or three numbers are fitted: below this nothing is left to tell how well
+FEWEST_POINTS = 4  # two or three numbers are fitted: with fewer points no misfit is left to judge them
 # ln(h / z_0) [-] of the log law through fewer points: a Chezy coefficient of 47 m^(1/2)/s. Chosen: from 5 (31, coarse)
 # to 9 (63, smooth) the average of a point at 0.6 of the depth from the surface, or of two at 0.2 and 0.8, moves by 1 %.
 USUAL_ROUGHNESS = 7.0
@@ -21,7 +22,7 @@ USUAL_ROUGHNESS = 7.0
 FEW_POINTS_ERROR = {1: 0.075, 2: 0.035, 3: 0.03}
 # Standard errors by which the velocity must rise with height to count as a rise: by chance one vertical in 700 does.
 SIGNIFICANT_RISE = 3.0
-# z_0 and canopy heights tried in a fit: steps of 2 % of z_0, of some millimetres in a canopy, finer than points tell.
+# z_0 and canopy heights tried in a fit: steps of 2 % of z_0, some millimetres in a canopy, finer than points resolve.
 HEIGHTS_TRIED = 600
 SMOOTHEST_BED = 1e-6  # z_0 over the depth: a micrometre in a metre of water, smoother than any bed
 CANOPY_STEP = 0.001  # m, between canopy heights tried for all verticals of a stand, finer than ADV points stand apart
@@ -69,17 +70,25 @@ class ProfileFit:
         return float(self.within + self.slope * share), float(np.sqrt(gradient @ self.covariance @ gradient))
 
 
+class CanopyUnknown(Enum):
+    """Why verticals inside plants show no canopy height."""
+
+    FEW_POINTS = "too few points in each vertical inside the plants"
+    NO_SHARED_HEIGHT = "no height that all verticals reach above and below"
+    NO_TOP = "no canopy top in the verticals: not or just submerged"
+
+
 @dataclass(frozen=True)
 class CanopyHeight:
     """Deflected canopy height above the bed and its standard error [m], from how many verticals (columns).
 
-    Both are NaN when the verticals show no canopy top; `reason` then says why, else it is empty.
+    Both are NaN if the verticals show no canopy top, for the reason `unknown`.
     """
 
     value: float
     standard_error: float
     columns: int
-    reason: str
+    unknown: CanopyUnknown | None = None
 
 
 def sampling_error(deviation: Array, duration: Array, time_scale: Array | float) -> Array:
@@ -121,7 +130,7 @@ def linear_average(column: Column, scatter: float = 1.0) -> tuple[float, float]:
 
 
 def few_points_average(column: Column, among_plants: bool) -> tuple[float, float]:
-    """U and its standard error [m/s] of fewer than FEWEST_POINTS points, which do not tell the profile.
+    """U and its standard error [m/s] of fewer than FEWEST_POINTS points, which do not resolve the profile.
 
     Without plants U = a (L - 1 + e^-L) of the log law u = a (L + ln(z / h)), a by weighted least squares, with L =
     USUAL_ROUGHNESS; its error that of the points and FEW_POINTS_ERROR. Among plants see `average_within_plants`.
@@ -179,11 +188,11 @@ def fit_canopy_height(columns: Sequence[Column]) -> CanopyHeight:
     """
     columns = [column for column in columns if len(column.height) >= FEWEST_POINTS]
     if not columns:
-        return CanopyHeight(np.nan, np.nan, 0, "no vertical inside the plants has enough points")
+        return CanopyHeight(np.nan, np.nan, 0, CanopyUnknown.FEW_POINTS)
     lowest = max(column.height[1] for column in columns)
     highest = min(column.height[-2] for column in columns)
     if lowest >= highest:
-        return CanopyHeight(np.nan, np.nan, len(columns), "the verticals share no height at which a top could lie")
+        return CanopyHeight(np.nan, np.nan, len(columns), CanopyUnknown.NO_SHARED_HEIGHT)
     tops = np.arange(lowest, highest, CANOPY_STEP)
     misfit = np.sum([_with_offset(column, tops)[2] for column in columns], axis=0)
     uniform = sum(_with_offset(column, np.array([np.inf]))[2][0] for column in columns)
@@ -191,9 +200,9 @@ def fit_canopy_height(columns: Sequence[Column]) -> CanopyHeight:
     freedom = sum(len(column.height) for column in columns) - 2 * len(columns) - 1
     unit = max(misfit[best] / freedom, 1.0)
     if uniform - misfit[best] < SIGNIFICANT_RISE**2 * unit * len(columns):
-        return CanopyHeight(np.nan, np.nan, len(columns), "the verticals show no canopy top: not or just submerged")
+        return CanopyHeight(np.nan, np.nan, len(columns), CanopyUnknown.NO_TOP)
     inside = tops[misfit <= misfit[best] + unit]
-    return CanopyHeight(float(tops[best]), float(inside[-1] - inside[0]) / 2.0 + 0.5 * CANOPY_STEP, len(columns), "")
+    return CanopyHeight(float(tops[best]), float(inside[-1] - inside[0]) / 2.0 + 0.5 * CANOPY_STEP, len(columns))
 
 
 LeastSquares = tuple[Array, Array, Array]  # within, slope, chi-square for each given top, each (tops,)

@@ -47,7 +47,7 @@ from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import Posterior
 from vegglue.results.verdict import is_too_small
 from vegglue.wording.numbers import so_many
-from vegglue.wording.sentences import sentences
+from vegglue.wording.sentences import phrase, sentences
 
 # Share of failed members [-] above which it is a doubt: fewer hardly change what the others say of the prior.
 FAILED_TOLERATED = 0.01
@@ -120,11 +120,12 @@ def _plants(case: Case, posterior: Posterior, cylinder: RigidCylinder | None) ->
         comparison = "the flow at these stations cannot tell whether that is so"
     else:
         comparison = f"the flow asks for {short(inferred / median, 2)} times as much"
+    undergrowth = phrase("undergrowth_assumption", cylinder.undergrowth_density)
     yield Finding(
         "plants",
         f"Rigid cylinders of the surveyed size would have {symbol(case, name)} = "
         f"{plus_minus(cylinder.mean, cylinder.standard_deviation)} (median {short(median, 2)}); {comparison}. "
-        f"{html.escape(cylinder.assumption)}",
+        f"{html.escape(undergrowth)}",
     )
 
 
@@ -137,8 +138,8 @@ def _canopy_correction(posterior: Posterior, notation: Notation) -> Iterator[Fin
 def _canopy_height(run: Run) -> Iterator[Finding]:
     for (experiment, section), canopy in run.observations.canopy_height.items():
         where = f"the verticals inside the plants at {html.escape(section)} ({html.escape(experiment)})"
-        if not np.isfinite(canopy.value):
-            yield Finding("canopy", f"No canopy height could be read off {where}: {html.escape(canopy.reason)}.")
+        if canopy.unknown is not None:
+            yield Finding("canopy", f"No canopy height could be read off {where}: {html.escape(canopy.unknown.value)}.")
             continue
         used = ", ".join(
             f"{height:g}{NARROW}m" for height in np.unique(median_plants(run, experiment).canopy_height.round(3))
