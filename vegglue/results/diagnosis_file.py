@@ -71,9 +71,10 @@ SPOTS = dict.fromkeys(("x", "y", "score"), Stored(("place",)))
 FIELD_MAP = {
     "x": Stored(("x",)), "y": Stored(("y",)), "value": Stored(("x", "y")), "error": Stored(("x", "y")),
 }  # fmt: skip
+ENDS = ("low95", "high95", "least", "most")  # of the interval and of the support of an amplitude
 NUMBERS_OF_CANDIDATE = (
     "amplitude", "score", "p_family", "visibility", "smallest_detectable", "objective", "likeness", "off", "scale",
-    "low95", "high95", "least", "most",
+    *ENDS,
 )  # fmt: skip
 CANDIDATE_COLUMNS = {
     **dict.fromkeys(("name", "title", "unit", "mimicked_by", "shapes"), Stored(("suspect",), type=IN_WORDS)),
@@ -102,33 +103,31 @@ def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
     stations = table_group(at_stations.station, "station", STATION_UNITS)
     arrays = zip(AT_STATIONS, (at_stations.first, at_stations.last, at_stations.error), strict=True)
     values = {name: Variable(("station",), array, VALUE_UNIT) for name, array in arrays}
-    candidate_effects = pd.DataFrame([_row(candidate_effect) for candidate_effect in diagnosis.candidate_effects])
+    effects = []
+    for one in diagnosis.candidate_effects:
+        row = candidate_effect_json(one)
+        ends = (*row.pop("interval95"), *row.pop("support"))
+        effects.append(row | dict(zip(ENDS, ends, strict=True)) | {"shapes": json.dumps(one.shapes)})
     places = diagnosis.place_map
     spots = {
         "x": Variable(("place",), places.x, "m"),
         "y": Variable(("place",), places.y, "m"),
         "score": Variable(("place",), places.score),
     }
-    first = diagnosis.first_screening
+    first, mapped, field = diagnosis.first_screening, diagnosis.field_map, diagnosis.field
     names = np.array(first.compared, object)
-    return {
+    groups = {
         "stations": Group(stations.coordinates, {**stations.variables, **values}),
-        "suspects": table_group(candidate_effects, "suspect", {}),
+        "suspects": table_group(pd.DataFrame(effects), "suspect", {}),
         "zones": table_group(diagnosis.misfit.zones, "zone_number", {}),
         "places": Group({"place": np.arange(places.x.size)}, spots),
         "alike": Group({"name": names, "other": names}, {"cosine": Variable(("name", "other"), first.cosine)}),
-        **_field_group(diagnosis),
     }
-
-
-def _field_group(diagnosis: Diagnosis) -> dict[str, Group]:
-    """The map of the field, where there is one."""
-    mapped, found = diagnosis.field_map, diagnosis.field
-    if mapped is None or found is None:
-        return {}
-    unit = UNIT_OF_FIELD[found.term]
-    values = {name: Variable(("x", "y"), getattr(mapped, name), unit) for name in ("value", "error")}
-    return {"field": Group({"x": mapped.x, "y": mapped.y}, values, {"x": "m", "y": "m"})}
+    if mapped is not None and field is not None:
+        unit = UNIT_OF_FIELD[field.term]
+        cells = {name: Variable(("x", "y"), getattr(mapped, name), unit) for name in ("value", "error")}
+        groups["field"] = Group({"x": mapped.x, "y": mapped.y}, cells, {"x": "m", "y": "m"})
+    return groups
 
 
 def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -176,14 +175,44 @@ def diagnosis_attributes(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[str, Any]) -> Diagnosis:
-    """The diagnosis whose file has these groups and attributes."""
+    """The diagnosis whose file has these groups and attributes.
+
+    Raises
+    ------
+    KeyError, ValueError
+        If a part is missing or does not fit, a step names an effect, or a list a station, that the diagnosis lacks.
+    """
     stations, places = fitting(groups["stations"], STATION_VALUES), fitting(groups["places"], SPOTS)
-    candidate_effects = _table_from(groups["suspects"], "suspect", CANDIDATE_COLUMNS)
+    verdict = _untagged(json.loads(stated_as(str, attributes, "verdict_value")))
+    if not isinstance(verdict, Verdict):
+        raise ValueError("verdict_value is no verdict")
+    effects = []
+    for row in _table_from(groups["suspects"], "suspect", CANDIDATE_COLUMNS).to_dict("records"):
+        amplitude = AmplitudeEstimate(
+            value=row["amplitude"],
+            interval95=(row["low95"], row["high95"]),
+            support=(row["least"], row["most"]),
+            **{name: row[name] for name in ("unit", "off", "scale", "refitted", "objective")},
+        )
+        detectability = Detectability(
+            visibility=row["visibility"],
+            smallest=row["smallest_detectable"],
+            testable=row["testable"],
+            confounder=row["mimicked_by"],
+            cosine=row["likeness"],
+        )
+        shapes, test = _parsed(dict[str, float], row["shapes"]), ScoreTest(row["score"], row["p_family"])
+        effects.append(CandidateEffect(row["name"], row["title"], shapes, amplitude, test, detectability))
+    compared = names_of(groups["alike"], "name")
+    both = dict.fromkeys(("name", "other"), len(compared))
+    # An instrument at several stations has no place: null.
+    nowhere = {"x": float("nan"), "y": float("nan")}
+    off = [{key: one for key, one in tree.items() if one is not None} for tree in json.loads(attributes["instruments"])]
     found = Diagnosis(
         name=stated_as(str, attributes, "name"),
         version=stated_as(str, attributes, "version"),
-        verdict=_verdict_from(stated_as(str, attributes, "verdict_value")),
-        candidate_effects=tuple(_candidate_effect_from(row) for row in candidate_effects.to_dict("records")),
+        verdict=verdict,
+        candidate_effects=tuple(effects),
         steps=_parsed(tuple[Step, ...], attributes["steps"]),
         misfit=Misfit(
             chi2_first=stated_as(float, attributes, "chi2_first"),
@@ -196,7 +225,12 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
             **{name: stated_as(float, attributes, name) for name in ("correlation", "scale", "grid_error")},
             flagged=_parsed(tuple[int, ...], attributes["flagged"]),
         ),
-        first_screening=_first_screening_from(groups["alike"], attributes),
+        first_screening=FirstScreening(
+            threshold=stated_as(float, attributes, "threshold"),
+            scores=_parsed(dict[str, float], attributes["first_scores"]),
+            compared=compared,
+            cosine=fitting(groups["alike"], {"cosine": Stored(("name", "other"))}, both)["cosine"],
+        ),
         parameters=ParameterEstimates(
             first=_parsed(dict[str, float], attributes["first_parameters"]),
             last=_parsed(dict[str, tuple[float, float, float]], attributes["parameters"]),
@@ -204,37 +238,31 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
         predictions=Predictions(stations_from(stations), *(stations[name] for name in AT_STATIONS)),
         place_map=PlaceMap(stated_as(str, attributes, "mapped_term"), places["x"], places["y"], places["score"]),
         places=_parsed(tuple[LocalAnomaly, ...], attributes["locations"]),
-        instruments=_instruments_from(attributes["instruments"]),
+        instruments=TypeAdapter(tuple[FaultyInstrument, ...]).validate_python([nowhere | tree for tree in off]),
         field=_parsed(FieldFound | None, attributes["field"]),
         model_error=_parsed(ModelErrorUsed | None, attributes["model_error"]),
         field_map=FieldMapKept(**fitting(groups["field"], FIELD_MAP)) if "field" in groups else None,
         laws=_parsed(CandidateLaws | None, attributes["laws"]),
     )
-    _refuse_strays(found)
+    names = {one.name for one in found.candidate_effects}
+    for step in found.steps:
+        if step.accepted not in step.chance or not set(step.rivals) <= names:
+            raise ValueError(f"a step names {', '.join((step.accepted, *step.rivals))!r}, not all of them candidates")
+    rows = {*found.errors.flagged, *(row for one in found.instruments for row in one.stations)}
+    if not rows <= set(range(len(found.predictions.station))):
+        raise ValueError("a station that is excluded is not in the table")
     return found
 
 
-def _refuse_strays(found: Diagnosis) -> None:
-    """Errors: ValueError where a step names an effect, or a list a station, that the diagnosis does not hold."""
-    effects = {one.name for one in found.candidate_effects}
-    for step in found.steps:
-        if step.accepted not in step.chance or not set(step.rivals) <= effects:
-            raise ValueError(f"a step names {', '.join((step.accepted, *step.rivals))!r}, not all of them its suspects")
-    rows = {*found.errors.flagged, *(row for one in found.instruments for row in one.stations)}
-    if not rows <= set(range(len(found.predictions.station))):
-        raise ValueError("a station that was set aside is not in the table")
+def _table_from(group: ReadGroup, dim: str, columns: Mapping[str, Stored]) -> pd.DataFrame:
+    """A table without rows has no columns either."""
+    there = fitting(group, columns if len(group) > 1 else {})
+    return pd.DataFrame({name: there[name] for name in there if name != dim})
 
 
 def _parsed(kind: Any, text: str) -> Any:
     """A value of this kind from JSON. Errors: ValueError where it is none."""
     return TypeAdapter(kind).validate_json(text)
-
-
-def _verdict_from(text: str) -> Verdict:
-    found = _untagged(json.loads(text))
-    if not isinstance(found, Verdict):
-        raise ValueError("verdict_value is no verdict")
-    return found
 
 
 def _untagged(tree: Any) -> Any:
@@ -248,58 +276,3 @@ def _untagged(tree: Any) -> Any:
     if own.get(tag) not in VERDICT_VALUES:
         return own
     return TypeAdapter(VERDICT_VALUES[own.pop(tag)]).validate_python(own)
-
-
-def _instruments_from(text: str) -> tuple[FaultyInstrument, ...]:
-    """Several stations have no place: null."""
-    nowhere = {"x": float("nan"), "y": float("nan")}
-    known = [{name: value for name, value in tree.items() if value is not None} for tree in json.loads(text)]
-    instruments: tuple[FaultyInstrument, ...] = TypeAdapter(tuple[FaultyInstrument, ...]).validate_python(
-        [nowhere | tree for tree in known]
-    )
-    return instruments
-
-
-def _first_screening_from(alike: ReadGroup, attributes: Mapping[str, Any]) -> FirstScreening:
-    compared = names_of(alike, "name")
-    both = dict.fromkeys(("name", "other"), len(compared))
-    return FirstScreening(
-        threshold=stated_as(float, attributes, "threshold"),
-        scores=_parsed(dict[str, float], attributes["first_scores"]),
-        compared=compared,
-        cosine=fitting(alike, {"cosine": Stored(("name", "other"))}, both)["cosine"],
-    )
-
-
-def _table_from(group: ReadGroup, dim: str, columns: Mapping[str, Stored]) -> pd.DataFrame:
-    """A table without rows has no columns either."""
-    there = fitting(group, columns if len(group) > 1 else {})
-    return pd.DataFrame({name: there[name] for name in there if name != dim})
-
-
-def _row(candidate_effect: CandidateEffect) -> dict[str, Any]:
-    row = candidate_effect_json(candidate_effect)
-    ends = dict(zip(("low95", "high95", "least", "most"), (*row.pop("interval95"), *row.pop("support")), strict=True))
-    return row | ends | {"shapes": json.dumps(candidate_effect.shapes)}
-
-
-def _candidate_effect_from(row: Mapping[str, Any]) -> CandidateEffect:
-    return CandidateEffect(
-        name=row["name"],
-        title=row["title"],
-        shapes=_parsed(dict[str, float], row["shapes"]),
-        amplitude=AmplitudeEstimate(
-            value=row["amplitude"],
-            interval95=(row["low95"], row["high95"]),
-            support=(row["least"], row["most"]),
-            **{name: row[name] for name in ("unit", "off", "scale", "refitted", "objective")},
-        ),
-        test=ScoreTest(row["score"], row["p_family"]),
-        detectability=Detectability(
-            visibility=row["visibility"],
-            smallest=row["smallest_detectable"],
-            testable=row["testable"],
-            confounder=row["mimicked_by"],
-            cosine=row["likeness"],
-        ),
-    )

@@ -5,7 +5,7 @@ for each class of this file. A new reason is a class here, its rule, and its mac
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from dataclasses import field as by_default
 from typing import Literal, get_args
@@ -621,18 +621,15 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
     if far > constants().far_off_prior:
         return ParameterFarFromPrior(parameter, far)
     names = {step.accepted for step in inputs.steps}
-    at_bound = tuple(one.name for one in inputs.candidates if one.name in names and _is_at_bound(one))
-    return AmplitudeAtBound(at_bound) if at_bound else None
-
-
-def _is_at_bound(one: CandidateEffect) -> bool:
-    """Whether an amplitude lies at an end of its support, other than the end at which it is off, or as far off its
-    prior as a calibration goes.
-    """
-    amplitude = one.amplitude
-    ends = [end for end in amplitude.support if end != amplitude.off]
-    near = any(abs(amplitude.value - end) < AT_BOUND * amplitude.scale for end in ends)
-    return amplitude.relative_size > FURTHEST - AT_BOUND or near
+    at_bound = []
+    for one in (each for each in inputs.candidates if each.name in names):
+        # An end other than that at which it is off, or as far off its prior as a calibration goes.
+        amplitude = one.amplitude
+        ends = [end for end in amplitude.support if end != amplitude.off]
+        near = any(abs(amplitude.value - end) < AT_BOUND * amplitude.scale for end in ends)
+        if near or amplitude.relative_size > FURTHEST - AT_BOUND:
+            at_bound.append(one.name)
+    return AmplitudeAtBound(tuple(at_bound)) if at_bound else None
 
 
 def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt: Reason | None) -> Verdict:
@@ -740,30 +737,23 @@ def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
         yield StatedErrorsTooSmall(errors.scale)
     others = [one for one in inputs.instruments if one not in found.instruments]
     yield from (InstrumentExcluded(one, is_clear(one), constants().instrument_errors) for one in others)
-    yield from _untestable(inputs.candidates, {*hidden, *accepted}, inputs.significant_effects)
+    elsewhere, alike = {*hidden, *accepted}, dict[str, list[CandidateEffect]]()
+    blind = [one for one in inputs.candidates if not one.detectability.testable]
+    unnamed = [one for one in blind if one.name not in {*elsewhere, *inputs.significant_effects}]
+    for one in unnamed:  # by what they look like, the largest group first
+        alike.setdefault(one.detectability.looks_like, []).append(one)
+    groups = sorted(alike.items(), key=lambda group: (not group[0], -len(group[1])))
+    if unnamed:
+        yield EffectsUntestable(
+            tuple((parameter, tuple(one.name for one in some)) for parameter, some in groups),
+            effects_among(unnamed),
+            len(unnamed),
+            any(one.name in elsewhere for one in blind),
+        )
     yield from inputs.surroundings
     named = found.kind in ("identified", "one-of", "none-of-these", "instrument")
     if named and misfit.p < constants().poor_fit_chance and found.laws is None:
         yield MisfitRemains(misfit)
-
-
-def _untestable(
-    candidates: Sequence[CandidateEffect], named: set[str], significant: Iterable[str]
-) -> Iterable[EffectsUntestable]:
-    """The effects that cannot be tested and are named nowhere else, by what they look like, the largest group first."""
-    blind = [one for one in candidates if not one.detectability.testable]
-    hidden = [one for one in blind if one.name not in {*named, *significant}]
-    alike: dict[str, list[str]] = {}
-    for one in hidden:
-        alike.setdefault(one.detectability.looks_like, []).append(one.name)
-    groups = sorted(alike.items(), key=lambda group: (not group[0], -len(group[1])))
-    if hidden:
-        yield EffectsUntestable(
-            tuple((parameter, tuple(names)) for parameter, names in groups),
-            effects_among(hidden),
-            len(hidden),
-            any(one.name in named for one in blind),
-        )
 
 
 def is_too_small(chi2: float, freedom: int) -> bool:
