@@ -16,7 +16,7 @@ VEGGLUE := $(BIN)/vegglue
 # One process a core, but no more than four: each takes some 1.2 GB. The tests of a file share what they set up.
 PYTEST := $(BIN)/pytest tests -n auto --maxprocesses 4 --dist loadfile
 CASES := d0 d3a d3a_refined d3b d3b_paper
-SOURCES := $(wildcard vegglue/*.py vegglue/*/*.py vegglue/*/*.j2 vegglue/*/*.css vegglue/*/*.js)
+SOURCES := $(wildcard vegglue/*.py vegglue/*/*.py vegglue/wording/*/*)
 SHARED := configs/kict.yaml $(wildcard data/kict/*.csv) $(SOURCES) $(READY)
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1

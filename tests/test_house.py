@@ -14,7 +14,7 @@ AT_HOME_EVERYWHERE = {"numpy", "scipy"}
 # Folders or files where each library may be imported. A new home is a decision: say it here.
 HOMES = {
     "h5py": {"results"},
-    "jinja2": {"pages", "wording"},
+    "jinja2": {"wording"},
     "joblib": {"parallel"},
     "matplotlib": {"pages"},
     "numba": {"compilation"},

@@ -35,11 +35,11 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 def test_every_step_says_what_it_made(finished: Finished) -> None:
     folder, said = finished
     run = folder / "runs/brook"
-    assert "540 cells, 15 of 15 stations in use" in said["check"]
-    assert said["simulate"].startswith(f"... solving brook: 0 of {MEMBERS} members\n")
-    assert f"{MEMBERS} members, 0 by marching, 0 failed, largest mass error" in said["simulate"]
+    assert re.search(r"540 cells, 15 of 15 ", said["check"])
+    assert re.search(rf"^\.\.\. .*: 0 of {MEMBERS} ", said["simulate"])
+    assert re.search(rf": {MEMBERS} members, 0 .*, 0 failed", said["simulate"])
     assert re.search(r"^n_b s m\^\(-1/3\) +0\.05", said["infer"], re.MULTILINE)
-    assert len(said["infer"].split("of 15 stations used.")[1].splitlines()) < 24
+    assert len([line for line in said["infer"].splitlines() if not line.startswith("...")]) <= 24
     assert str(run / "report.html") in said["report"]
     assert {file.name for file in run.iterdir()} == {
         ".lock", "channel.png", "ensemble.h5", "posterior.h5", "flow.h5", "report.html", "figures",

@@ -32,9 +32,8 @@ def pasted(text: str) -> tuple[tuple[str, str], ...]:
 
 def test_the_list_names_every_effect(capsys, monkeypatch):
     assert said_to(monkeypatch, capsys, "effects")[0] == 0
-    assert said_to_text(monkeypatch, capsys, "effects").count("\n") == len(SHIPPED) + 8
-    *_, last = said_to_text(monkeypatch, capsys, "effects").splitlines()
-    assert last.startswith(f"{len(SHIPPED)} entries: {len(SHIPPED) - 4} effects that a diagnosis tries, ")
+    listed = said_to_text(monkeypatch, capsys, "effects").splitlines()
+    assert {line.split()[0] for line in listed if line.startswith("  ")} == {effect.name for effect in SHIPPED}
     named = json.loads(said_to_text(monkeypatch, capsys, "effects", "--json"))
     assert {entry["name"] for entry in named} == {effect.name for effect in SHIPPED}
 

@@ -1,7 +1,7 @@
 """GLUE against a linear model with Gaussian errors, whose posterior is known in closed form."""
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,17 @@ from vegglue.errors import InputError
 from vegglue.flow.status import FAILED
 from vegglue.inference.glue import glue
 from vegglue.inference.posterior_summary import correct_phi_for_canopy, marginals, prior_mass_near_bounds
+from vegglue.inference.statements import (
+    CanopyCorrected,
+    NoPosteriorClaimed,
+    ParameterAtBound,
+    ParameterNotIdentified,
+    ParametersCorrelated,
+    posterior_statements,
+)
 from vegglue.measurements.observations import Observations
 from vegglue.results.ensemble import Ensemble
-from vegglue.results.posterior import CLAIMED_FROM, LEVELS, Posterior
+from vegglue.results.posterior import LEVELS, Posterior
 
 MEMBERS = 32768
 SIGMA = 0.08
@@ -206,6 +214,7 @@ def test_failed_members_have_no_weight_and_are_counted() -> None:
     assert posterior.sample.weights[[whole.sample.best, 11]].tolist() == [0, 0]
     assert posterior.sample.weights.sum() == pytest.approx(1)
     assert np.isfinite(posterior.predicted.model_band).all()
+    assert posterior_statements(posterior)[0].failed == 2
 
 
 def test_chi2_against_known_errors() -> None:
@@ -271,6 +280,8 @@ def test_insensitive_parameter_is_not_identified_and_hits_no_bound() -> None:
     assert posterior.marginals.identified == {"a": True, "b": True, "c": False}
     assert posterior.marginals.width_ratio["c"] == pytest.approx(1, abs=0.1)
     assert not posterior.marginals.bound_hit["c"].any()
+    unknown = [one.parameter.name for one in posterior_statements(posterior) if isinstance(one, ParameterNotIdentified)]
+    assert unknown == ["c"]
 
 
 def test_mass_near_a_bound_by_chance_is_no_hit() -> None:
@@ -293,6 +304,8 @@ def test_a_parameter_at_a_bound_hits_it(true_a: float, side: int) -> None:
     half_a_normal = 2 * 0.1554  # 2 (Phi(0.4) - 1/2)
     assert posterior.marginals.bound_mass["a"][side] == pytest.approx(half_a_normal, abs=0.05)
     assert not posterior.marginals.bound_hit["b"].any()
+    (at,) = (one for one in posterior_statements(posterior) if isinstance(one, ParameterAtBound))
+    assert (at.parameter.name, at.side) == ("a", ("lower", "upper")[side])
 
 
 def test_parameter_settled_near_a_bound_is_no_hit() -> None:
@@ -305,13 +318,19 @@ def test_parameter_settled_near_a_bound_is_no_hit() -> None:
 
 def test_few_members_are_few_effective_ones(toy: Posterior) -> None:
     few = infer(stations(measured(), SIGMA), members=512, sigma="known")
-    assert few.weighting.effective_size < CLAIMED_FROM < toy.weighting.effective_size
+    assert few.weighting.effective_size < 100 < toy.weighting.effective_size
+    assert any(isinstance(one, NoPosteriorClaimed) for one in posterior_statements(few))
+    assert not any(isinstance(one, NoPosteriorClaimed) for one in posterior_statements(toy))
 
 
 def test_parameters_that_make_up_for_one_another_are_correlated() -> None:
     design = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.1], [0.3, 0.0, 0.0], [0.0, 0.0, 0.3]])
     posterior = infer(stations(design @ TRUTH, SIGMA), design, sigma="known")
     assert posterior.marginals.correlation[0, 1] < -0.7
+    (pair,) = (one for one in posterior_statements(posterior) if isinstance(one, ParametersCorrelated))
+    assert (pair.first.name, pair.second.name, pair.correlation < -0.7) == ("a", "b", True)
+    few = replace(posterior, weighting=replace(posterior.weighting, effective_size=2.0))
+    assert not any(isinstance(one, ParametersCorrelated) for one in posterior_statements(few)), "any two members are"
 
 
 def chezy(phi: float, canopy_height: float, depth: float) -> float:
@@ -352,6 +371,8 @@ def test_canopy_correction_stands_beside_the_raw_median() -> None:
     expected = correct_phi_for_canopy(np.array([raw]), 0.8, 1.06, 1.36, 60.0)[0]
     assert posterior.canopy.median == pytest.approx(expected, rel=1e-3)
     assert 10**posterior.canopy.log10_median == pytest.approx(expected, rel=1e-3)
+    (corrected,) = (one for one in posterior_statements(posterior) if isinstance(one, CanopyCorrected))
+    assert (corrected.before, corrected.median) == (raw, posterior.canopy.median)
 
 
 def test_a_prior_that_ends_where_it_is_largest_is_no_bound_that_is_pressed() -> None:

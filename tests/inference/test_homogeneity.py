@@ -23,9 +23,14 @@ from vegglue.inference.homogeneity import (
     transfer,
     without_prior,
 )
+from vegglue.inference.statements import (
+    CalibrationDiffers,
+    ErrorsOfComparison,
+    ParameterBetweenExperiments,
+    transfer_statements,
+)
 from vegglue.measurements.observations import read_observations
-from vegglue.pages.homogeneity_words import homogeneity_rejected, moving_parameters
-from vegglue.results.posterior import Transfer
+from vegglue.results.posterior import Posterior, Transfer
 
 
 def test_homogeneity_of_the_papers_table() -> None:
@@ -101,8 +106,10 @@ def test_a_bed_that_changes_between_experiments_is_noticed(tmp_path: Path, rough
     assert again.chi2[0] == pytest.approx(free.chi2[0], rel=0.1, abs=0.1)
 
 
-@pytest.mark.parametrize(("apart", "rejected"), [(0.0, False), (0.028, False), (0.06, True)])
-def test_one_value_for_all_is_rejected_only_if_estimates_lie_far_apart(apart: float, rejected: bool) -> None:
+@pytest.mark.parametrize(
+    ("apart", "outcome"), [(0.0, "one-value"), (0.028, "hardly-one-value"), (0.06, "differs")]
+)
+def test_what_is_stated_of_experiments(refined: Posterior, apart: float, outcome: str) -> None:
     value, error = np.array([0.05, 0.05 + apart]), np.array([0.01, 0.008])
     chi2, freedom, p = equal_values_test(value, error)
     found = Transfer(
@@ -111,8 +118,14 @@ def test_one_value_for_all_is_rejected_only_if_estimates_lie_far_apart(apart: fl
         chi2=np.array([chi2, np.nan]), freedom=np.array([freedom, 0]), p=np.array([p, np.nan]),
         misfit_together=np.array([20.0, 15.0]), misfit_alone=np.array([12.0, 13.0]), stations=np.array([15, 15]),
     )  # fmt: skip
-    assert moving_parameters(found).tolist() == [rejected, False]
-    assert homogeneity_rejected(found) == rejected
+    first, _, errors, last = transfer_statements(replace(refined, transfer=found), {"chi2_n_b": 16.9})
+    assert isinstance(first, ParameterBetweenExperiments), "nothing of phi, which one experiment alone determines"
+    assert (first.parameter.name, first.outcome, first.reference) == ("n_b", outcome, 16.9)
+    assert first.values[0] == ("June", 0.05, 0.01)
+    assert isinstance(last, CalibrationDiffers) == (outcome == "differs")
+    assert errors == ErrorsOfComparison(False, 1.0)
+    larger = list(transfer_statements(replace(refined, transfer=replace(found, scale=2.1)), {}))
+    assert larger[2] == ErrorsOfComparison(False, 2.1)
 
 
 def test_errors_of_one_experiment_are_those_of_all(reach: SolvedReach) -> None:

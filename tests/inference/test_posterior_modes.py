@@ -26,6 +26,7 @@ from vegglue.inference.posterior_modes import (
 )
 from vegglue.inference.refine import log_posterior, refine
 from vegglue.inference.solve_ensemble import solve_ensemble
+from vegglue.inference.statements import posterior_statements
 from vegglue.measurements.observations import Observations, read_observations
 from vegglue.parallel import at_most
 from vegglue.progress import silent
@@ -56,6 +57,7 @@ def test_points_of_the_prior_lead_to_the_same_posterior(reach: SolvedReach, refi
     for name, quantiles in refined.marginals.quantiles.items():
         sd = refined.marginals.sd[name]
         assert found.marginals.quantiles[name] == pytest.approx(quantiles, abs=0.15 * sd)
+    assert posterior_statements(found)[0].from_prior
 
 
 def test_points_of_the_prior_are_tried_on_coarse_cells(tmp_path: Path) -> None:

@@ -19,8 +19,16 @@ from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.flow.status import FAILED
 from vegglue.inference.refine import log_posterior, refinable, refine, solved_for
-from vegglue.pages.posterior_words import posterior_in_words
-from vegglue.pages.validation_words import validation_in_words
+from vegglue.inference.statements import (
+    ErrorsEstimated,
+    ErrorsStated,
+    GroupsLeftOutScore,
+    MisfitTested,
+    NoPosteriorClaimed,
+    SearchSummary,
+    posterior_statements,
+    validation_statements,
+)
 from vegglue.parallel import at_most
 from vegglue.results.posterior import GroupsLeftOut, Posterior
 from vegglue.results.result_files import read_posterior, write_posterior
@@ -90,6 +98,7 @@ def test_everything_comes_back_from_the_file(refined: Posterior, tmp_path: Path)
     assert back.refinement is not None
     assert_same(back, refined)
     assert list(back.refinement.groups.left_out) == ["June above", "June patch", "June below"]
+    assert posterior_statements(back) == posterior_statements(refined)
 
 
 # Weighted draws are resampled for ArviZ. Some come twice, which its shape of a tail takes for heavy: 0.702, ours 0.11.
@@ -110,11 +119,19 @@ def test_arviz_reads_draws_likelihood_and_prior(refined: Posterior, tmp_path: Pa
     data.close()
 
 
-def test_errors_of_the_model_are_not_called_those_of_the_data(refined: Posterior) -> None:
-    """Of 0.01 m/s stated, and 0.311 m/s with what the model is allowed to err."""
+def test_what_is_stated(refined: Posterior) -> None:
+    kinds = [type(one) for one in posterior_statements(refined)]
+    assert {SearchSummary, ErrorsStated, MisfitTested} <= set(kinds)
+    assert not {ErrorsEstimated, NoPosteriorClaimed} & set(kinds)
+    assert posterior_statements(refined)[0].modes == 1
+
+
+def test_errors_of_the_model_are_not_said_to_be_those_of_the_data(refined: Posterior) -> None:
+    """Where the model was allowed large errors, `0.311 m/s` was called stated with data of 0.041 m/s."""
     larger = replace(refined, fit=replace(refined.fit, sigma={"velocity": 0.311}))
-    shown = " ".join(posterior_in_words(larger))
-    assert shown.index(" 0.01 m/s") < shown.index(" 0.311 m/s")
+    (errors,) = (one for one in posterior_statements(larger) if isinstance(one, ErrorsStated))
+    assert [value for _, value in errors.stated] == pytest.approx([0.01])
+    assert [value for _, value in errors.sizes] == [0.311]
 
 
 def test_a_group_of_smaller_errors_is_not_told_better_for_them(refined: Posterior) -> None:
@@ -134,7 +151,8 @@ def test_a_group_of_smaller_errors_is_not_told_better_for_them(refined: Posterio
     )  # fmt: skip
     assert told.refinement is not None
     assert logs[2] > logs[0], "in metres the level has the higher density"
-    assert any("June levels (-2.92" in one for one in validation_in_words(told, told.refinement))
+    (score,) = (one for one in validation_statements(told) if isinstance(one, GroupsLeftOutScore))
+    assert (score.worst, round(score.score, 2)) == ("June levels", -2.92)
 
 
 @pytest.mark.slow
@@ -145,6 +163,9 @@ def test_errors_are_taken_from_the_residual(tmp_path: Path) -> None:
     assert posterior.refinement.error_model.errors == "estimated"
     left = posterior.fit.best_residual
     assert posterior.fit.sigma["velocity"] == pytest.approx(math.sqrt(np.mean(left**2) * 15 / 13), rel=0.05)
+    kinds = {type(one) for one in posterior_statements(posterior)}
+    assert ErrorsEstimated in kinds
+    assert MisfitTested not in kinds
 
 
 def test_an_informal_likelihood_is_not_refined(reach: SolvedReach) -> None:

@@ -15,7 +15,7 @@ from verdicts import step, verdict_on
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
-from vegglue.cli.tables import show_carried
+from vegglue.cli.printed import show_carried
 from vegglue.effects.library import library
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.section_discharge import (
@@ -25,7 +25,7 @@ from vegglue.measurements.section_discharge import (
     discharge_mismatches,
     mismatched_discharges,
 )
-from vegglue.pages.answer_words import why_not_to_rely
+from vegglue.pages.answer import not_reliable
 from vegglue.results.verdict import OF_DISCHARGES
 
 # Water that enters over a stretch of a bank, and a discharge that is not the reported one: more passes the sections.
@@ -195,15 +195,15 @@ def test_effects_of_discharges_are_listed() -> None:
 def test_the_page_says_that_the_verdict_is_not_to_be_relied_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     doubting = a_diagnosis(verdict={"kind": "cannot-tell", "reasons": (DischargeMismatch((HIGHER,)),)})
     explained, toy = (replace(a_toy(tmp_path), diagnosis=one) for one in (a_diagnosis(), doubting))
-    before = len(why_not_to_rely(toy))
-    monkeypatch.setattr("vegglue.pages.answer_words.mismatched_discharges", lambda *_: [HIGHER])
-    assert len(why_not_to_rely(toy)) > before
-    assert len(why_not_to_rely(explained)) <= before  # what was found may be why
+    monkeypatch.setattr("vegglue.pages.answer.mismatched_discharges", lambda *_: [HIGHER])
+    found, other = not_reliable(toy), not_reliable(explained)
+    assert found is not None
+    assert (found.verdict, len(found.discharges)) == (True, 1)
+    assert other is None or not other.discharges, "what was found may be why"
 
 
 def test_every_section_stands_in_the_table_of_a_check(capsys: pytest.CaptureFixture[str]) -> None:
     show_carried([HIGHER, replace(HIGHER, section="B", stated=None, gauged=False)])
-    _, heading, first, second = [line.split() for line in capsys.readouterr().out.splitlines()]
-    assert " ".join(heading) == "experiment section x [m] carries 95 % stated ratio width measured level"
+    *_, first, second = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert " ".join(first) == "low A 36 2.1 1.9 to 2.3 1.4 1.50 85% measured"
     assert " ".join(second) == "low B 36 2.1 1.9 to 2.3 - - 85% estimated"

@@ -21,26 +21,35 @@ from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.pages.diagnosis_figures import (
     MARKS,
     draw_alike,
+    draw_candidates,
     draw_diagnosis,
     draw_fingerprint,
     draw_gauges,
-    draw_suspects,
     draw_zones,
     save_diagnosis_figure,
     save_fingerprint_figure,
 )
-from vegglue.pages.diagnosis_words import diagnosis_section, ranked_suspects, rms_residual, suspect_status
+from vegglue.pages.diagnosis_tables import candidate_rows, diagnosis_section
 from vegglue.pages.flow_maps import Outline
-from vegglue.pages.ladder_figure import draw_ladder, save_ladder_figure
+from vegglue.pages.headline import Headline, candidate_status, rms_residual
+from vegglue.pages.ladder_figure import LINES, draw_errors, draw_ladder, save_ladder_figure
 from vegglue.pages.style import COLOUR
 from vegglue.results.causes import Step
 from vegglue.results.diagnosis import Diagnosis, Predictions
-from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
+from vegglue.results.model_comparison import (
+    ComparedModel,
+    HeldOut,
+    InSample,
+    ModelComparison,
+    ModelScore,
+    PredictiveScores,
+)
+from vegglue.wording.sentences import sentence
 
 pytestmark = pytest.mark.slow
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-SUSPECTS = pd.DataFrame({
+CANDIDATES = pd.DataFrame({
     "name": list("abcdef"), "status": list(MARKS), "first": [40.0, -30.0, 9.5, 9.0, 1.0, 0.5],
     "left": [np.nan, np.nan, 4.0, 1.5, 0.2, np.nan], "visibility": [0.9, 0.5, 0.5, 0.4, 0.3, 0.01],
 })  # fmt: skip
@@ -50,23 +59,22 @@ def stations(**columns: object) -> pd.DataFrame:
     return a_diagnosis().predictions.table.assign(**columns)
 
 
-def test_standings_follow_the_verdict() -> None:
+def test_statuses_follow_the_verdict() -> None:
     found = a_diagnosis()
-    said = {one.name: suspect_status(found, one) for one in found.candidate_effects}
-    assert said == {"eddies": "accepted", "mixing[D3]": "rival", "wind": "untestable", "turning": "no sign"}
-    assert [one.name for one in ranked_suspects(found)] == ["eddies", "mixing[D3]", "turning", "wind"]
+    statuses = {row.effect.name: row.status for row in candidate_rows(found)}
+    assert list(statuses.items()) == [
+        ("eddies", "accepted"), ("mixing[D3]", "rival"), ("turning", "no sign"), ("wind", "untestable"),
+    ]  # fmt: skip
     louder = a_diagnosis(first_screening={"scores": found.first_screening.scores | {"turning": -9.0}})
-    assert suspect_status(louder, found.candidate_effects[3]) == "less likely"
+    assert candidate_status(louder, "turning") == "less likely"
 
 
-def test_what_stands_out_is_not_called_untestable() -> None:
+def test_what_is_significant_is_not_called_untestable() -> None:
     """A row said both "untestable" and p = 0.008: at a size that is not plausible these data showed it all the same."""
     beside = a_diagnosis(verdict={"significant_effects": {"wind": 0.008}})
-    wind = beside.candidate_effect("wind")
-    assert not wind.detectability.testable
-    assert suspect_status(beside, wind) == "stands out"
-    tried = {one.name: one.remark for one in diagnosis_section(beside).numbers}["effects tried"]
-    assert "0 of them untestable" in tried
+    assert not beside.candidate_effect("wind").detectability.testable
+    assert candidate_status(beside, "wind") == "significant"
+    assert diagnosis_section(beside).untestable == 0
 
 
 def test_errors_leave_out_what_does_not_count() -> None:
@@ -79,21 +87,13 @@ def test_errors_leave_out_what_does_not_count() -> None:
     assert np.isnan(rms_residual(a_diagnosis(predictions={"station": station.assign(used=False)}), value))
 
 
-def test_words_tell_scores_before_and_after() -> None:
-    rows = {row.name: row for row in diagnosis_section(a_diagnosis()).suspects}
-    assert rows["turning"].score == "−1.0 → −1.0"
-    assert rows["eddies"].score == "45.2"  # refitted, not looked at again
-    assert rows["eddies"].p_family == "", "its p is of another score than the one that is told"
-    assert rows["eddies"].chance.startswith("70")
-    assert rows["wind"].chance == ""
-    assert diagnosis_section(a_diagnosis()).flagged[0].measured == "0.500"
-
-
-def test_what_leaves_no_trace_is_never_detected() -> None:
-    """The page said: from 4.9·10³⁰⁰ m."""
-    found = a_diagnosis((a_candidate_effect("bank_trend", detectability={"smallest": 4.9e300, "testable": False}),))
-    (row,) = diagnosis_section(found).suspects
-    assert row.detectable == "never"
+def test_rows_have_scores_before_and_after() -> None:
+    rows = {row.effect.name: row for row in candidate_rows(a_diagnosis())}
+    assert rows["turning"].scores == (-1.0, -1.0)
+    assert rows["eddies"].scores == (45.2,), "refitted, not screened again"
+    assert np.isnan(rows["eddies"].p), "its p is of another score than the last one"
+    assert (rows["eddies"].probability, rows["wind"].probability) == (0.7, None)
+    assert diagnosis_section(a_diagnosis()).excluded[0].measured == 0.5
 
 
 def test_what_a_later_step_accepts_has_its_chance() -> None:
@@ -119,13 +119,13 @@ def test_zones_print_the_misfit_and_fill_by_its_sign(rows: int) -> None:
 
 
 def test_suspects_differ_by_form_and_not_by_colour_alone() -> None:
-    scores, visible = draw_suspects(SUSPECTS, 3.4).axes
+    scores, visible = draw_candidates(CANDIDATES, 3.4).axes
     marks = {line.get_label(): line for line in scores.lines if line.get_label() in MARKS}
     forms = {name: (line.get_marker(), line.get_markerfacecolor() == COLOUR["paper"]) for name, line in marks.items()}
     assert set(forms) == set(MARKS)
     assert len(set(forms.values())) == len(forms)
     assert list(marks["rival"].get_xdata()) == [30.0]
-    assert [bar.get_width() for bar in visible.patches] == list(SUSPECTS["visibility"])
+    assert [bar.get_width() for bar in visible.patches] == list(CANDIDATES["visibility"])
     assert "f (untestable)" in [tick.get_text() for tick in scores.get_yticklabels()]
     assert any(list(line.get_xdata()) == [3.4, 3.4] for line in scores.lines)
 
@@ -189,9 +189,9 @@ def crowded() -> Diagnosis:
             for zone in ("floor", "bank", "plants", "edge")]  # fmt: skip
     zones = pd.DataFrame(rows, columns=["experiment", "section", "zone"])
     zones = zones.assign(stations=3, mean=0.02, standard_error=0.004, chi2=np.linspace(1.0, 900.0, len(zones)))
+    found = tuple(an_effect_found(name) for name in names[:6])
     return a_diagnosis(
-        suspects, steps, verdict={"effects": tuple(map(an_effect_found, names[:9])), "places": ()},
-        misfit={"zones": zones},
+        suspects, steps, verdict={"effects": found, "places": ()}, misfit={"zones": zones},
         first_screening={"scores": {}, "compared": tuple(names[:12]), "cosine": cosine},
     )  # fmt: skip
 
@@ -206,8 +206,8 @@ SCREENS = {
 def test_every_diagnosis_fits_one_screen(diagnosis: Diagnosis) -> None:
     figure = draw_diagnosis(diagnosis, [])
     assert off_the_sheet(figure) == []
-    verdict, zones, drag = diagnosis.verdict, diagnosis.misfit.zones, diagnosis.place_map
-    assert " ".join(figure.get_suptitle().split()) == f"{diagnosis.name}: {verdict.kind}. {verdict.sentence}"
+    zones, drag = diagnosis.misfit.zones, diagnosis.place_map
+    assert " ".join(figure.get_suptitle().split()) == f"{diagnosis.name}: {sentence(Headline(diagnosis.verdict))}"
     scores, visible, alike, *rest = figure.axes
     assert {label.get_text().split()[0] for label in scores.get_yticklabels()} == {
         one.name for one in diagnosis.candidate_effects
@@ -284,8 +284,8 @@ def test_ladder_draws_held_out_errors_with_their_paired_error() -> None:
     bar = axes.collections[0].get_segments()[1]
     assert (bar[1, 1] - bar[0, 1]) / 2 == pytest.approx(improvement(before, after)[1] / (2 * held_out_rmse(after)))
     assert "+ eddies" in axes.get_xticklabels()[1].get_text()
-    assert {"held out by section", "in sample", "error of measuring"} <= set(texts(axes))
-    assert "not seen by any fit" not in texts(axes)
+    named = {name for name, (_, words, _, _) in LINES.items() if words in texts(axes)}
+    assert named == {"held_out_sections", "in_sample", "noise_floor"}
 
 
 def test_ladder_tells_parameters_that_move_from_those_that_stand_still() -> None:
@@ -315,4 +315,20 @@ def test_ladder_of_one_rung_is_a_file(tmp_path: Path, scores: list[ModelScore]) 
     for axes, (middle, low, high) in zip(parameters, score.values.values(), strict=True):
         assert points(axes) == [(1.0, middle)]
         assert axes.collections[0].get_segments()[0][:, 1].tolist() == [low, high]
+    assert off_the_sheet(figure) == []
+
+
+def test_the_errors_of_a_kept_ladder_are_drawn_for_the_page() -> None:
+    """`compare` and the page drew the ladder by two stacks of code."""
+    long = "unlisted_inflow_x27_22_y2_04"
+    steps = (
+        ComparedModel("toy", "toy.yaml", "a", (), 4, 0.04, 0.041, 0.063, 0.039, 0.012),
+        ComparedModel(f"toy-{long}", "b.yaml", "b", (long, "wind"), 6, 0.012, 0.013, np.nan, 0.0033, 0.012),
+    )
+    figure = draw_errors(ModelComparison(steps, 0, ""))
+    (axes,) = figure.axes
+    held = next(line for line in axes.lines if line.get_linestyle() == "-" and line.get_marker() == "o")
+    assert list(held.get_ydata()) == [0.041, 0.013]
+    assert LINES["held_out_experiments"][1] not in texts(axes), "of the last model it is not known"
+    assert "wind" in axes.get_xticklabels()[1].get_text()
     assert off_the_sheet(figure) == []

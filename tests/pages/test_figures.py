@@ -25,7 +25,7 @@ from vegglue.pages.posterior_figures import (
     draw_weights,
 )
 from vegglue.pages.style import COLOUR, PALETTE, inline, publish, publish_text
-from vegglue.pages.typography import (
+from vegglue.wording.numbers import (
     as_given,
     fixed,
     interval,

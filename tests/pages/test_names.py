@@ -12,7 +12,7 @@ from vegglue.pages.diagnosis_figures import draw_fingerprint
 from vegglue.pages.measured_figures import draw_quantiles, draw_residuals
 from vegglue.pages.posterior_figures import DrawnParameter, draw_cylinder, draw_joint
 from vegglue.pages.style import canvas, formula_labels, save, styled
-from vegglue.pages.typography import symbol_math, unit_math
+from vegglue.wording.numbers import symbol_math, unit_math
 
 NASTY = (
     "10\\south", "$n_b$", "$x^$", "a b%", "n^", "x_", "_x", "a_b_c", "a_{b", "\\frac", "$", "$$", "\\$", "a#b&c~", "{}",

@@ -1,4 +1,4 @@
-"""Panels of sections, rows of errors and maps, written as SVG: what is drawn is what was handed in."""
+"""Panels of sections and maps, written as SVG: what is drawn is what was handed in."""
 
 import re
 from dataclasses import replace
@@ -7,7 +7,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from vegglue.pages.error_rows import draw_error_rows
 from vegglue.pages.flow_maps import first_crossing
 from vegglue.pages.overview import DrawnInterval, draw_interval_rows
 from vegglue.pages.sections import PanelGround, SectionPanel, draw_panel, value_range
@@ -66,29 +65,6 @@ def test_all_values_fit_in_the_range_with_zero_where_it_is_near() -> None:
     assert high > 0.6
     assert value_range([PANEL, replace(PANEL, after=PANEL.after - 0.3)])[0] == 0.0
     assert value_range([replace(PANEL, measured=PANEL.measured - 0.7)])[0] < -0.4
-
-
-def test_the_rows_of_a_ladder_name_the_first_and_the_last_error() -> None:
-    rows = {"what was held out": [0.039, 0.02, 0.0033], "what it saw": [0.04, np.nan, 0.012]}
-    svg = draw_error_rows(rows, 0.012, "m/s", "errors")
-    words = [text.text for text in parsed(svg).iter(f"{SVG}text")]
-    assert {"what was held out", "0.039", "0.0033", "0.040", "errors of measuring alone: 0.012"} <= set(words)
-    assert "0.020" not in words, "those between are strokes"
-    faces = [one.get("fill") for one in parsed(svg).iter(f"{SVG}circle")]
-    assert faces == [COLOUR["paper"], COLOUR["model"]] * 2
-
-
-def test_the_line_of_measuring_breaks_where_a_number_stands() -> None:
-    far, near = (draw_error_rows({"a": [0.063, last]}, 0.012, "m/s", "errors") for last in (0.03, 0.0033))
-    (apart,), (broken,) = ([one.get("d") for one in parsed(svg).iter(f"{SVG}path") if one.get("stroke-dasharray")]
-                           for svg in (far, near))  # fmt: skip
-    assert [apart.count("M"), broken.count("M")] == [2, 3]
-
-
-def test_one_model_alone_is_one_dot() -> None:
-    svg = draw_error_rows({"what it saw": [0.04]}, np.nan, "m/s", "errors")
-    assert [one.get("fill") for one in parsed(svg).iter(f"{SVG}circle")] == [COLOUR["model"]]
-    assert "measuring" not in svg
 
 
 def test_lines_break_where_nothing_is_known() -> None:

@@ -13,7 +13,7 @@ from reach import write_reach
 from stored import ALL, a_header, write_chunks
 
 from vegglue.case.config import load_case
-from vegglue.cli.tables import show_ladder
+from vegglue.cli.printed import show_ladder
 from vegglue.diagnosis.comparison import MEASUREMENT
 from vegglue.flow.status import FAILED
 from vegglue.measurements.kinds import errors_in_short

@@ -12,8 +12,8 @@ from reach import COARSE, ROOT, write_reach
 
 import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
+from vegglue.inference.statements import ReadingsExcluded, posterior_statements
 from vegglue.measurements.observations import SET_ASIDE, read_observations
-from vegglue.pages.posterior_words import posterior_in_words
 from vegglue.progress import Progress
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import comparison_that_fits, questions_that_fit
@@ -166,6 +166,6 @@ def test_a_posterior_leaves_out_what_the_diagnosis_set_aside(tmp_path: Path) -> 
     after = vegglue.infer(case, ensemble, method="glue", runs=runs, jobs=1)
     assert after.fit.used == 13
     assert after.station.index[after.station["reason"] == SET_ASIDE].tolist() == [3, 7]
-    assert "2 measurements of 15 are left out, as the diagnosis set them aside." in posterior_in_words(after)
+    assert ReadingsExcluded(2, 15) in posterior_statements(after)
     assert is_inferred(CaseRun(case, runs))
     assert results_of(run, run).set_aside_since == 0

@@ -2,7 +2,7 @@
 
 To add a command, write a function `NAME_command` in the file of its group (`ensemble_commands`, `loop_commands`,
 `library_commands`), with options from `options.py` where they mean the same, and list
-it in COMMANDS of `main.py`. What it does belongs into `workflow`; what it prints into `words.py` and, for `--json`,
+it in COMMANDS of `main.py`. What it does belongs into `workflow`; what it prints into `printed.py` and, for `--json`,
 `objects.py`. Both tables of `docs/commands.md` list it.
 
 Help and a refused config come at once, since files of commands import nothing heavy at their top: verbs are called as

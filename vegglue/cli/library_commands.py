@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 import vegglue
-from vegglue.cli.hearing import heard
 from vegglue.cli.options import FLAG, RUNS, Config, Force, Json, Quiet, Runs, Trust
 from vegglue.cli.output import command_line, print_object
+from vegglue.cli.reporting import progress_reporter
 from vegglue.errors import InputError, shown_path
-from vegglue.wording.sentences import sentences
 
 if TYPE_CHECKING:
-    from vegglue.case.schema import Case
     from vegglue.effects.definition import Effect
 
 
@@ -35,7 +33,7 @@ def new_command(
     """Make a working folder: a commented case of a straight reach, and example measurements that belong to it."""
     from vegglue.workflow.new import Reach
 
-    with heard(quiet, as_object):
+    with progress_reporter(quiet, as_object):
         case = vegglue.new(name, Reach(length, width, slope, depth, discharge, plants), folder=folder)
     config = shown_path(case.source)
     if as_object:
@@ -58,7 +56,7 @@ def export_command(
 ) -> None:
     """Write the flow and the stations for maps and tables: CSV, GeoTIFF, netCDF (UGRID); on the map, with a frame."""
     case = vegglue.load_case(config, trust)
-    with heard(quiet, as_object) as watch:
+    with progress_reporter(quiet, as_object) as watch:
         found = vegglue.export(case, runs=runs, forms=(only,) if only else FORMS, watch=watch)
     if as_object:
         print_object({"files": found.files, "parameters": found.parameters})
@@ -87,56 +85,45 @@ def effects_command(
         return
     case = vegglue.load_case(config, trust) if config is not None else None
     from vegglue.case.messages import nearest_effect
+    from vegglue.effects.definition import STAGES
     from vegglue.effects.library import library
+    from vegglue.wording.sentences import layout, phrase
 
     known = library(case.effect_file if case is not None else None)
     if name is None:
-        _list(tuple(effect for effect in known.values() if "law" not in effect.tags), as_object)
-    elif name not in known:
-        raise InputError(f"effects: there is no effect `{name}`: {nearest_effect(name, known)}")
-    else:
-        _show(known[name], case, as_object)
-        if case is not None and case.observations and not as_object:
-            _draw(case, known[name], runs, quiet)
-
-
-def _list(known: "tuple[Effect, ...]", as_object: bool) -> None:
-    from vegglue.pages.effect_page import by_stage, effect_json
-
-    if as_object:
-        print_object([effect_json(effect) for effect in known])
+        listed = [effect for effect in known.values() if "law" not in effect.tags]
+        if as_object:
+            print_object([effect_json(effect) for effect in listed])
+            return
+        stages = [(stage, [effect for effect in listed if effect.stage == stage]) for stage in STAGES]
+        at_a_place = sum("search" in effect.tags for effect in listed)
+        print(layout("effect_list", [one for one in stages if one[1]], len(listed), at_a_place))
         return
-    for heading, effects in by_stage(known):
-        print(heading)
-        for effect in effects:
-            print(f"  {effect.name:<22}{effect.title}")
-    at_a_place = sum("search" in effect.tags for effect in known)
-    print(
-        f"{len(known)} entries: {len(known) - at_a_place} effects that a diagnosis tries, some once for each "
-        f"experiment, section, device or patch, and {at_a_place} for something at a place that nobody listed."
-    )
-
-
-def _show(effect: "Effect", case: "Case | None", as_object: bool) -> None:
-    from vegglue.pages.effect_page import effect_in_words, effect_json, work_in_case
-
-    doing = list(work_in_case(case, effect)) if case is not None else []
+    if name not in known:
+        raise InputError(f"effects: there is no effect `{name}`: {nearest_effect(name, known)}")
+    effect, doing = known[name], []
+    for key, entry in ({} if case is None else case.effects).items():
+        if case is not None and (entry.effect or key) == name:
+            of = {one: case.parameters[one].distribution for one in entry.values.values() if isinstance(one, str)}
+            values = [(shape, value, of.get(value, "")) for shape, value in entry.values.items()]
+            limits = [(kind, getattr(entry, kind) or ()) for kind in ("experiments", "sections", "devices")]
+            doing.append(phrase("effect_in_case", case.name, key, values, limits))
+    if case is not None and not doing:
+        doing = [phrase("effect_absent", case.name)]
     if as_object:
         print_object(effect_json(effect) | ({"case": doing} if case is not None else {}))
         return
-    for line in (*effect_in_words(effect), *doing):
-        print(line)
+    print("\n".join([layout("effect_described", effect), *doing]))
+    if case is not None and case.observations:
+        from vegglue.workflow.diagnose import draw_fingerprint_of
 
-
-def _draw(case: "Case", effect: "Effect", runs: Path, quiet: bool) -> None:
-    from vegglue.workflow.diagnose import draw_fingerprint_of
-
-    with heard(quiet, as_object=False) as watch:
-        picture = draw_fingerprint_of(case, effect, runs=runs, watch=watch)
-    print(f"Fingerprint drawn in {picture}")
+        with progress_reporter(quiet, as_object=False) as watch:
+            picture = draw_fingerprint_of(case, effect, runs=runs, watch=watch)
+        print(f"Fingerprint drawn in {picture}")
 
 
 def _check(file: Path, as_object: bool, trust: bool) -> None:
+    from vegglue.wording.sentences import layout, sentences
     from vegglue.workflow.check import check_effects
 
     found = {name: sentences(broken) for name, broken in check_effects(file, trust=trust).items()}
@@ -144,12 +131,17 @@ def _check(file: Path, as_object: bool, trust: bool) -> None:
         print_object(found)
     else:
         for name, breaches in found.items():
-            print(f"{name}: {'breaks the contract' if breaches else 'keeps the contract'}")
-            for breach in breaches:
-                print(f"  - {breach}")
+            print(layout("effect_checked", name, breaches))
     broken = [name for name, breaches in found.items() if breaches]
     if broken:
         raise InputError(f"{file}: {len(broken)} of {len(found)} effects break the contract: {', '.join(broken)}.")
+
+
+def effect_json(effect: "Effect") -> dict[str, object]:
+    """All that is declared of an effect."""
+    plain = ("name", "stage", "title", "equation", "source", "doi", "checked", "read_in", "each", "mirrored")
+    of_values = {"amplitude": vars(effect.amplitude), "shapes": [vars(shape) for shape in effect.shapes]}
+    return {name: getattr(effect, name) for name in plain} | of_values | {"tags": list(effect.tags)}
 
 
 def twin_command(

@@ -2,21 +2,30 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 import vegglue
-from vegglue.cli.doubts import opened_run, opened_runs
-from vegglue.cli.hearing import heard
-from vegglue.cli.options import FLAG, RUNS, Cluster, Config, Force, Jobs, Json, Quiet, Runs, Trust, number_given
+from vegglue.cli.options import (
+    FLAG,
+    RUNS,
+    Cluster,
+    Config,
+    Force,
+    Jobs,
+    Json,
+    Quiet,
+    Runs,
+    Trust,
+    number_given,
+    opened_run,
+    opened_runs,
+)
 from vegglue.cli.output import command_line, print_object
-from vegglue.cli.telling import tell
+from vegglue.cli.reporting import print_result, progress_reporter
 from vegglue.errors import InputError, shown_path
 from vegglue.wording.numbers import so_many
-
-if TYPE_CHECKING:
-    from vegglue.results.diagnosis import Diagnosis
 
 
 def import_command(
@@ -62,6 +71,9 @@ def import_command(
 
 def diagnose_command(
     config: Config,
+    details: Annotated[
+        bool, typer.Option("--details", metavar=FLAG, help="Print the whole verdict, remarks and candidate effects.")
+    ] = False,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,
@@ -69,22 +81,21 @@ def diagnose_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Say where the model fails, which effect is missing, and how sure that is."""
+    """Find where the model fails, which effect is missing, and with which probability."""
     opened = opened_run(config, trust)
-    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
+    with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.diagnose(opened.with_settings(runs, jobs, watch))
-    tell(opened.case, runs, found, as_object)
-    if not (quiet or as_object):
-        print(f"Next: {_after(found, config, runs, trust)}")
-
-
-def _after(found: "Diagnosis", config: Path, runs: Path, trust: bool) -> str:
-    """The command that goes on from a diagnosis, or what is to be done before."""
+    more = command_line("diagnose", config, "--details", runs=runs, trust=trust)
+    print_result(opened.case, runs, found, as_object, details, more)
+    if quiet or as_object:
+        return
     if found.verdict.doubts_the_data:
-        return f"mend these measurements; {command_line('check', config)} says all that is odd"
-    found_something = ("extend", config, "--auto") if found.steps or found.places else ("next", config)
-    following = ("discover", config) if found.verdict.tells_laws else found_something
-    return command_line(*following, runs=runs, trust=trust)
+        print(f"Next: correct the measurements; see {command_line('check', config)}")
+        return
+    following = ("extend", config, "--auto") if found.steps or found.places else ("next", config)
+    if found.verdict.tells_laws:
+        following = ("discover", config)
+    print(f"Next: {command_line(*following, runs=runs, trust=trust)}")
 
 
 def discover_command(
@@ -103,9 +114,9 @@ def discover_command(
 ) -> None:
     """Say which law, in no list, explains the misfit; write it as an effect file and a child config."""
     opened = opened_run(config, trust)
-    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
+    with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.discover(opened.with_settings(runs, jobs, watch, force), without=without or [], to=to)
-    tell(opened.case, runs, found, as_object)
+    print_result(opened.case, runs, found, as_object)
 
 
 def extend_command(
@@ -136,9 +147,9 @@ def extend_command(
         raise InputError(f"extend: expected {given} with --add only, got it with --auto, which finds its own; drop it.")
     if auto:
         opened = opened_run(config, trust)
-        with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
+        with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
             extension = vegglue.extend_stepwise(opened.with_settings(runs, jobs, watch, force))
-        tell(opened.case, runs, extension, as_object)
+        print_result(opened.case, runs, extension, as_object)
         return
     child = vegglue.extend(vegglue.load_case(config, trust), add or [], shapes=shapes, to=to, force=force, runs=runs)
     target = shown_path(child.source)
@@ -161,9 +172,9 @@ def compare_command(
 ) -> None:
     """Set models side by side: their errors on what they have seen, on what was held out, and what each step cost."""
     opened = opened_runs(configs, trust)
-    with heard(quiet, as_object) as watch:
+    with progress_reporter(quiet, as_object) as watch:
         found = vegglue.compare([one.with_settings(runs, jobs, watch) for one in opened])
-    tell(opened[-1].case, runs, found, as_object)
+    print_result(opened[-1].case, runs, found, as_object)
 
 
 def overview_command(
@@ -175,9 +186,9 @@ def overview_command(
 ) -> None:
     """Make one page of several runs: their answers, parameters side by side, and the way to each report."""
     cases = [vegglue.load_case(config, trust) for config in configs]
-    with heard(quiet, as_object) as watch:
+    with progress_reporter(quiet, as_object) as watch:
         page = vegglue.overview(cases, runs=runs, trust=trust, watch=watch)
-    tell(cases[0], runs, page, as_object)
+    print_result(cases[0], runs, page, as_object)
 
 
 def next_command(
@@ -192,6 +203,6 @@ def next_command(
 ) -> None:
     """Say which measurement would tell the remaining rivals apart, by gain per hour of field work."""
     opened = opened_run(config, trust)
-    with heard(quiet, as_object) as watch, vegglue.on_cluster(cluster):
+    with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.next_measurement(opened.with_settings(runs, jobs, watch), between=between or [])
-    tell(opened.case, runs, found, as_object)
+    print_result(opened.case, runs, found, as_object)

@@ -1,4 +1,4 @@
-"""Results as objects, as `--json` prints them: names of files and every number that is told in words."""
+"""Results as objects, as `--json` prints them: names of files and every number that words state."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -9,23 +9,22 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import model_score_json
 from vegglue.diagnosis.discovered import LawFound
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
+from vegglue.inference.statements import off_its_prior, posterior_statements, pressed_bounds
 from vegglue.measurements.section_discharge import CarriedDischarge
-from vegglue.pages.posterior_words import posterior_in_words
-from vegglue.pages.prior_words import off_its_prior, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis, diagnosis_json
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.open_questions import ProposedMeasurement, Question
 from vegglue.results.posterior import Posterior
-from vegglue.wording.sentences import sentences, tagged
+from vegglue.wording.sentences import sentence, sentences, tagged
 from vegglue.workflow.check import CheckedCase
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.discover import DiscoveredCase
 from vegglue.workflow.extend import StepwiseExtension
 
-Told = dict[str, Any]
+Object = dict[str, Any]
 
 
-def object_of(case: Case, runs: Path, result: Any) -> Told:
+def object_of(case: Case, runs: Path, result: Any) -> Object:
     """What a verb returns of a case, by name."""
     folder = runs / case.name
     match result:
@@ -41,8 +40,9 @@ def object_of(case: Case, runs: Path, result: Any) -> Told:
             return _discovered(result)
         case StepwiseExtension():
             told = {"configs": [one.source for one in result.cases], "cases": [one.name for one in result.cases]}
-            words = {"sentence": result.sentence, "reason": result.reason, "unclear": result.unclear}
-            return told | words | _comparison(result.comparison)
+            told |= {"sentence": sentence(result.sentence), "reason": sentence(result.reason)}
+            told |= {"unclear": result.unclear}
+            return told | _comparison(result.comparison)
         case Comparison():
             return _comparison(result)
         case list():
@@ -52,12 +52,12 @@ def object_of(case: Case, runs: Path, result: Any) -> Told:
     return {"note": str(result)}
 
 
-def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Told:
+def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Object:
     """What `run` found of the case it was given: diagnosis, extension, discovery, comparison with its law, questions;
     then, of each case by name, its own diagnosis and questions, its ensemble, posterior and report, and what was up to
     date in `notes`.
     """
-    told: Told = {"cases": {}}
+    told: Object = {"cases": {}}
     for case, result in results:
         of_case = told["cases"].setdefault(case.name, {"config": case.source, "notes": []})
         match result:
@@ -84,7 +84,7 @@ def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Told:
     return told
 
 
-def _checked(case: Case, found: CheckedCase) -> Told:
+def _checked(case: Case, found: CheckedCase) -> Object:
     return {
         "case": case.name, "experiments": list(case.experiments), "cells": found.cells, "stations": found.stations,
         "used_stations": found.used_stations, "remarks": sentences(found.remarks), "picture": found.picture,
@@ -93,7 +93,7 @@ def _checked(case: Case, found: CheckedCase) -> Told:
     }  # fmt: skip
 
 
-def _carried(one: CarriedDischarge) -> Told:
+def _carried(one: CarriedDischarge) -> Object:
     """Discharges [m3/s]; stated: both ends of its priors, null where it is not known."""
     return {
         "experiment": one.experiment, "section": one.section, "x": one.x, "carried": one.value,
@@ -102,21 +102,21 @@ def _carried(one: CarriedDischarge) -> Told:
     }  # fmt: skip
 
 
-def _discovered(result: DiscoveredCase) -> Told:
+def _discovered(result: DiscoveredCase) -> Object:
     return {
-        "sentence": result.found.sentence,
+        "sentence": sentence(result.found.sentence),
         "p": result.found.p,
         "laws_tried": result.found.tried,
         "laws": [_law(one) for one in result.found.laws],
         "product": None if result.found.product is None else _law(result.found.product.found),
         "others": result.found.others,
-        "left_out": result.aside or None,
+        "left_out": sentence(result.aside) or None,
         "effect_file": result.effect_file,
         "config": None if result.child is None else result.child.source,
     }
 
 
-def _law(one: LawFound) -> Told:
+def _law(one: LawFound) -> Object:
     return {
         "name": one.name, "title": one.law.title, "equation": one.equation, "same_as": one.same_as or None,
         "reference": one.reference, "strength": one.strength, "interval95": one.interval95, "chance": one.chance,
@@ -124,13 +124,13 @@ def _law(one: LawFound) -> Told:
     }  # fmt: skip
 
 
-def _ensemble(found: Ensemble) -> Told:
+def _ensemble(found: Ensemble) -> Object:
     marched, failed = (members_with(found.status, number) for number in (SOLVED_BY_MARCHING, FAILED))
     mass_error = None if found.by_command else found.mass_error[found.status != FAILED].max(initial=0.0)
     return {"members": len(found.status), "marched": marched, "failed": failed, "largest_mass_error": mass_error}
 
 
-def _posterior(case: Case, found: Posterior) -> Told:
+def _posterior(case: Case, found: Posterior) -> Object:
     refined = found.refinement
     misfit = None if refined is None or refined.error_model.errors == "estimated" else refined.misfit
     return {
@@ -146,11 +146,11 @@ def _posterior(case: Case, found: Posterior) -> Told:
         "rmse": found.fit.rmse,
         "sigma": found.fit.sigma,
         "chi2": None if misfit is None else {"chi2": misfit.chi2, "freedom": misfit.freedom, "p": misfit.p_misfit},
-        "sentences": posterior_in_words(found, case.reference.table if case.reference else None),
+        "sentences": sentences(posterior_statements(found, case.reference.table if case.reference else None)),
     }
 
 
-def _parameter(found: Posterior, name: str) -> Told:
+def _parameter(found: Posterior, name: str) -> Object:
     marginals = found.marginals
     return {
         "unit": found.sample.unit[name],
@@ -164,14 +164,14 @@ def _parameter(found: Posterior, name: str) -> Told:
     }
 
 
-def _comparison(found: Comparison) -> Told:
+def _comparison(found: Comparison) -> Object:
     return {
         "rungs": [model_score_json(one) for one in found.model_scores],
         "left_out": found.left_out.to_dict("records"),
     }
 
 
-def _question(question: Question) -> Told:
+def _question(question: Question) -> Object:
     """What is to be told apart, and the measurements that could."""
     return {
         "tells_apart": question.tells_apart, "answered": question.answered,
@@ -179,5 +179,5 @@ def _question(question: Question) -> Told:
     }  # fmt: skip
 
 
-def _worth(one: ProposedMeasurement) -> Told:
+def _worth(one: ProposedMeasurement) -> Object:
     return {**asdict(one), "gain_per_hour": one.per_hour}

@@ -14,6 +14,7 @@ from vegglue.plain_json import plain
 if TYPE_CHECKING:
     from rich.console import Console
 
+
 # Letters of a line in a file or a pipe, where nothing has to be left out.
 WIDEST = 1000
 # Spaces between two columns of a table.

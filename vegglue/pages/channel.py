@@ -65,7 +65,12 @@ def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
     """Above the whole grid (not to scale), below it the reach of interest where that is a part of it, last the bed
     across its middle.
     """
-    reach = _reach_of_interest(case, observations)
+    along = [corner for patch in case.plants.patches for corner in corners_of(case, patch)[:, 0]]
+    along += list(observations.table["x"])
+    reach = case.grid.x
+    if along:
+        near = min(along) - REACH_OF_INTEREST_MARGIN, max(along) + REACH_OF_INTEREST_MARGIN
+        reach = max(case.grid.x[0], near[0]), min(case.grid.x[1], near[1])
     (west, east), (low, high) = case.grid.x, reach
     apart = high - low < ALL_BUT_WHOLE * (east - west)
     heights = [1.0, 1.6, 1.4] if apart else [1.6, 1.4]
@@ -82,77 +87,50 @@ def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
     for patch in case.plants.patches:
         places = about_a_patch(corners_of(case, patch), nearest)
         _name(nearest, places, patch.name, observations, "ink")
-    figure.legend(handles=_legend(case, site, observations), loc="outside lower left", ncols=6, fontsize=SMALL)
+    shown: list[Line2D | Swatch] = [
+        Swatch(color=_class_colour(i), label=name) for i, name in enumerate(site.class_names)
+    ]
+    if case.plants.patches:
+        shown.append(Swatch(color=COLOUR["plants"], label="plants (darker: more stems)"))
+    shown.append(Line2D([], [], color=COLOUR["model"], linewidth=0.8, label="expected waterline"))
+    if len(observations.table):
+        shown.append(Line2D([], [], linestyle="", marker="o", markersize=3, color=COLOUR["measured"], label="station"))
+    if not observations.table["used"].all():
+        shown.append(Line2D([], [], linestyle="", marker="x", markersize=5, color=COLOUR["ink"], label="not used"))
+    figure.legend(handles=shown, loc="outside lower left", ncols=6, fontsize=SMALL)
     _draw_section(across, case, site, 0.5 * (low + high))
     return figure
 
 
 def _draw_plan(axes: Axes, case: Case, site: Site, observations: Observations) -> None:
-    _draw_classes(axes, site)
-    _draw_waterlines(axes, case, site)
-    _draw_patches(axes, case, site)
-    _draw_stations(axes, observations)
-    axes.set(ylabel="y [m]", ylim=case.grid.y)
-
-
-def _reach_of_interest(case: Case, observations: Observations) -> tuple[float, float]:
-    corners = [corner for patch in case.plants.patches for corner in corners_of(case, patch)[:, 0]]
-    x = corners + list(observations.table["x"])
-    if not x:
-        return case.grid.x
-    return max(case.grid.x[0], min(x) - REACH_OF_INTEREST_MARGIN), min(
-        case.grid.x[1], max(x) + REACH_OF_INTEREST_MARGIN
-    )
-
-
-def _draw_classes(axes: Axes, site: Site) -> None:
-    grid = site.grid
-    extent = (
-        grid.x[0] - 0.5 * grid.dx,
-        grid.x[-1] + 0.5 * grid.dx,
-        grid.y[0] - 0.5 * grid.dy,
-        grid.y[-1] + 0.5 * grid.dy,
-    )
-    colours = ListedColormap([_class_colour(index) for index in range(len(site.class_names))])
+    """Classes of friction, waterlines, patches and stations."""
+    grid, table = site.grid, observations.table
     axes.imshow(
-        site.friction_class.T,
-        extent=extent,
-        origin="lower",
-        aspect="auto",
-        interpolation="nearest",
-        cmap=colours,
-        vmin=-0.5,
+        site.friction_class.T, origin="lower", aspect="auto", interpolation="nearest", vmin=-0.5,
+        extent=(grid.x[0] - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx, grid.y[0] - 0.5 * grid.dy,
+                grid.y[-1] + 0.5 * grid.dy),
+        cmap=ListedColormap([_class_colour(index) for index in range(len(site.class_names))]),
         vmax=len(site.class_names) - 0.5,
-    )
-
-
-def _draw_waterlines(axes: Axes, case: Case, site: Site) -> None:
+    )  # fmt: skip
     for name, experiment in case.experiments.items():
         depth = expected_depth(case, in_experiment(site, name), experiment)
         if depth.min() < 0 < depth.max():
-            axes.contour(site.grid.x, site.grid.y, depth.T, [0.0], colors=COLOUR["model"], linewidths=0.8)
+            axes.contour(grid.x, grid.y, depth.T, [0.0], colors=COLOUR["model"], linewidths=0.8)
+    densest = max((patch.stems for patch in case.plants.patches), default=1.0)
+    i, j = np.nonzero(site.main_patch >= 0)
+    axes.plot(grid.x[i], grid.y[j], ",", color=COLOUR["stems"])
+    for patch in case.plants.patches:
+        corners, strength = corners_of(case, patch), 0.3 + 0.6 * patch.stems / densest
+        axes.add_patch(Polygon(corners, facecolor=COLOUR["plants"], alpha=strength, edgecolor="none"))
+        axes.add_patch(Polygon(corners, fill=False, edgecolor=COLOUR["stems"], linewidth=0.8))
+    used = table["used"]
+    axes.plot(table["x"][used], table["y"][used], "o", markersize=2.6, color=COLOUR["measured"])
+    axes.plot(table["x"][~used], table["y"][~used], "x", markersize=4.5, color=COLOUR["ink"])
+    axes.set(ylabel="y [m]", ylim=case.grid.y)
 
 
 def _class_colour(index: int) -> str:
     return COLOUR[CLASS_COLOURS[index % len(CLASS_COLOURS)]]
-
-
-def _draw_patches(axes: Axes, case: Case, site: Site) -> None:
-    densest = max((patch.stems for patch in case.plants.patches), default=1.0)
-    i, j = np.nonzero(site.main_patch >= 0)
-    axes.plot(site.grid.x[i], site.grid.y[j], ",", color=COLOUR["stems"])
-    for patch in case.plants.patches:
-        strength = 0.3 + 0.6 * patch.stems / densest
-        corners = corners_of(case, patch)
-        axes.add_patch(Polygon(corners, facecolor=COLOUR["plants"], alpha=strength, edgecolor="none"))
-        axes.add_patch(Polygon(corners, fill=False, edgecolor=COLOUR["stems"], linewidth=0.8))
-
-
-def _draw_stations(axes: Axes, observations: Observations) -> None:
-    table = observations.table
-    used = table["used"]
-    axes.plot(table["x"][used], table["y"][used], "o", markersize=2.6, color=COLOUR["measured"])
-    axes.plot(table["x"][~used], table["y"][~used], "x", markersize=4.5, color=COLOUR["ink"])
 
 
 def _name(
@@ -165,12 +143,17 @@ def _name(
 
 def _draw_boundaries(axes: Axes, case: Case, observations: Observations) -> None:
     (west, east), (south, north) = case.grid.x, case.grid.y
+
+    def inward(text: str) -> float:
+        """How far from an end of the channel the middle of a text lies [m]."""
+        return (HALF_LETTER * (len(text) + 1) + HALF_POINT) * (east - west)
+
     line: dict[str, Any] = {"linewidth": 3.0, "solid_capstyle": "butt", "clip_on": False}
     for name, inflow in case.inflows.items():
         if inflow.side == "west":
             low, high = inflow.range or case.grid.y
             axes.plot([west, west], [low, high], color=COLOUR["model"], **line)
-            _name(axes, along_an_edge(west + _inward(case, name), (low, high)), name, observations, "model")
+            _name(axes, along_an_edge(west + inward(name), (low, high)), name, observations, "model")
         else:
             low, high = inflow.range or case.grid.x
             y = south if inflow.side == "south" else north
@@ -178,26 +161,7 @@ def _draw_boundaries(axes: Axes, case: Case, observations: Observations) -> None
             label(axes, 0.5 * (low + high), y, name, "model", xytext=(0, 6 if inflow.side == "south" else -10))
     low, high = case.outlet.range or case.grid.y
     axes.plot([east, east], [low, high], color=COLOUR["model"], **line)
-    _name(axes, along_an_edge(east - _inward(case, "outlet"), (low, high)), "outlet", observations, "model")
-
-
-def _inward(case: Case, text: str) -> float:
-    """How far from an end of the channel the middle of a text lies [m]."""
-    return (HALF_LETTER * (len(text) + 1) + HALF_POINT) * (case.grid.x[1] - case.grid.x[0])
-
-
-def _legend(case: Case, site: Site, observations: Observations) -> list[Line2D | Swatch]:
-    shown: list[Line2D | Swatch] = [
-        Swatch(color=_class_colour(i), label=name) for i, name in enumerate(site.class_names)
-    ]
-    if case.plants.patches:
-        shown.append(Swatch(color=COLOUR["plants"], label="plants (darker: more stems)"))
-    shown.append(Line2D([], [], color=COLOUR["model"], linewidth=0.8, label="about the waterline"))
-    if len(observations.table):
-        shown.append(Line2D([], [], linestyle="", marker="o", markersize=3, color=COLOUR["measured"], label="station"))
-    if not observations.table["used"].all():
-        shown.append(Line2D([], [], linestyle="", marker="x", markersize=5, color=COLOUR["ink"], label="not used"))
-    return shown
+    _name(axes, along_an_edge(east - inward("outlet"), (low, high)), "outlet", observations, "model")
 
 
 def _draw_section(axes: Axes, case: Case, site: Site, x: float) -> None:

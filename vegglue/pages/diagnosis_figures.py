@@ -1,8 +1,7 @@
 """Figures of a diagnosis: scores of effects, effects that look alike, misfit by zone, gauges, and all on one screen."""
 
-import html
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,26 +18,21 @@ from vegglue.calibration.score_test import alike_groups
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.measurements.kinds import KINDS, WATER_LEVEL, Kind
-from vegglue.pages.cause_words import accepted_causes
-from vegglue.pages.diagnosis_words import (
-    ranked_suspects,
-    rms_residual,
-    standard_errors,
-    suspect_status,
-)
+from vegglue.pages.diagnosis_tables import candidate_rows
 from vegglue.pages.flow_maps import Outline
+from vegglue.pages.headline import Headline, rms_residual
 from vegglue.pages.place_maps import field_picture, outlines, paint_places, place_picture, plan_marks
-from vegglue.pages.run import Run, published_picture
+from vegglue.pages.run import Run, accepted_causes, published_picture
 from vegglue.pages.style import COLOUR, HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, save, styled
-from vegglue.pages.typography import fixed, short, unit_math
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.wording.numbers import listed, section_in_words, so_many
+from vegglue.wording.numbers import fixed, section_in_words, unit_math
+from vegglue.wording.sentences import sentence
 
 # How each status is drawn: marker, face, edge. Form and fill tell them apart without colour.
 MARKS: dict[str, tuple[str, str, str]] = {
     "accepted": ("o", "measured", "measured"),
     "rival": ("D", "measured", "measured"),
-    "stands out": ("P", "ink", "ink"),
+    "significant": ("P", "ink", "ink"),
     "less likely": ("X", "ink", "ink"),
     "no sign": ("o", "paper", "muted"),
     "untestable": ("|", "muted", "muted"),
@@ -52,7 +46,7 @@ LINE_STYLES = ("solid", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 
 
 @styled
-def draw_suspects(suspects: pd.DataFrame, threshold: float) -> Figure:
+def draw_candidates(suspects: pd.DataFrame, threshold: float) -> Figure:
     """Scores of the effects before anything is added, and what the last look leaves of them (small rings), beside
     their visibility.
 
@@ -61,12 +55,12 @@ def draw_suspects(suspects: pd.DataFrame, threshold: float) -> Figure:
     """
     height = 0.95 + 0.2 * max(len(suspects), 3)
     figure, (scores, visible) = canvas(2 * WIDTH, height, ncols=2, sharey=True, width_ratios=(3.4, 1))
-    paint_suspects(scores, visible, suspects, threshold)
+    paint_candidates(scores, visible, suspects, threshold)
     return figure
 
 
-def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshold: float) -> None:
-    """Paint draw_suspects on two axes that share their rows: scores on the first, visibility on the second."""
+def paint_candidates(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshold: float) -> None:
+    """Paint draw_candidates on two axes that share their rows: scores on the first, visibility on the second."""
     rows = np.arange(len(suspects))
     first, left = np.abs(suspects["first"].to_numpy(float)), np.abs(suspects["left"].to_numpy(float))
     scores.hlines(rows, 0, first, color=COLOUR["rule"], linewidth=1)
@@ -74,14 +68,22 @@ def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshol
     status = suspects["status"].to_numpy()
     for word in [word for word in MARKS if word in status]:
         chosen = status == word
-        scores.plot(first[chosen], rows[chosen], linestyle="", zorder=5, label=word, **_mark(word))
+        marker, face, edge = MARKS[word]
+        scores.plot(
+            first[chosen], rows[chosen], linestyle="", zorder=5, label=word, marker=marker, color=COLOUR[edge],
+            markersize=9 if marker == "|" else 5.5, markerfacecolor=COLOUR[face],
+            markeredgewidth=1.2 if marker != "X" else 0.4,
+        )  # fmt: skip
     scores.axvline(threshold, color=COLOUR["ink"], linewidth=0.9, dashes=(4, 2))
     scores.set_xscale("function", functions=(lambda x: np.sqrt(np.maximum(x, 0.0)), np.square))
     reach = float(np.nanmax([3.2 * threshold, *(1.15 * first), *(1.15 * left)]))  # room right of the threshold
     scores.set(xlim=(0, reach), ylim=(len(rows) - 0.4, TOP), xlabel="score [standard errors], root scale")
     scores.set_xticks([tick for tick in (0, 1, 2, 5, 10, 20, 50, 100, 200) if tick < reach])
     label(scores, threshold, TOP, "errors alone seldom reach this", xytext=(4, -8), va="center")
-    scores.set_yticks(rows, [_effect_label(name, word) for name, word in zip(suspects["name"], status, strict=True)])
+    scores.set_yticks(rows, [
+        f"{name} (untestable)" if word == "untestable" else name
+        for name, word in zip(suspects["name"], status, strict=True)
+    ])
     again = [Line2D([], [], linestyle="", marker="o", markersize=3.4, markerfacecolor="none", color=COLOUR["model"],
                     label="when looked at last")] if np.isfinite(left).any() else []  # fmt: skip
     handles = [*scores.get_legend_handles_labels()[0], *again]
@@ -94,19 +96,6 @@ def paint_suspects(scores: Axes, visible: Axes, suspects: pd.DataFrame, threshol
     for axes in (scores, visible):
         axes.tick_params(axis="y", length=0, labelsize=8)
         axes.spines["left"].set_visible(False)
-
-
-def _mark(status: str) -> dict[str, Any]:
-    marker, face, edge = MARKS[status]
-    size = 9 if marker == "|" else 5.5
-    return {
-        "marker": marker, "markersize": size, "color": COLOUR[edge], "markerfacecolor": COLOUR[face],
-        "markeredgewidth": 1.2 if marker != "X" else 0.4,
-    }  # fmt: skip
-
-
-def _effect_label(name: str, status: str) -> str:
-    return f"{name} (untestable)" if status == "untestable" else name
 
 
 @styled
@@ -157,54 +146,44 @@ def draw_fingerprint(trace: Array, station: pd.DataFrame, size: str) -> Figure:
     trace: (station,) [unit of the kind]; station: experiment, kind, section, x, y; size: of the effect, in words.
     """
     table = station.assign(change=trace)
-    parts = [part for kind in KINDS.values() for part in _parts_of(kind, table[table["kind"] == kind.name])]
-    figure, grid = _panels(len(parts))
+    parts: list[tuple[pd.DataFrame, str, Kind]] = []  # rows and title of each panel: sections, else all of a kind
+    for kind in KINDS.values():
+        rows = table[table["kind"] == kind.name]
+        if len(rows) and not kind.velocity:
+            parts.append((rows, f"{kind.instrument}s", kind))
+        elif len(rows):
+            for name in rows.groupby("section")["x"].mean().sort_values().index:
+                part = rows[rows["section"] == name]
+                parts.append((part, section_in_words(str(name), float(part["x"].mean())), kind))
+    across = min(max(len(parts), 1), FINGERPRINT_COLUMNS)
+    down = max(-(-len(parts) // FINGERPRINT_COLUMNS), 1)
+    size_of_figure = max(WIDTH, 0.9 + 1.95 * across), 0.5 + 2.3 * down
+    figure, grid = canvas(*size_of_figure, nrows=down, ncols=across, squeeze=False)
+    for axes in grid.flat[len(parts) :]:
+        axes.set_visible(False)
     lines = dict(zip(dict.fromkeys(table["experiment"]), LINE_STYLES * len(table), strict=False))
-    for place, (axes, (part, title, kind)) in enumerate(zip(grid, parts, strict=False)):
-        _paint_traces(axes, part, "y" if kind.velocity else "x", lines)
+    for place, (axes, (part, title, kind)) in enumerate(zip(grid.flat, parts, strict=False)):
+        along = "y" if kind.velocity else "x"
+        axes.axhline(0, color=COLOUR["muted"], linewidth=0.7)
+        for experiment, rows in part.sort_values(along).groupby("experiment"):
+            line = lines[str(experiment)]
+            axes.plot(rows[along], rows["change"], linestyle=line, marker=".", markersize=3, color=COLOUR["model"])
+        axes.set_xlabel(f"{along} [m]")
+        axes.yaxis.set_major_locator(MaxNLocator(5))
         axes.set_title(title, fontsize=8.5)
         if place % FINGERPRINT_COLUMNS == 0 or kind != parts[place - 1][2]:
             formula_labels(axes, upward=f"change of {kind.column} [{unit_math(kind.unit)}]")
         if kind.velocity:
-            axes.set_ylim(*_range(table.loc[table["kind"] == kind.name, "change"]))
+            change = table.loc[table["kind"] == kind.name, "change"]
+            low, high = min(float(change.min()), 0.0), max(float(change.max()), 0.0)
+            room = 0.08 * (high - low) or 1.0
+            axes.set_ylim(low - room, high + room)
     handles = [
         Line2D([], [], linestyle=line, color=COLOUR["model"], label=experiment) for experiment, line in lines.items()
     ]
     figure.legend(handles=handles, loc="outside upper left", ncols=4, frameon=False, fontsize=SMALL + 0.5)
     figure.suptitle(f"by {size}", x=0.995, ha="right", fontsize=SMALL + 0.5, color=COLOUR["muted"])
     return figure
-
-
-def _parts_of(kind: Kind, rows: pd.DataFrame) -> list[tuple[pd.DataFrame, str, Kind]]:
-    """Rows and title of each panel of a kind: one for each section of velocities, one for all others."""
-    if not kind.velocity:
-        return [(rows, f"{kind.instrument}s", kind)] if len(rows) else []
-    sections = rows.groupby("section")["x"].mean().sort_values().index
-    parts = [(str(name), rows[rows["section"] == name]) for name in sections]
-    return [(part, section_in_words(name, float(part["x"].mean())), kind) for name, part in parts]
-
-
-def _panels(number: int) -> tuple[Figure, list[Axes]]:
-    across, rows = min(max(number, 1), FINGERPRINT_COLUMNS), max(-(-number // FINGERPRINT_COLUMNS), 1)
-    figure, grid = canvas(max(WIDTH, 0.9 + 1.95 * across), 0.5 + 2.3 * rows, nrows=rows, ncols=across, squeeze=False)
-    for axes in grid.flat[number:]:
-        axes.set_visible(False)
-    return figure, list(grid.flat)
-
-
-def _range(change: "pd.Series[float]") -> tuple[float, float]:
-    low, high = min(float(change.min()), 0.0), max(float(change.max()), 0.0)
-    room = 0.08 * (high - low) or 1.0
-    return low - room, high + room
-
-
-def _paint_traces(axes: Axes, part: pd.DataFrame, along: str, lines: Mapping[str, Any]) -> None:
-    axes.axhline(0, color=COLOUR["muted"], linewidth=0.7)
-    for experiment, rows in part.sort_values(along).groupby("experiment"):
-        line = lines[str(experiment)]
-        axes.plot(rows[along], rows["change"], linestyle=line, marker=".", markersize=3, color=COLOUR["model"])
-    axes.set_xlabel(f"{along} [m]")
-    axes.yaxis.set_major_locator(MaxNLocator(5))
 
 
 # Root mean square misfit [standard errors] from which it is set in bold: twice what errors alone make.
@@ -277,15 +256,41 @@ def paint_zones(axes: Axes, zones: pd.DataFrame) -> None:
 
 
 # Effects drawn at once: as many rows as their names stay legible on one screen.
-SUSPECTS_DRAWN = 16
+CANDIDATES_DRAWN = 16
 # Letters of the verdict in a line: at 11.5 pt more of them run off a figure 14 inches wide.
 VERDICT_LINE_LETTERS = 135
 
 
 def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture]]:
     """All figures of a diagnosis, written to run.folder/figures: those as wide as the page, and the others."""
-    wide = [*_suspects(run, diagnosis), *place_picture(run, diagnosis), *field_picture(run, diagnosis)]
-    return {"wide": wide, "narrow": [*_zones(run, diagnosis), *_alike(run, diagnosis), *_gauges(run, diagnosis)]}
+    screening, names = diagnosis.first_screening, accepted_causes(diagnosis)
+    threshold = screening.threshold
+    wide, narrow = [], []
+    table = candidate_table(diagnosis)
+    if not table.empty:
+        above = sum(abs(diagnosis.first_score(one)) > threshold for one in diagnosis.candidate_effects)
+        still = sum(abs(np.nan_to_num(diagnosis.last_score(one))) > threshold for one in diagnosis.candidate_effects)
+        said = len(diagnosis.candidate_effects), above, threshold, names, still
+        figure = draw_candidates(table, threshold)
+        wide.append(published_picture(run, figure, "missing-suspects", "caption_suspects", *said))
+    wide += [*place_picture(run, diagnosis), *field_picture(run, diagnosis)]
+    if diagnosis.misfit.worst is not None:
+        worst, size = diagnosis.misfit.worst
+        said = worst["experiment"], worst["section"], worst["zone"], size, diagnosis.errors.scale
+        narrow.append(
+            published_picture(run, draw_zones(diagnosis.misfit.zones), "missing-zones", "caption_zones", *said)
+        )
+    if len(screening.compared) > 1:
+        families = [group for group in alike_groups(screening.compared, screening.cosine) if len(group) > 1]
+        figure = draw_alike(screening.compared, screening.cosine)
+        narrow.append(published_picture(run, figure, "missing-alike", "caption_alike", families))
+    stations = diagnosis.predictions.table
+    if (stations["kind"] == WATER_LEVEL).any():
+        both = diagnosis.predictions.first, diagnosis.predictions.last
+        rms = (1000 * rms_residual(diagnosis, each, WATER_LEVEL) for each in both)
+        figure = draw_gauges(stations, names)
+        narrow.append(published_picture(run, figure, "missing-gauges", "caption_gauges", *rms, names))
+    return {"wide": wide, "narrow": narrow}
 
 
 def save_diagnosis_figure(diagnosis: Diagnosis, case: Case, path: Path) -> None:
@@ -314,7 +319,7 @@ def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     zones_width = max(4.7, 1.2 + ZONE_WIDTH * missed["zone"].nunique()) if len(missed) else 4.7
     figure = Figure(figsize=(9.3 + zones_width, 8.6), layout="constrained")
     title = textwrap.fill(
-        f"{diagnosis.name}: {diagnosis.verdict.kind}. {diagnosis.verdict.sentence}", VERDICT_LINE_LETTERS
+        f"{diagnosis.name}: {sentence(Headline(diagnosis.verdict))}", VERDICT_LINE_LETTERS
     )
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
     upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
@@ -322,7 +327,7 @@ def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     for part, words in zip((suspects, alike, zones, lower), TITLES, strict=True):
         part.suptitle(words, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
     scores, visible = suspects.subplots(1, 2, sharey=True, width_ratios=(3, 1))
-    paint_suspects(scores, visible, _suspect_table(diagnosis), diagnosis.first_screening.threshold)
+    paint_candidates(scores, visible, candidate_table(diagnosis), diagnosis.first_screening.threshold)
     paint_alike(alike.subplots(), diagnosis.first_screening.compared, diagnosis.first_screening.cosine)
     if len(missed):
         paint_zones(zones.subplots(), missed)
@@ -336,78 +341,13 @@ def _split(figure: FigureBase, rows: int, columns: int, **ratios: Any) -> list[S
     return list(np.ravel(np.array(figure.subfigures(rows, columns, **ratios), object)))
 
 
-def _suspect_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """The strongest suspects and every one that is accepted or a rival, the strongest first."""
-    order = sorted(ranked_suspects(diagnosis), key=lambda one: -abs(np.nan_to_num(diagnosis.first_score(one))))
-    drawn = [one for k, one in enumerate(order) if k < SUSPECTS_DRAWN or one.name in diagnosis.set]
+def candidate_table(found: Diagnosis) -> pd.DataFrame:
+    """The strongest candidates and every one that is accepted or a rival, the strongest first."""
+    order = sorted(candidate_rows(found), key=lambda row: -abs(np.nan_to_num(found.first_score(row.effect))))
+    drawn = [row for k, row in enumerate(order) if k < CANDIDATES_DRAWN or row.effect.name in found.set]
     rows = [
-        {"name": one.name, "status": suspect_status(diagnosis, one), "first": diagnosis.first_score(one),
-         "left": diagnosis.last_score(one), "visibility": one.detectability.visibility}
-        for one in drawn
+        {"name": row.effect.name, "status": row.status, "first": found.first_score(row.effect),
+         "left": found.last_score(row.effect), "visibility": row.effect.detectability.visibility}
+        for row in drawn
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=["name", "status", "first", "left", "visibility"])
-
-
-def _suspects(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    table = _suspect_table(diagnosis)
-    if table.empty:
-        return
-    threshold = diagnosis.first_screening.threshold
-    out = sum(abs(diagnosis.first_score(one)) > threshold for one in diagnosis.candidate_effects)
-    left = [diagnosis.last_score(one) for one in diagnosis.candidate_effects]
-    caption = (
-        f"<b>Suspects.</b> Of {so_many(len(diagnosis.candidate_effects), 'effect')}, {out} would improve the fit by "
-        f"more than errors alone seldom do ({fixed(threshold, 1)} standard errors, dashed)"
-    )
-    if accepted_causes(diagnosis):
-        still = int(np.sum(np.abs(np.nan_to_num(left)) > threshold))
-        after = f"{still} still {'does' if still == 1 else 'do'}" if still else "none does any more"
-        caption += f"; with {html.escape(accepted_causes(diagnosis))} added, {after} (rings)"
-    caption += ". Visibility: the share of its trace that no change of the calibrated parameters can mimic."
-    alt = "Effects ranked by score: " + ", ".join(
-        f"{row.name} {row.first:.1f} ({row.status})" for row in table.head(6).itertuples()
-    )
-    yield published_picture(run, draw_suspects(table, threshold), "missing-suspects", caption, alt)
-
-
-def _gauges(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    stations = diagnosis.predictions.table
-    if not (stations["kind"] == WATER_LEVEL).any():
-        return
-    both = diagnosis.predictions.first, diagnosis.predictions.last
-    before, after = (1000 * rms_residual(diagnosis, each, WATER_LEVEL) for each in both)
-    finding, names = f"{short(after, 2)} mm", accepted_causes(diagnosis)
-    if names:
-        finding = f"{short(before, 2)} mm before (hollow) and {finding} with {html.escape(names)} (full)"
-    caption = f"<b>Gauges.</b> The model misses the levels by {finding} (root mean square)."
-    yield published_picture(run, draw_gauges(stations, names), "missing-gauges", caption, f"Gauges: {finding}.")
-
-
-def _zones(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    zones, most = diagnosis.misfit.zones, diagnosis.misfit.worst
-    if most is None:
-        return
-    worst, size = most
-    finding = (
-        f"Largest in {worst['experiment']} {worst['section']}, {worst['zone']}: {fixed(size, 1)} "
-        f"{standard_errors(diagnosis)}, where errors alone make 1"
-    )
-    caption = (
-        f"<b>Misfit by zone</b> of the model as it was, root mean square. {html.escape(finding)}. Small: the mean in "
-        "its own standard errors; squares are full where more was measured than modelled, hollow where less."
-    )
-    yield published_picture(run, draw_zones(zones), "missing-zones", caption, f"Misfit by section and zone. {finding}.")
-
-
-def _alike(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
-    names, cosine = diagnosis.first_screening.compared, diagnosis.first_screening.cosine
-    if len(names) < 2:
-        return
-    families = [group for group in alike_groups(names, cosine) if len(group) > 1]
-    finding = "No two of the strongest suspects leave the same trace"
-    if families:
-        finding = f"To first order these leave the same trace: {'; '.join(listed(group) for group in families)}"
-    caption = f"<b>What looks alike</b>, by the cosine of the traces after calibration. {html.escape(finding)}."
-    yield published_picture(
-        run, draw_alike(names, cosine), "missing-alike", caption, f"Cosines between traces of effects. {finding}."
-    )

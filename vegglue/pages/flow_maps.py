@@ -1,7 +1,6 @@
 """Maps of the flow of the median parameters as SVG: depth, velocity, streamlines, patches, stations, water level."""
 
 import base64
-import html
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -9,7 +8,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-import pandas as pd
 from matplotlib.image import imsave
 
 from vegglue.arrays import Array
@@ -18,7 +16,7 @@ from vegglue.case.zones import corners_of
 from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.normal_range import NORMAL95
-from vegglue.pages.run import Run, file_name, planted_cells, published_svg, stamp
+from vegglue.pages.run import SYNTHETIC, Run, file_name, is_synthetic, planted_cells, published_picture
 from vegglue.pages.style import COLOUR, EDGE_COLOUR, Picture
 from vegglue.pages.svg import (
     Scale,
@@ -31,7 +29,6 @@ from vegglue.pages.svg import (
     svg_words,
     tick_labels,
 )
-from vegglue.pages.typography import short
 
 # A map as wide as the page, its colours beside it [px].
 MAP_LEFT, MAP_RIGHT, MAP_TOTAL, MAP_LETTERS = 52.0, 800.0, 902.0, 12.0
@@ -72,40 +69,28 @@ def coloured_cells(frame: MapFrame, x: Array, y: Array, field: Array, colours: s
     most = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
     ends = frame.across(np.array([x[columns[0]] - 0.5 * dx, x[columns[-1]] + 0.5 * dx]))
     edges = frame.down(np.array([y[rows[-1]] + 0.5 * dy, y[rows[0]] - 0.5 * dy]))
-    picture = _as_png(shown.T[::-1] / most, colours)
+    share = shown.T[::-1] / most
+    painted = matplotlib.colormaps[colours](np.nan_to_num(share), bytes=True)
+    painted[~np.isfinite(share), 3] = 0
+    file = BytesIO()
+    imsave(file, painted, format="png")
+    picture = f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
     name = f"frame-{frame.top:g}"
     clip = svg_element("rect", x=MAP_LEFT, y=frame.top, width=MAP_RIGHT - MAP_LEFT, height=frame.foot - frame.top)
     image = svg_element(
         "image", x=float(ends[0]), y=float(edges[0]), width=float(ends[1] - ends[0]), height=float(edges[1] - edges[0]),
         preserveAspectRatio="none", style="image-rendering:pixelated", href=picture, clip_path=f"url(#{name})",
     )  # fmt: skip
-    return [svg_element("clipPath", clip, id=name), image, *_bar(frame, most, colours, title)]
-
-
-def _as_png(share: Array, colours: str) -> str:
-    """Shares of the largest value (rows, columns) as a picture within the text; clear where NaN."""
-    painted = matplotlib.colormaps[colours](np.nan_to_num(share), bytes=True)
-    painted[~np.isfinite(share), 3] = 0
-    file = BytesIO()
-    imsave(file, painted, format="png")
-    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
-
-
-def _bar(frame: MapFrame, most: float, colours: str, title: str) -> list[str]:
+    parts = [svg_element("clipPath", clip, id=name), image]
     left, step = MAP_RIGHT + 14, (frame.foot - frame.top) / BAR_STEPS
     palette = matplotlib.colormaps[colours]((np.arange(BAR_STEPS) + 0.5) / BAR_STEPS, bytes=True)
-    parts = [
-        svg_element(
-            "rect", x=left, y=frame.foot - (k + 1) * step, width=BAR_WIDTH, height=step + 0.5,
-            fill=f"rgb({red},{green},{blue})",
-        )
-        for k, (red, green, blue, _) in enumerate(palette.tolist())
-    ]  # fmt: skip
+    for k, (red, green, blue, _) in enumerate(palette.tolist()):
+        fill, top = f"rgb({red},{green},{blue})", frame.foot - (k + 1) * step
+        parts.append(svg_element("rect", x=left, y=top, width=BAR_WIDTH, height=step + 0.5, fill=fill))
     height, ticks = linear_scale(0.0, most, frame.foot, frame.top), round_ticks(0.0, most, 4)
     for tick, words in zip(ticks, tick_labels(ticks), strict=True):
         parts.append(svg_words(left + BAR_WIDTH + 5, float(height(tick)) + 4, words, "muted"))
-    parts.append(svg_words(MAP_TOTAL, frame.top - 5, title, text_anchor="end"))
-    return parts
+    return [*parts, svg_words(MAP_TOTAL, frame.top - 5, title, text_anchor="end")]
 
 
 def map_axes(frame: MapFrame, along: bool, title: str = "y [m]") -> list[str]:
@@ -219,10 +204,11 @@ def stream_function(flow: FlowFields) -> Array:
 
 def stretch_of(window: PlanWindow) -> float:
     """How many times wider than at true scale a reach is drawn [-], so that it has LEAST_HEIGHT; 1 where it is wide."""
-    return max(1.0, LEAST_HEIGHT / _true_height(window))
+    return max(1.0, LEAST_HEIGHT / true_height(window))
 
 
-def _true_height(window: PlanWindow) -> float:
+def true_height(window: PlanWindow) -> float:
+    """Height of a window as wide as the map at true scale [px]."""
     x0, x1, y0, y1 = window
     return (MAP_RIGHT - MAP_LEFT) * (y1 - y0) / (x1 - x0)
 
@@ -234,9 +220,16 @@ def draw_reach(
 
     stations: x, y (station, 2) [m]; note: in the corner.
     """
-    tall = stretch_of(window) * _true_height(window)
+    tall, speed = stretch_of(window) * true_height(window), np.hypot(flow.u, flow.v)
     upper, lower = MapFrame(window, HEAD, HEAD + tall), MapFrame(window, HEAD + tall + GAP, HEAD + 2 * tall + GAP)
-    parts = [*_depth(upper, flow), *_velocity(lower, flow)]
+    parts = [
+        *coloured_cells(upper, flow.x, flow.y, flow.depth, "viridis_r", "depth [m]"),
+        *coloured_cells(lower, flow.x, flow.y, speed, "cividis", "velocity [m/s]"),
+    ]
+    psi = stream_function(flow)
+    middle = psi[len(flow.x) // 2]
+    levels = np.linspace(middle.min(), middle.max(), STREAM_TUBES + 1)[1:-1]
+    parts += streamlines(lower, flow.x, flow.y, np.where(np.isfinite(flow.depth), psi, np.nan), levels)
     for frame in (upper, lower):
         parts += [
             *outlined(frame, [one.corners for one in patches]),
@@ -246,7 +239,11 @@ def draw_reach(
         place = float(upper.across(one.corners[:, 0].max())) + 5, float(upper.down(one.corners[:, 1].mean())) + 4
         halo: dict[str, Any] = {"stroke": COLOUR["paper"], "stroke_width": 3.0, "paint_order": "stroke"}
         parts.append(svg_words(*place, one.name, **halo))
-    parts += [*map_axes(upper, along=False), *map_axes(lower, along=True), _noted(lower.foot + BELOW, note)]
+    parts += [
+        *map_axes(upper, along=False),
+        *map_axes(lower, along=True),
+        svg_words(MAP_TOTAL, lower.foot + BELOW - 4, note, "muted", text_anchor="end"),
+    ]
     return svg_document(MAP_TOTAL, lower.foot + BELOW, parts, "Depth and velocity", MAP_LETTERS)
 
 
@@ -255,37 +252,22 @@ def draw_plan(
 ) -> str:
     """SVG text: the whole channel, depth, velocity (y stretched), and bed and water level along the deepest line."""
     window = wet_window(flow, (float(flow.x[0]), float(flow.x[-1])))
-    tops = [HEAD + place * (STRETCHED + GAP) for place in range(3)]
+    tops, speed = [HEAD + place * (STRETCHED + GAP) for place in range(3)], np.hypot(flow.u, flow.v)
     maps = [MapFrame(window, top, top + STRETCHED) for top in tops[:2]]
-    parts = [*_depth(maps[0], flow), *_velocity(maps[1], flow, lines=False)]
+    parts = [
+        *coloured_cells(maps[0], flow.x, flow.y, flow.depth, "viridis_r", "depth [m]"),
+        *coloured_cells(maps[1], flow.x, flow.y, speed, "cividis", "velocity [m/s]"),
+    ]
     for frame in maps:
         parts += [*outlined(frame, [one.corners for one in patches]), *station_dots(frame, stations, 2.0)]
         parts += map_axes(frame, along=False)
     foot = tops[2] + PROFILE
-    parts += [*_levels(flow, gauges, (tops[2], foot)), _noted(foot + BELOW, note)]
+    parts += draw_levels(flow, gauges, (tops[2], foot))
+    parts += [svg_words(MAP_TOTAL, foot + BELOW - 4, note, "muted", text_anchor="end")]
     return svg_document(MAP_TOTAL, foot + BELOW, parts, "The whole channel", MAP_LETTERS)
 
 
-def _noted(height: float, note: str) -> str:
-    return svg_words(MAP_TOTAL, height - 4, note, "muted", text_anchor="end")
-
-
-def _depth(frame: MapFrame, flow: FlowFields) -> list[str]:
-    return coloured_cells(frame, flow.x, flow.y, flow.depth, "viridis_r", "depth [m]")
-
-
-def _velocity(frame: MapFrame, flow: FlowFields, lines: bool = True) -> list[str]:
-    parts = coloured_cells(frame, flow.x, flow.y, np.hypot(flow.u, flow.v), "cividis", "velocity [m/s]")
-    if not lines:
-        return parts
-    psi = stream_function(flow)
-    middle = psi[len(flow.x) // 2]
-    levels = np.linspace(middle.min(), middle.max(), STREAM_TUBES + 1)[1:-1]
-    wet = np.where(np.isfinite(flow.depth), psi, np.nan)
-    return [*parts, *streamlines(frame, flow.x, flow.y, wet, levels)]
-
-
-def _levels(flow: FlowFields, gauges: Gauges | None, heights: tuple[float, float]) -> list[str]:
+def draw_levels(flow: FlowFields, gauges: Gauges | None, heights: tuple[float, float]) -> list[str]:
     """Bed and water level along the deepest line, and gauges with 95 % of their error over the band of the model."""
     along, deepest = np.arange(len(flow.x)), np.argmin(flow.bed, axis=1)
     bed, level = flow.bed[along, deepest], flow.level[along, deepest]
@@ -300,24 +282,20 @@ def _levels(flow: FlowFields, gauges: Gauges | None, heights: tuple[float, float
         svg_words(MAP_LEFT + 10, float(np.nanmin(water)) - 5, "water level", "model"),
         svg_words(MAP_LEFT + 10, frame.foot - 8, "bed on the deepest line"),
     ]
-    if gauges is not None:
-        parts += _gauge_marks(frame, gauges)
-    return [*parts, *map_axes(frame, along=True, title="level [m]")]
-
-
-def _gauge_marks(frame: MapFrame, gauges: Gauges) -> list[str]:
-    parts, error = [], NORMAL95 * np.nan_to_num(gauges.standard_error)
+    parts += map_axes(frame, along=True, title="level [m]")
+    if gauges is None:
+        return parts
+    error = NORMAL95 * np.nan_to_num(gauges.standard_error)
     for k, at in enumerate(frame.across(gauges.x)):
         if not np.isfinite(gauges.value[k]):
             continue
         low, high = (float(frame.down(edge[k])) for edge in (gauges.low, gauges.high))
         if np.isfinite(low) and np.isfinite(high):
-            parts.append(
-                svg_element("path", d=f"M{at:.1f},{low:.1f}V{high:.1f}", stroke=COLOUR["narrow"], stroke_width=6)
-            )
-        foot, head = (float(frame.down(gauges.value[k] + side * error[k])) for side in (-1, 1))
-        parts.append(svg_element("path", d=f"M{at:.1f},{foot:.1f}V{head:.1f}", stroke=COLOUR["measured"]))
-        parts.append(svg_element("circle", cx=float(at), cy=0.5 * (foot + head), r=3.6, fill=COLOUR["measured"]))
+            band = f"M{at:.1f},{low:.1f}V{high:.1f}"
+            parts.append(svg_element("path", d=band, stroke=COLOUR["narrow"], stroke_width=6))
+        below, head = (float(frame.down(gauges.value[k] + side * error[k])) for side in (-1, 1))
+        parts.append(svg_element("path", d=f"M{at:.1f},{below:.1f}V{head:.1f}", stroke=COLOUR["measured"]))
+        parts.append(svg_element("circle", cx=float(at), cy=0.5 * (below + head), r=3.6, fill=COLOUR["measured"]))
     last = float(frame.across(gauges.x[0])) + 8, float(frame.down(gauges.value[0])) + 16
     return [*parts, svg_words(*last, "gauges", "measured")]
 
@@ -328,75 +306,38 @@ REACH_MARGIN = 8.0
 
 def plans(run: Run, experiment: str) -> Iterator[Picture]:
     """The reach of patches and stations, and the whole channel."""
-    flow, table = run.flow[experiment], run.observations.table
+    flow, table, planted = run.flow[experiment], run.observations.table, planted_cells(run, experiment)
     called = told_apart({name: file_name(name) for name in run.case.experiments})[experiment]
-    rows = table[table["experiment"] == experiment]
-    stations = rows[["x", "y"]].drop_duplicates().to_numpy(float)
-    patches = _outlines(run, experiment)
+    rows, built_in = table[table["experiment"] == experiment], run.case.engine is not None
+    stations, note = rows[["x", "y"]].drop_duplicates().to_numpy(float), SYNTHETIC if is_synthetic(run.case) else ""
+    here = [run.case.plants.patches[index] for index in np.unique(run.site.patch[planted])]
+    patches = [Outline(patch.name, corners_of(run.case, patch)) for patch in here]
     places = np.concatenate([stations[:, 0], *[outline.corners[:, 0] for outline in patches]])
     if len(places):
         start, end = places.min() - REACH_MARGIN, places.max() + REACH_MARGIN
-        reach = max(float(flow.x[0]), start), min(float(flow.x[-1]), end)
-        window = wet_window(flow, reach)
-        drawn = draw_reach(flow, window, patches, stations, stamp(run.case))
-        alt = f"Plan of depth and velocity around the patches, experiment {experiment}."
-        yield published_svg(run, drawn, f"reach-{called}", _reach_caption(run, experiment, window), alt)
-    gauges = _gauges(run, rows[rows["kind"] == WATER_LEVEL])
-    drawn = draw_plan(flow, patches, stations, gauges, stamp(run.case))
-    alt = f"Depth, velocity and water level of experiment {experiment} along the whole channel."
-    caption = channel_caption(flow, experiment, _of_engine(run))
-    yield published_svg(run, drawn, f"channel-{called}", caption, alt)
-
-
-def _outlines(run: Run, experiment: str) -> list[Outline]:
-    present = np.unique(run.site.patch[planted_cells(run, experiment)])
-    patches = [run.case.plants.patches[index] for index in present]
-    return [Outline(patch.name, corners_of(run.case, patch)) for patch in patches]
-
-
-def _reach_caption(run: Run, experiment: str, window: PlanWindow) -> str:
-    flow, plants = run.flow[experiment], planted_cells(run, experiment)
-    speed = np.hypot(flow.u, flow.v)
-    inside = ((flow.x >= window[0]) & (flow.x <= window[1]))[:, None] & np.isfinite(speed)
-    moves = ""
-    ground = np.isin(run.site.friction_class, np.unique(run.site.friction_class[plants]))
-    if (plants & inside).any():
-        among, beside = speed[plants & inside].mean(), speed[~plants & inside & ground].mean()
-        moves = (
-            f" The water moves at {short(among, 2)} m/s among the plants and {short(beside, 2)} m/s on the bed beside."
-        )
-    scale = scale_in_words(stretch_of(window))
-    return (
-        f"<b>The reach of patches and stations, experiment {html.escape(experiment)}</b>, {scale}, "
-        f"median parameters{_of_engine(run)}.{moves} Between two streamlines flows a tenth of the discharge; dots are "
-        "stations."
-    )
-
-
-def scale_in_words(stretch: float) -> str:
-    """How a plan is drawn that is so many times wider than at true scale [-]."""
-    times = f"{stretch:.2g}"
-    return "at true scale" if times == "1" else f"y stretched {times} times"
-
-
-def _of_engine(run: Run) -> str:
-    """Whose flow is drawn, where it is not that of the predictions: a command leaves none to draw."""
-    return "" if run.case.engine is None else ", by the built-in engine"
-
-
-def channel_caption(flow: FlowFields, experiment: str, engine: str) -> str:
+        window = wet_window(flow, (max(float(flow.x[0]), start), min(float(flow.x[-1]), end)))
+        drawn = draw_reach(flow, window, patches, stations, note)
+        speeds = speeds_of(flow, window, planted, run.site.friction_class)
+        said = experiment, stretch_of(window), built_in, *speeds
+        yield published_picture(run, drawn, f"reach-{called}", "caption_reach", *said)
+    gauges, levels = None, rows[rows["kind"] == WATER_LEVEL]
+    if len(levels):
+        low, high = run.posterior.predicted.model_band[[0, -1]][:, levels.index.to_numpy()]
+        gauges = Gauges(*(levels[name].to_numpy(float) for name in ("x", "value", "standard_error")), low, high)
+    drawn = draw_plan(flow, patches, stations, gauges, note)
     wet = np.isfinite(flow.depth).any(axis=1)
     level, depth = np.nanmean(flow.level[wet], axis=1), np.nanmax(flow.depth[wet], axis=1)
-    return (
-        f"<b>The whole channel, experiment {html.escape(experiment)}</b> (y stretched{engine}): the water level falls "
-        f"{short(level[0] - level[-1], 2)} m over {short(np.ptp(flow.x[wet]))} m, the greatest depth goes from "
-        f"{short(depth[0])} to {short(depth[-1])} m."
-    )
+    along = level[0] - level[-1], float(np.ptp(flow.x[wet])), depth[0], depth[-1]
+    yield published_picture(run, drawn, f"channel-{called}", "caption_channel", experiment, built_in, *along)
 
 
-def _gauges(run: Run, levels: pd.DataFrame) -> Gauges | None:
-    if levels.empty:
-        return None
-    low, high = run.posterior.predicted.model_band[[0, -1]][:, levels.index.to_numpy()]
-    x, value, error = (levels[column].to_numpy(float) for column in ("x", "value", "standard_error"))
-    return Gauges(x, value, error, low, high)
+def speeds_of(
+    flow: FlowFields, window: PlanWindow, planted: np.ndarray, friction_class: np.ndarray
+) -> tuple[float | None, float | None]:
+    """Mean speed [m/s] among the plants of a window, and on like bed beside them; None without plants."""
+    speed = np.hypot(flow.u, flow.v)
+    inside = ((flow.x >= window[0]) & (flow.x <= window[1]))[:, None] & np.isfinite(speed)
+    ground = np.isin(friction_class, np.unique(friction_class[planted]))
+    if not (planted & inside).any():
+        return None, None
+    return float(speed[planted & inside].mean()), float(speed[~planted & inside & ground].mean())

@@ -1,6 +1,5 @@
 """Several runs on one page: their answers, their parameters side by side, and links to their reports."""
 
-import html
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,15 +9,13 @@ from typing import Any
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.pages.answer import CaseAnswer, answer_of
-from vegglue.pages.answer_words import headline
-from vegglue.pages.key_numbers import as_power, study_value, symbol
-from vegglue.pages.page_file import rendered, write_page
+from vegglue.pages.answer import CaseAnswer, answer_of, headline_lines
+from vegglue.pages.page import write_page
+from vegglue.pages.parameters import as_power, parameter_row, study_value
 from vegglue.pages.run import Run, file_name
-from vegglue.pages.style import COLOUR, Picture, publish_text
+from vegglue.pages.style import COLOUR, Picture, palette_css, publish_text
 from vegglue.pages.svg import (
     FEWEST_TICKS,
-    Scale,
     axis_below,
     linear_scale,
     round_ticks,
@@ -28,8 +25,8 @@ from vegglue.pages.svg import (
     tick_labels,
     within_width,
 )
-from vegglue.pages.typography import short, unit_html
 from vegglue.whole_files import folder_within
+from vegglue.wording.sentences import page_document, page_phrase, phrase, sentence
 
 # The picture [px], legible on a telephone of 360 px; the height of a row, of its words in it, and of the foot.
 INTERVALS_WIDTH, INTERVALS_LETTERS, ROW, WORDS, FOOT = 460.0, 13.0, 40.0, 18.0, 28.0
@@ -64,45 +61,34 @@ def draw_interval_rows(rows: Mapping[str, DrawnInterval], logarithmic: bool, tit
         return place(np.log10(value) if logarithmic else value)
 
     foot = ROW * len(rows) + 6.0
-    ticks = _powers(low, high) if logarithmic else round_ticks(low, high, 6)
+    ticks = round_ticks(low, high, 6)
+    if logarithmic:  # powers of ten, with 2 and 5 times them if these are few; else round numbers
+        powers = range(int(np.floor(low)), int(np.ceil(high)) + 1)
+        factors = (1.0, 2.0, 5.0) if high - low < 2.0 else (1.0,)
+        values = [factor * 10.0**power for power in powers for factor in factors]
+        inside = [value for value in values if low <= np.log10(value) <= high]
+        ticks = inside if len(inside) >= FEWEST_TICKS else round_ticks(10.0**low, 10.0**high, 5)
     labels = [f"{tick:.4g}" for tick in ticks]
     if not logarithmic or len(set(labels)) < len(labels):
         labels = tick_labels(ticks)
     parts = axis_below(scale, ticks, labels, foot, INTERVALS_WIDTH, "")
-    for number, (words, row) in enumerate(rows.items()):
-        parts += _interval_row(scale, words, row, ROW * number + WORDS)
+    for number, (words, row) in enumerate(rows.items()):  # words above a line with its centre
+        height, colour = ROW * number + WORDS, "measured" if row.others else "model"
+        shown = within_width(words, INTERVALS_WIDTH, INTERVALS_LETTERS)
+        parts.append(svg_words(0.0, height - 4, shown, "muted" if row.others else "ink"))
+        centre, level = float(scale(row.centre)), height + 9.0
+        if row.high > row.low:
+            line = f"M{float(scale(row.low)):.1f},{level:g}H{float(scale(row.high)):.1f}"
+            dashes = {"stroke_dasharray": "5 3"} if row.others else {}
+            parts.append(svg_element("path", d=line, stroke=COLOUR[colour], stroke_width=3, **dashes))
+        if row.others:
+            diamond = f"M{centre:.1f},{level - 6:g}l6,6l-6,6l-6,-6z"
+            parts.append(svg_element("path", d=diamond, fill=COLOUR["paper"], stroke=COLOUR[colour], stroke_width=2))
+        else:
+            parts.append(svg_element("circle", cx=centre, cy=level, r=6.0, fill=COLOUR[colour]))
     return svg_document(INTERVALS_WIDTH, foot + FOOT, parts, title, INTERVALS_LETTERS)
 
 
-def _powers(low: float, high: float) -> list[float]:
-    """Powers of ten from 10^low to 10^high, with 2 and 5 times them where they are few; else round numbers."""
-    factors = (1.0, 2.0, 5.0) if high - low < 2.0 else (1.0,)
-    powers = range(int(np.floor(low)), int(np.ceil(high)) + 1)
-    values = [factor * 10.0**power for power in powers for factor in factors]
-    inside = [value for value in values if low <= np.log10(value) <= high]
-    return inside if len(inside) >= FEWEST_TICKS else round_ticks(10.0**low, 10.0**high, 5)
-
-
-def _interval_row(scale: Scale, words: str, row: DrawnInterval, height: float) -> list[str]:
-    """Words above a line from low to high with its centre: a dot of ours, a diamond of others."""
-    colour = "measured" if row.others else "model"
-    shown = within_width(words, INTERVALS_WIDTH, INTERVALS_LETTERS)
-    parts = [svg_words(0.0, height - 4, shown, "muted" if row.others else "ink")]
-    centre, level = float(scale(row.centre)), height + 9.0
-    if row.high > row.low:
-        line = f"M{float(scale(row.low)):.1f},{level:g}H{float(scale(row.high)):.1f}"
-        dashes = {"stroke_dasharray": "5 3"} if row.others else {}
-        parts.append(svg_element("path", d=line, stroke=COLOUR[colour], stroke_width=3, **dashes))
-    if row.others:
-        diamond = f"M{centre:.1f},{level - 6:g}l6,6l-6,6l-6,-6z"
-        parts.append(svg_element("path", d=diamond, fill=COLOUR["paper"], stroke=COLOUR[colour], stroke_width=2))
-    else:
-        parts.append(svg_element("circle", cx=centre, cy=level, r=6.0, fill=COLOUR[colour]))
-    return parts
-
-
-# How methods are called in a table.
-METHODS = {"glue": "members weighed (GLUE)", "refine": "draws around the best"}
 # Standard deviations on both sides that hold some 95 %, for values of others that are stated with one.
 BOTH_SIDES = 2.0
 
@@ -119,15 +105,26 @@ class LoopOfOverview:
 
 @dataclass(frozen=True)
 class OverviewRow:
-    """One line of the table of runs (text, but headline, which is HTML)."""
+    """One line of the table of runs; members: of its ensemble and draws of its own, 0 without."""
 
     name: str
     title: str
     page: str
-    headline: str
-    method: str
-    members: str
-    worth: str
+    headline: list[object]
+    refined: bool
+    members: int
+    drawn: int
+    effective_size: float
+
+
+@dataclass(frozen=True)
+class IntervalOf:
+    """What an interval of the overview is of: a run, or (members None) a value of others with the runs it is for."""
+
+    name: str
+    effective_size: float = 0.0
+    members: int | None = None
+    runs: tuple[str, ...] = ()
 
 
 def write_overview(path: Path, runs: Sequence[Run]) -> Path:
@@ -140,51 +137,34 @@ def write_overview(path: Path, runs: Sequence[Run]) -> Path:
 
 def render_overview(folder: Path, runs: Sequence[Run]) -> str:
     """The page as text; writes the pictures on the way."""
+    loops: dict[str, LoopOfOverview] = {}  # runs that know what they lack, each ladder once
+    for run in runs:
+        first = run.loop.ladder.steps[0].name if run.loop.ladder else run.case.name
+        if run.behind is not None and first not in loops:
+            title, name = run.case.title or run.case.name, run.case.name
+            loops[first] = LoopOfOverview(file_name(name), title, f"{name}/report.html", answer_of(run))
     shared = list(_shared_parameters(runs))
-    compared = [_side_by_side(folder, name, those) for name, those in shared]
     shown = [run for _, those in shared for run in those]
-    return rendered(
+    light, dark = palette_css()
+    return page_document(
         "overview.html.j2",
-        loops=list(_loops(runs)),
+        light=light,
+        dark=dark,
+        loops=list(loops.values()),
         rows=[_run_row(run) for run in runs],
-        compared=compared,
+        compared=[_side_by_side(folder, name, those) for name, those in shared],
         others=any(run.case.reference for run in shown),
         first_looks=any(not run.posterior.claimed for run in shown),
     )
 
 
-def _loops(runs: Sequence[Run]) -> Iterator[LoopOfOverview]:
-    """Runs that know what they lack, each ladder once."""
-    told: set[str] = set()
-    for run in runs:
-        if run.behind is None:
-            continue
-        ladder = run.loop.ladder
-        first = ladder.steps[0].name if ladder else run.case.name
-        if first not in told:
-            told.add(first)
-            yield LoopOfOverview(file_name(run.case.name), run.case.title or run.case.name, _page(run), answer_of(run))
-
-
-def _page(run: Run) -> str:
-    return f"{run.case.name}/report.html"
-
-
 def _run_row(run: Run) -> OverviewRow:
-    posterior = run.posterior
-    size = posterior.weighting.effective_size
-    members = [] if run.ensemble is None else [f"{len(run.ensemble.status):,}"]
-    drawn = [f"{posterior.sample.members:,} drawn"] if posterior.refinement else []
-    method = METHODS["refine" if posterior.refinement else "glue"]
+    posterior, ensemble, name = run.posterior, run.ensemble, run.case.name
+    refined, members = posterior.refinement is not None, 0 if ensemble is None else len(ensemble.status)
     return OverviewRow(
-        run.case.name,
-        run.case.title,
-        _page(run),
-        headline(run),
-        method,
-        ", ".join(members + drawn),
-        f"{max(size, 1.0):,.0f}",
-    )
+        name, run.case.title, f"{name}/report.html", headline_lines(run), refined, members,
+        posterior.sample.members if refined else 0, max(posterior.weighting.effective_size, 1.0),
+    )  # fmt: skip
 
 
 def _shared_parameters(runs: Sequence[Run]) -> Iterator[tuple[str, list[Run]]]:
@@ -194,58 +174,37 @@ def _shared_parameters(runs: Sequence[Run]) -> Iterator[tuple[str, list[Run]]]:
         groups: dict[tuple[object, ...], list[Run]] = {}
         for run in runs:
             if name in run.posterior.parameters:
-                prior = run.case.parameters[name]
-                told = tuple(sorted(prior.model_dump(exclude={"symbol", "meaning"}).items()))
-                groups.setdefault(told, []).append(run)
+                prior = run.case.parameters[name].model_dump(exclude={"symbol", "meaning"})
+                groups.setdefault(tuple(sorted(prior.items())), []).append(run)
         yield from ((name, those) for those in groups.values() if len(those) > 1)
 
 
 def _side_by_side(folder: Path, name: str, runs: Sequence[Run]) -> Picture:
-    rows = {_words(run): _interval(run, name) for run in runs} | _of_others(runs, name)
-    unit = unit_html(runs[0].posterior.sample.unit[name])
-    powers = as_power(runs[0].posterior, name)
-    told = "; ".join(f"{words}: {short(row.centre)}" for words, row in rows.items())
-    meaning = runs[0].case.parameters[name].meaning
-    svg = draw_interval_rows(rows, powers, f"{name} in {len(runs)} runs")
-    of_what = f": {html.escape(meaning)}" if meaning else ""
-    caption = f"{symbol(runs[0].case, name)}{f' [{unit}]' if unit else ''}{of_what}"
-    return publish_text(
-        svg, folder_within(folder, "figures"), f"parameter-{file_name(name)}", caption, f"{name}. {told}."
-    )
-
-
-def _words(run: Run) -> str:
-    size = max(run.posterior.weighting.effective_size, 1.0)
-    return f"{run.case.name}, worth {size:,.0f} of {run.posterior.sample.members:,} members"
-
-
-def _interval(run: Run, name: str) -> DrawnInterval:
-    """Median and 95 % range; the median alone where too few members carry the weight."""
-    median = float(run.posterior.marginals.median[name])
-    low, high = run.posterior.marginals.quantiles[name][[0, -1]] if run.posterior.claimed else (median, median)
-    return DrawnInterval(float(low), median, float(high))
-
-
-def _of_others(runs: Sequence[Run], name: str) -> dict[str, DrawnInterval]:
-    """What others state for a parameter, each value once, with the runs it is for."""
-    of_whom: dict[tuple[str, DrawnInterval], list[str]] = {}
+    """Medians with 95 % ranges, medians alone if the effective sample is too small; then values of others, each once
+    with the runs it is for: of the source of a case, and what a synthetic record was made with.
+    """
+    rows: dict[IntervalOf, DrawnInterval] = {}
+    of_others: dict[tuple[str, DrawnInterval], list[str]] = {}
     for run in runs:
-        for told in _references(run, name):
-            of_whom.setdefault(told, []).append(run.case.name)
-    return {f"{source} ({', '.join(names)})": value for (source, value), names in of_whom.items()}
-
-
-def _references(run: Run, name: str) -> Iterator[tuple[str, DrawnInterval]]:
-    """What the source of a case states for a parameter, and what a synthetic record was made with."""
-    reference = run.case.reference
-    if reference is None:
-        return
-    stated = study_value(run.case, run.posterior, name)
-    if stated is not None:
-        centre, reach = stated[0], 0.0 if math.isnan(stated[1]) else BOTH_SIDES * stated[1]
-        powers = as_power(run.posterior, name)
-        low, middle, high = (10.0**one if powers else one for one in (centre - reach, centre, centre + reach))
-        yield reference.source, DrawnInterval(low, middle, high, others=True)
-    if name in reference.made_with:
-        made = float(reference.made_with[name])
-        yield "the record was made with", DrawnInterval(made, made, made, others=True)
+        posterior, marginals, reference = run.posterior, run.posterior.marginals, run.case.reference
+        median = float(marginals.median[name])
+        low, high = marginals.quantiles[name][[0, -1]] if posterior.claimed else (median, median)
+        size = max(posterior.weighting.effective_size, 1.0)
+        rows[IntervalOf(run.case.name, size, posterior.sample.members)] = DrawnInterval(float(low), median, float(high))
+        stated = study_value(run.case, posterior, name)
+        if reference is not None and stated is not None:
+            reach, powers = 0.0 if math.isnan(stated[1]) else BOTH_SIDES * stated[1], as_power(posterior, name)
+            ends = (stated[0] - reach, stated[0], stated[0] + reach)
+            drawn = DrawnInterval(*(10.0**one if powers else one for one in ends), others=True)
+            of_others.setdefault((reference.source, drawn), []).append(run.case.name)
+        if reference is not None and name in reference.made_with:
+            made = float(reference.made_with[name])
+            drawn = DrawnInterval(made, made, made, others=True)
+            of_others.setdefault(("the record was made with", drawn), []).append(run.case.name)
+    rows |= {IntervalOf(source, runs=tuple(names)): drawn for (source, drawn), names in of_others.items()}
+    named = {sentence(of): row for of, row in rows.items()}
+    svg = draw_interval_rows(named, as_power(runs[0].posterior, name), name)
+    row = parameter_row(runs[0], name)
+    picture = f"parameter-{file_name(name)}"
+    texts = page_phrase("caption_parameter", row, []), phrase("caption_parameter", row, [*named])
+    return publish_text(svg, folder_within(folder, "figures"), picture, *texts)

@@ -1,26 +1,22 @@
 """One run as one page: a self-contained HTML file that needs no network, and the figures beside it as files."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from vegglue.case.resolved_config import resolved_yaml
+from vegglue.inference.statements import measurement_error
+from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.pages.answer import answer_of
 from vegglue.pages.diagnosis_figures import diagnosis_pictures
-from vegglue.pages.diagnosis_words import diagnosis_section
+from vegglue.pages.diagnosis_tables import diagnosis_section
 from vegglue.pages.findings import findings
-from vegglue.pages.key_numbers import key_numbers, verdict_of
-from vegglue.pages.page_file import rendered, write_page
+from vegglue.pages.parameters import fit_rows, key_parameters, parameter_rows, posterior_verdict
 from vegglue.pages.posterior_figures import pictures
-from vegglue.pages.run import Run, command_about, is_synthetic
-from vegglue.pages.tables import (
-    failure_reasons,
-    fit_rows,
-    health_facts,
-    health_in_words,
-    member_counts,
-    parameter_rows,
-    provenance,
-    station_rows,
-)
+from vegglue.pages.run import Run, is_synthetic
+from vegglue.pages.style import palette_css
+from vegglue.pages.tables import provenance, run_health, station_rows
+from vegglue.whole_files import MAKE_ROOM, write_file
+from vegglue.wording.sentences import page_document
 
 
 def write_report(run: Run) -> Path:
@@ -31,31 +27,41 @@ def write_report(run: Run) -> Path:
     return write_page(run.folder / "report.html", lambda: render(run))
 
 
+def write_page(path: Path, page: Callable[[], str]) -> Path:
+    """Write what `page` makes, which may write pictures on its way; an earlier page stays until the new one is whole.
+
+    Errors: StorageError when a file cannot be written.
+    """
+    write_file(path, page().encode(), MAKE_ROOM)
+    return path
+
+
 def render(run: Run) -> str:
     """The whole page as text; writes the figures as files on the way."""
-    stations, found = station_rows(run), findings(run)
-    remarks = run.diagnosis.verdict.remarks if run.diagnosis else ()
-    return rendered(
+    stations, found, fit = station_rows(run), findings(run), fit_rows(run)
+    notes = run.diagnosis.verdict.notes if run.diagnosis else ()
+    light, dark = palette_css()
+    return page_document(
         "report.html.j2",
+        light=light,
+        dark=dark,
         top=answer_of(run),
-        caveats=len(remarks) + sum(one.doubt for one in found),
+        caveats=len(notes) + sum(limits for _, limits in found),
         case=run.case,
         synthetic=is_synthetic(run.case),
-        verdict=verdict_of(run.case, run.posterior),
-        numbers=key_numbers(run.case, run.posterior),
+        verdict=posterior_verdict(run.case, run.posterior),
+        parameters=key_parameters(run),
+        error=measurement_error(run.posterior, next(iter(run.posterior.fit.sigma))),
+        rows=parameter_rows(run),
+        fit=fit,
         findings=found,
         diagnosis=None if run.diagnosis is None else diagnosis_section(run.diagnosis),
         diagnosis_pictures={} if run.diagnosis is None else diagnosis_pictures(run, run.diagnosis),
-        parameters=parameter_rows(run),
-        fit_rows=fit_rows(run),
         pictures=pictures(run),
         stations=stations,
         flagged=[row for row in stations if row.reason],
-        member_counts=[] if run.ensemble is None else member_counts(run.ensemble),
-        failure_reasons=[] if run.ensemble is None else failure_reasons(run.ensemble),
-        health_facts=list(health_facts(run)),
-        health_words=health_in_words(run),
-        provenance=list(provenance(run)),
+        health=run_health(run),
+        trusted_k=TRUSTED_K_HAT,
+        made=provenance(run),
         config=resolved_yaml(run.case),
-        to_diagnose=command_about(run, "diagnose"),
     )

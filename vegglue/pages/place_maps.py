@@ -1,7 +1,5 @@
 """Maps of places and of a smooth field: where something that is no listed effect would reduce the misfit."""
 
-import html
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -16,30 +14,21 @@ from matplotlib.patches import Ellipse, Polygon
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of
-from vegglue.pages.cause_words import (
-    FIELD_WORDS,
-    TERM_SIGNS,
-    accepted_causes,
-    field_in_words,
-    field_scale,
-    instrument_in_words,
-    place_in_words,
-    what_at,
-    where,
-)
 from vegglue.pages.flow_maps import Outline
 from vegglue.pages.run import Run, published_picture
 from vegglue.pages.style import COLOUR, EDGE_COLOUR, SMALL, WIDTH, Picture, canvas, label, styled
-from vegglue.pages.typography import fixed, percent
+from vegglue.results.causes import UNIT_OF_FIELD
 from vegglue.results.diagnosis import Diagnosis
+from vegglue.wording.numbers import fixed
+from vegglue.wording.sentences import phrase
 
 # Least score [standard errors] in full colour, so that a map of errors alone (scores of 2 to 3) stays pale.
 FULL_COLOUR_SCORE = 6.0
 # Opacity [-] of the colour in each quarter of the largest score of a map; the first quarter stays blank.
 SHADES = (0.22, 0.5, 0.85)
-# Standard errors [-] below which a field is not told from nothing, and the opacity it is drawn with there.
-TOLD_FROM, FADED = 2.0, 0.3
-# Blue is more and vermilion less, as in all maps; light grey between, told from both in every colour blindness.
+# Standard errors [-] below which a field is not distinguished from zero, and its opacity there.
+CLEAR_FROM, FADED = 2.0, 0.3
+# Blue is more and vermilion less, as in all maps; light grey between, distinct from both in every colour blindness.
 LESS_TO_MORE = LinearSegmentedColormap.from_list("less_to_more", [COLOUR["measured"], "#f3f2ef", COLOUR["model"]])
 
 # Pale enough for stations and patches on top.
@@ -59,7 +48,7 @@ class MarkedSpot:
 
 @dataclass(frozen=True)
 class PlanMarks:
-    """What is drawn over a map: patches, stations (station, 2) and those set aside (station, 2) as x, y [m], spots."""
+    """What is drawn over a map: patches, stations (station, 2) and those excluded (station, 2) as x, y [m], spots."""
 
     patches: Sequence[Outline]
     stations: Array
@@ -96,10 +85,22 @@ def paint_places(axes: Axes, x: Array, y: Array, score: Array, term: str, marks:
     along, across, field = strongest_spots(x, y, score)
     largest = float(np.nanmax(np.abs(field), initial=0.0)) or 1.0
     if min(field.shape) > 1:
-        _paint_scores(axes, along, across, field, largest, term)
+        full = max(largest, FULL_COLOUR_SCORE)
+        quarters = full * np.array([0.25, 0.5, 0.75, 1.0])
+        shown = np.ma.masked_invalid(field.T)
+        for sign, colour, line in ((1.0, "model", "solid"), (-1.0, "measured", "dashed")):
+            faces = [to_rgba(COLOUR[colour], shade) for shade in SHADES]
+            axes.contourf(along, across, sign * shown, levels=quarters, colors=faces)
+            look = {"colors": COLOUR[colour], "linewidths": 0.7, "linestyles": line}
+            axes.contour(along, across, sign * shown, levels=quarters[:-1], **look)
+        text = f"steps of {fixed(0.25 * full, 1)} standard errors; largest {fixed(largest, 1)}"
+        axes.text(1.0, 1.02, text, transform=axes.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
+        for place, line, sign, colour in ((0.0, "━", 1, "model"), (0.28, "╌", -1, "measured")):
+            acting, look = phrase("acting", term, sign), {"fontsize": SMALL, "color": COLOUR[colour]}
+            axes.text(place, 1.02, f"{line} {acting} here would help", transform=axes.transAxes, **look)
     _paint_marks(axes, marks)
     if len(marks.aside):
-        axes.text(0.56, 1.02, "× set aside", transform=axes.transAxes, fontsize=SMALL, color=COLOUR["ink"])
+        axes.text(0.56, 1.02, "× excluded", transform=axes.transAxes, fontsize=SMALL, color=COLOUR["ink"])
     axes.set(xlabel="x [m], flow to the right", ylabel="y [m]")
 
 
@@ -114,40 +115,16 @@ def strongest_spots(x: Array, y: Array, score: Array) -> tuple[Array, Array, Arr
     along, across = np.unique(parts[0][0]), np.unique(parts[0][1])
     shortest = np.full((along.size, across.size), np.nan)
     shortest[np.searchsorted(along, parts[0][0]), np.searchsorted(across, parts[0][1])] = parts[0][2]
-    layers = np.array([shortest, *(_interpolated(along, across, *part) for part in parts[1:])])
+    layers = np.full((len(parts), *shortest.shape), np.nan)
+    layers[0] = shortest
+    for layer, (x_of, y_of, scores) in zip(layers[1:], parts[1:], strict=True):
+        for j, row in enumerate(across):
+            own = np.isclose(y_of, row)
+            if own.any():
+                layer[:, j] = np.interp(along, x_of[own], scores[own], left=np.nan, right=np.nan)
     size = np.nan_to_num(np.abs(layers), nan=-1.0)
     strongest = np.take_along_axis(layers, size.argmax(axis=0)[None], axis=0)[0]
     return along, across, np.where(np.isfinite(shortest), strongest, np.nan)
-
-
-def _interpolated(along: Array, across: Array, x: Array, y: Array, score: Array) -> Array:
-    """Spots of one length along each row of a raster, (nx, ny)."""
-    layer = np.full((along.size, across.size), np.nan)
-    for j, row in enumerate(across):
-        own = np.isclose(y, row)
-        if own.any():
-            layer[:, j] = np.interp(along, x[own], score[own], left=np.nan, right=np.nan)
-    return layer
-
-
-def _paint_scores(axes: Axes, along: Array, across: Array, field: Array, largest: float, term: str) -> None:
-    full = max(largest, FULL_COLOUR_SCORE)
-    quarters = full * np.array([0.25, 0.5, 0.75, 1.0])
-    shown = np.ma.masked_invalid(field.T)
-    for sign, colour, line in ((1.0, "model", "solid"), (-1.0, "measured", "dashed")):
-        faces = [to_rgba(COLOUR[colour], shade) for shade in SHADES]
-        axes.contourf(along, across, sign * shown, levels=quarters, colors=faces)
-        axes.contour(
-            along, across, sign * shown, levels=quarters[:-1], colors=COLOUR[colour], linewidths=0.7, linestyles=line
-        )
-    text = f"steps of {fixed(0.25 * full, 1)} standard errors; largest {fixed(largest, 1)}"
-    axes.text(1.0, 1.02, text, transform=axes.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
-    more, less = TERM_SIGNS[term]
-    for place, line, words, colour in ((0.0, "━", more, "model"), (0.28, "╌", less, "measured")):
-        axes.text(
-            place, 1.02, f"{line} {words} here would help", transform=axes.transAxes, fontsize=SMALL,
-            color=COLOUR[colour],
-        )  # fmt: skip
 
 
 def _paint_marks(axes: Axes, marks: PlanMarks) -> None:
@@ -172,7 +149,7 @@ def draw_field_map(field: DrawnField, marks: PlanMarks) -> Figure:
     """The field, pale where it is less than two of its standard errors, and below it these errors; y stretched."""
     figure, (upper, lower) = canvas(2 * WIDTH, 4.4, nrows=2, sharex=True, sharey=True)
     largest = float(np.abs(field.value).max()) or 1.0
-    told = np.abs(field.value) >= TOLD_FROM * field.error
+    told = np.abs(field.value) >= CLEAR_FROM * field.error
     mesh = upper.pcolormesh(
         field.x, field.y, field.value.T, cmap=LESS_TO_MORE, vmin=-largest, vmax=largest, rasterized=True,
         alpha=np.where(told, 1.0, FADED).T,
@@ -184,7 +161,7 @@ def draw_field_map(field: DrawnField, marks: PlanMarks) -> Figure:
     _colour_bar(lower, mesh, f"standard error [{field.unit}]")
     _paint_marks(upper, marks)
     _paint_marks(lower, PlanMarks(marks.patches, marks.stations, marks.aside))
-    text = f"outlined: more than {TOLD_FROM:g} standard errors; pale: less"
+    text = f"outlined: more than {CLEAR_FROM:g} standard errors; pale: less"
     upper.text(1.0, 1.02, text, transform=upper.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
     for axes in (upper, lower):
         axes.set_ylabel("y [m]")
@@ -204,58 +181,26 @@ def outlines(case: Case) -> list[Outline]:
 
 
 def plan_marks(diagnosis: Diagnosis, patches: Sequence[Outline]) -> PlanMarks:
-    """Patches, stations, those set aside, and all places that were found; one of another term than the map says so."""
+    """Patches, stations, excluded ones, and all places that were found; one of another term than the map is named."""
     station, aside = diagnosis.predictions.station, list(diagnosis.errors.flagged)
-    mapped = diagnosis.place_map.term
+    spots = []
+    for one in diagnosis.places:
+        of_term = "" if one.term == diagnosis.place_map.term else f"{phrase('acting', one.term, one.amplitude)}: "
+        spots.append(MarkedSpot(one.x, one.y, one.length, one.width, of_term + phrase("place", one.x, one.y)))
     return PlanMarks(
         patches=patches,
         stations=station[["x", "y"]].drop_duplicates().to_numpy(float),
         aside=station.iloc[aside][["x", "y"]].drop_duplicates().to_numpy(float),
-        spots=[
-            MarkedSpot(
-                one.x,
-                one.y,
-                one.length,
-                one.width,
-                ("" if one.term == mapped else f"{what_at(one)}: ") + where(one.x, one.y),
-            )
-            for one in diagnosis.places
-        ],
+        spots=spots,
     )
 
 
 def place_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     """The map of places, if there is any place where something could be."""
     mapped = diagnosis.place_map
-    if not mapped.x.size:
-        return
-    finding = _finding(diagnosis)
-    more, less = TERM_SIGNS[mapped.term]
-    caption = (
-        f"<b>Where a spot of {_term(mapped.term)} would help</b> the model as it was, y stretched. {finding}. Green: "
-        f"patches; dots: stations; full lines: {more} would help, dashed: {less}."
-    )
-    figure = draw_places(mapped.x, mapped.y, mapped.score, mapped.term, plan_marks(diagnosis, outlines(run.case)))
-    alt = _spoken(f"Plan of the channel with scores of a spot of {_term(mapped.term)}. {finding}.")
-    yield published_picture(run, figure, "missing-places", caption, alt)
-
-
-def _finding(diagnosis: Diagnosis) -> str:
-    """What is marked on the map (HTML)."""
-    if diagnosis.places:
-        marked = "; ".join(place_in_words(one) for one in diagnosis.places)
-        found = f"Marked, with the outline of the spot: {marked}"
-    elif diagnosis.steps:
-        found = f"No place explains as much as {html.escape(accepted_causes(diagnosis))} does"
-    else:
-        found = "No place stands out more than errors alone make it"
-    if diagnosis.instruments:
-        found += f". Crosses: set aside ({'; '.join(instrument_in_words(one) for one in diagnosis.instruments)})"
-    return found
-
-
-def _term(term: str) -> str:
-    return {"drag": "drag", "bed": "the bed level", "inflow": "water that enters", "viscosity": "mixing"}[term]
+    if mapped.x.size:
+        figure = draw_places(mapped.x, mapped.y, mapped.score, mapped.term, plan_marks(diagnosis, outlines(run.case)))
+        yield published_picture(run, figure, "missing-places", "caption_places", diagnosis)
 
 
 def field_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
@@ -263,22 +208,11 @@ def field_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     mapped, found = diagnosis.field_map, diagnosis.field
     if mapped is None or found is None:
         return
-    what, unit = FIELD_WORDS[found.term]
-    scale = field_scale(found.term)
-    drawn = DrawnField(mapped.x, mapped.y, scale * mapped.value, scale * mapped.error, f"change of {what}", unit)
+    scale, unit = (100.0, "%") if found.term == "friction" else (1.0, UNIT_OF_FIELD[found.term])
+    what = f"change of {phrase('field_of', found.term)}"
+    drawn = DrawnField(mapped.x, mapped.y, scale * mapped.value, scale * mapped.error, what, unit)
     marks = plan_marks(diagnosis, outlines(run.case))
-    most = MarkedSpot(found.x, found.y, found.length, found.width, where(found.x, found.y))
-    told = float(np.mean(np.abs(mapped.value) >= TOLD_FROM * mapped.error))
-    finding = f"It acts like {field_in_words(diagnosis)}"
-    caption = (
-        f"<b>The field of {what}</b> that would close the misfit, and its standard error, y stretched. {finding}. "
-        f"Pale: within two standard errors of nothing, {percent(1 - told)} of the plan; dashed: the size of its bumps."
-    )
+    most = MarkedSpot(found.x, found.y, found.length, found.width, phrase("place", found.x, found.y))
     figure = draw_field_map(drawn, PlanMarks(marks.patches, marks.stations, marks.aside, [most]))
-    alt = _spoken(f"Plan of the channel with a field of {what} and its standard error. {finding}.")
-    yield published_picture(run, figure, "missing-field", caption, alt)
-
-
-def _spoken(words: str) -> str:
-    """Without tags, for those who hear the page."""
-    return html.unescape(re.sub("<[^>]+>", "", words))
+    unclear = float(np.mean(np.abs(mapped.value) < CLEAR_FROM * mapped.error))
+    yield published_picture(run, figure, "missing-field", "caption_field", diagnosis, unclear)

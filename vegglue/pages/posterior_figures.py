@@ -14,23 +14,22 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.case.schema import Reference
+from vegglue.inference.statements import parameter_of, weight_statements
 from vegglue.inference.weighted_statistics import effective_size, weighted_quantile
 from vegglue.pages.flow_maps import plans
-from vegglue.pages.key_numbers import (
+from vegglue.pages.measured_figures import canopy_profiles, discharges, residuals, verticals
+from vegglue.pages.parameters import (
+    ParameterRow,
     as_power,
-    estimate,
-    identified_width,
+    parameter_rows,
     plant_parameter,
     study_value,
-    symbol,
+    symbols_of,
 )
-from vegglue.pages.measured_figures import canopy_profiles, discharges, residuals, verticals
-from vegglue.pages.posterior_words import weights_in_words
 from vegglue.pages.run import Run, published_picture
 from vegglue.pages.style import COLOUR, HEIGHT, WIDTH, Picture, canvas, formula_labels, label, styled
 from vegglue.pages.svg import FEWEST_TICKS, round_ticks
-from vegglue.pages.typography import fixed, html_notation, no_formula, plus_minus, short, symbol_math, unit_math
+from vegglue.wording.numbers import no_formula, symbol_math, unit_math
 
 # Points of a drawn density: its curve looks smooth at the width of a column.
 DENSITY_POINTS = 240
@@ -130,39 +129,29 @@ def draw_marginal(parameter: DrawnParameter, weights: Array, references: Sequenc
     axes.plot(grid, posterior, color=COLOUR["model"], linewidth=1.4)
     peak = float(posterior.max())
     axes.plot([quantiles[2]] * 2, [0, np.interp(quantiles[2], grid, posterior)], color=COLOUR["model"], linewidth=0.9)
-    _name_densities(axes, grid, prior, posterior)
+    at, (left, reach) = int(np.argmax(posterior)), (float(grid[0]), float(np.ptp(grid)))
+    right = grid[at] < left + 0.5 * reach
+    side = {"ha": "left" if right else "right", "xytext": (7 if right else -7, -9)}
+    label(axes, grid[at], posterior[at], "posterior", "model", **side)
+    if prior.any():
+        room = (grid > left + 0.05 * reach) & (grid < left + 0.83 * reach)  # for the word, which begins there
+        gap = int(np.argmax(np.where(room, prior - posterior, -np.inf)))
+        label(axes, grid[gap], 0.0, "prior", "muted", xytext=(0, 3))
     for place, reference in enumerate(references):
-        _mark(axes, parameter, reference, peak * (1.10 + 0.13 * place))
+        value, height = float(parameter.coordinate(reference.value)), peak * (1.10 + 0.13 * place)
+        error = None if np.isnan(reference.sd) else reference.sd
+        axes.errorbar(value, height, xerr=error, fmt=reference.marker, markersize=5, color=COLOUR["ink"], elinewidth=1)
+        axes.axvline(value, ymax=0.97, color=COLOUR["ink"], linewidth=0.5, dashes=(1, 2), zorder=0)
+        leftward = value > 0.5 * (low + high)
+        end = value - (error or 0) if leftward else value + (error or 0)
+        label(axes, end, height, reference.name, ha="right" if leftward else "left", va="center",
+              xytext=(-6 if leftward else 6, 0))  # fmt: skip
     axes.set(xlim=(low, high), ylim=(0, peak * (1.16 + 0.13 * len(references))), yticks=[])
     formula_labels(axes, parameter.title)
     axes.spines["left"].set_visible(False)
     if parameter.logarithmic:
         _powers(axes, "x")
     return figure
-
-
-def _name_densities(axes: Axes, grid: Array, prior: Array, posterior: Array) -> None:
-    at = int(np.argmax(posterior))
-    left, reach = float(grid[0]), float(np.ptp(grid))
-    right = grid[at] < left + 0.5 * reach
-    side = {"ha": "left" if right else "right", "xytext": (7 if right else -7, -9)}
-    label(axes, grid[at], posterior[at], "posterior", "model", **side)
-    if not prior.any():
-        return
-    room = (grid > left + 0.05 * reach) & (grid < left + 0.83 * reach)  # for the word, which begins there
-    gap = int(np.argmax(np.where(room, prior - posterior, -np.inf)))
-    label(axes, grid[gap], 0.0, "prior", "muted", xytext=(0, 3))
-
-
-def _mark(axes: Axes, parameter: DrawnParameter, reference: ReferenceValue, height: float) -> None:
-    value = float(parameter.coordinate(reference.value))
-    error = None if np.isnan(reference.sd) else reference.sd
-    axes.errorbar(value, height, xerr=error, fmt=reference.marker, markersize=5, color=COLOUR["ink"], elinewidth=1)
-    axes.axvline(value, ymax=0.97, color=COLOUR["ink"], linewidth=0.5, dashes=(1, 2), zorder=0)
-    low, high = (float(parameter.coordinate(bound)) for bound in (parameter.low, parameter.high))
-    left = value > 0.5 * (low + high)
-    label(axes, value - (error or 0) if left else value + (error or 0), height, reference.name,
-          ha="right" if left else "left", va="center", xytext=(-6 if left else 6, 0))  # fmt: skip
 
 
 def _window(parameter: DrawnParameter, heavy: NDArray[np.int64], marked: Sequence[float]) -> tuple[float, float]:
@@ -271,8 +260,6 @@ def draw_weights(weights: Array) -> Figure:
 
 # Pairs of parameters drawn together, the most correlated first: one row; strong correlations are told in words.
 PAIRS_DRAWN = 3
-# |r| [-] below which two parameters are said hardly to constrain each other: they share less than a tenth of variance.
-HARDLY_CORRELATED = 0.3
 # Letters beside a mark, with which the axes of a marginal keep nine tenths of their width.
 LONGEST_LABEL = 24
 # Share of their range within which values come near a bound: a figure ends there.
@@ -284,21 +271,29 @@ def pictures(run: Run) -> dict[str, list[Picture]]:
 
     A new figure of a part that exists is one more entry in its list; the template takes whatever it finds there.
     """
+    weights = draw_weights(run.posterior.sample.weights)
     return {
-        "marginals": [*(_marginal(run, name) for name in run.posterior.parameters), *_canopy_corrected(run)],
+        "marginals": [_marginal(run, row) for row in parameter_rows(run)],
         "joints": list(_joint_posteriors(run)),
         "plants": list(_plant_drag(run)),
         "residuals": list(residuals(run)),
         "verticals": list(verticals(run)),
         "canopy_and_discharge": [*canopy_profiles(run), *discharges(run)],
         "flow": [drawn for experiment in run.flow for drawn in plans(run, experiment)],
-        "health": [_weights(run)],
+        "health": [
+            published_picture(run, weights, "weights", "caption_weights", next(weight_statements(run.posterior)))
+        ],
     }
 
 
 def _drawn_parameter(run: Run, name: str) -> DrawnParameter:
     (low, high), logarithmic = run.posterior.marginals.bounds[name], as_power(run.posterior, name)
-    values, prior = run.posterior.sample.theta[name], _prior_values(run, name)
+    values = run.posterior.sample.theta[name]
+    if run.ensemble is not None:
+        prior = run.ensemble.parameters[name]
+    else:
+        assert run.posterior.refinement is not None  # without an ensemble nothing but draws is a posterior
+        prior = run.posterior.refinement.draws.prior_theta[name]
     return DrawnParameter(
         values,
         prior,
@@ -323,16 +318,8 @@ def range_of_figure(values: np.ndarray, bounds: tuple[float, float], logarithmic
     return float(low), float(high)
 
 
-def _prior_values(run: Run, name: str) -> np.ndarray:
-    """Members of the prior: those of the ensemble, or those that were drawn beside the posterior."""
-    if run.ensemble is not None:
-        return run.ensemble.parameters[name]
-    assert run.posterior.refinement is not None  # without an ensemble nothing but draws is a posterior
-    return run.posterior.refinement.draws.prior_theta[name]
-
-
 def references_of(run: Run, name: str) -> list[ReferenceValue]:
-    """Values of others that a figure marks: those that the table tells, and what a synthetic record was made with."""
+    """Values of others that a figure marks: those that the table has, and what a synthetic record was made with."""
     reference = run.case.reference
     if reference is None:
         return []
@@ -340,104 +327,67 @@ def references_of(run: Run, name: str) -> list[ReferenceValue]:
     if (stated := study_value(run.case, run.posterior, name)) is not None:
         on_axis, sd = stated
         value = 10.0**on_axis if as_power(run.posterior, name) else on_axis
-        found.append(ReferenceValue(_source(reference), value, sd, "D"))
+        source = shorten(reference.source, LONGEST_LABEL, placeholder="").rstrip(" ,;:") or "reference"
+        found.append(ReferenceValue(source, value, sd, "D"))
     if name in reference.made_with:
         found.append(ReferenceValue("made with", reference.made_with[name], np.nan, "X"))
     return found
 
 
-def _source(reference: Reference) -> str:
-    """Whose values they are: the first words of the source, as many as fit beside a mark."""
-    return shorten(reference.source, LONGEST_LABEL, placeholder="").rstrip(" ,;:") or "reference"
-
-
-def _marginal(run: Run, name: str) -> Picture:
-    canopy = run.posterior.canopy
-    references = [] if canopy is not None and canopy.parameter == name else references_of(run, name)
-    figure = draw_marginal(_drawn_parameter(run, name), run.posterior.sample.weights, references)
-    identified = identified_width(run.posterior, name)
-    caption = f"{symbol(run.case, name)} = {estimate(run.posterior, name)}: {identified}."
-    marked = ", ".join(reference.name for reference in references) or "nothing"
-    alt = f"Prior and posterior density of {name}; {identified}; marked: {marked}."
-    return published_picture(run, figure, f"posterior-{name}", caption, alt)
-
-
-def _canopy_corrected(run: Run) -> Iterator[Picture]:
-    """phi corrected to another canopy height, which is what values of others compare with."""
-    canopy = run.posterior.canopy
-    if canopy is None:
-        return
-    uncorrected = _drawn_parameter(run, canopy.parameter)
-    kept = (canopy.phi > 0) & np.isfinite(canopy.phi)
-    phi, weights = canopy.phi[kept], run.posterior.sample.weights[kept]
-    references = references_of(run, canopy.parameter)
-    marked = [reference.value for reference in references]
-    low, high = min([*marked, weighted_quantile(phi, weights, [0.001])[0]]), max([*marked, phi.max()])
-    prior = phi if np.array_equal(run.posterior.sample.theta[canopy.parameter], uncorrected.prior) else np.zeros(0)
-    drawn = replace(uncorrected, values=phi, prior=prior, low=low / 1.5, high=1.5 * high)
-    caption = (
-        f"{symbol(run.case, canopy.parameter)} corrected to a canopy of {canopy.to_height:g} m: "
-        f"10<sup>{plus_minus(canopy.log10_median, canopy.log10_sd)}</sup>."
-    )
-    figure = draw_marginal(drawn, weights, references)
-    yield published_picture(
-        run, figure, f"posterior-{canopy.parameter}-corrected", caption, "Density of the corrected plant drag."
-    )
+def _marginal(run: Run, row: ParameterRow) -> Picture:
+    name, posterior, canopy = row.parameter.name, run.posterior, run.posterior.canopy
+    drawn, references = _drawn_parameter(run, name), references_of(run, name)
+    if row.corrected is not None and canopy is not None:  # phi of another canopy height, which values of others are of
+        kept = (canopy.phi > 0) & np.isfinite(canopy.phi)
+        phi, weights = canopy.phi[kept], posterior.sample.weights[kept]
+        marked = [reference.value for reference in references]
+        low, high = min([*marked, weighted_quantile(phi, weights, [0.001])[0]]), max([*marked, phi.max()])
+        prior = phi if np.array_equal(posterior.sample.theta[name], drawn.prior) else np.zeros(0)
+        drawn = replace(drawn, values=phi, prior=prior, low=low / 1.5, high=1.5 * high)
+        figure = draw_marginal(drawn, weights, references)
+        return published_picture(run, figure, f"posterior-{name}-corrected", "caption_corrected", row)
+    if canopy is not None and canopy.parameter == name:
+        references = []
+    figure = draw_marginal(drawn, posterior.sample.weights, references)
+    sources = [reference.name for reference in references]
+    return published_picture(run, figure, f"posterior-{name}", "caption_marginal", row, sources)
 
 
 def _joint_posteriors(run: Run) -> Iterator[Picture]:
-    names = run.posterior.parameters
-    pairs = list(combinations(range(len(names)), 2))
-    pairs.sort(key=lambda pair: -abs(np.nan_to_num(run.posterior.marginals.correlation[pair])))
-    for i, j in pairs[:PAIRS_DRAWN]:
-        r = run.posterior.marginals.correlation[i, j]
+    posterior, symbols = run.posterior, symbols_of(run.case)
+    names, correlation = posterior.parameters, posterior.marginals.correlation
+    pairs = sorted(combinations(range(len(names)), 2), key=lambda pair: -abs(np.nan_to_num(correlation[pair])))
+    for pair in pairs[:PAIRS_DRAWN]:
+        one, other = (names[place] for place in pair)
         marks = [
             (first.name, first.value, second.value, first.marker.lower())
-            for first in references_of(run, names[i])
-            for second in references_of(run, names[j])
+            for first in references_of(run, one)
+            for second in references_of(run, other)
             if first.name == second.name
         ]
-        dependence = "rise together" if r > 0 else "trade off: one rises as the other falls"
-        if abs(r) < HARDLY_CORRELATED:
-            dependence = "hardly constrain each other"
-        finding = f" {dependence} (correlation {fixed(r, 2)})"
-        if not run.posterior.claimed:
-            finding = ": too few members to tell how they constrain each other"
-        figure = draw_joint(
-            _drawn_parameter(run, names[i]), _drawn_parameter(run, names[j]), run.posterior.sample.weights, marks
-        )
-        both = f"{symbol(run.case, names[i])} and {symbol(run.case, names[j])}"
-        caption = f"{both}{finding}. Area of a disc: weight of a member; grey: prior."
-        alt = f"Members in the plane of {names[i]} and {names[j]}, weighted by likelihood."
-        yield published_picture(run, figure, f"joint-{names[i]}-{names[j]}", caption, alt)
+        drawn = _drawn_parameter(run, one), _drawn_parameter(run, other)
+        figure = draw_joint(*drawn, posterior.sample.weights, marks)
+        both = parameter_of(posterior, one, symbols), parameter_of(posterior, other, symbols)
+        r = float(correlation[pair])
+        yield published_picture(run, figure, f"joint-{one}-{other}", "caption_joint", *both, r, posterior.claimed)
 
 
 def _plant_drag(run: Run) -> Iterator[Picture]:
-    name = plant_parameter(run.case)
-    if name is None or run.cylinder is None:
+    name, cylinder, posterior = plant_parameter(run.case), run.cylinder, run.posterior
+    if name is None or cylinder is None:
         return
-    drawn, posterior = _drawn_parameter(run, name), run.posterior
+    drawn = _drawn_parameter(run, name)
     corrected = posterior.canopy is not None and posterior.canopy.parameter == name
     inferred = posterior.canopy.phi if corrected and posterior.canopy else drawn.values
     kept = (inferred > 0) & np.isfinite(inferred)
     inferred, weights = inferred[kept], posterior.sample.weights[kept]
     spread = np.concatenate(
-        [weighted_quantile(inferred, weights, [0.005, 0.995]), np.quantile(run.cylinder.draws, [0.005, 0.995])]
+        [weighted_quantile(inferred, weights, [0.005, 0.995]), np.quantile(cylinder.draws, [0.005, 0.995])]
     )
     low, high = min(drawn.low, spread.min()), max(drawn.high, spread.max())
-    figure = draw_cylinder(inferred, weights, run.cylinder.draws, low, high, drawn.symbol)
-    ratio = float(weighted_quantile(inferred, weights, [0.5])[0]) / run.cylinder.quantile(0.5)
-    how = f"{short(ratio, 2)} times" if posterior.marginals.identified[name] else "not told apart from"
-    caption = (
-        f"Inferred plant drag{', corrected for canopy height,' if corrected else ''} is {how} that of rigid cylinders "
-        f"of the surveyed size, {plus_minus(run.cylinder.mean, run.cylinder.standard_deviation)} (medians compared)."
-    )
+    figure = draw_cylinder(inferred, weights, cylinder.draws, low, high, drawn.symbol)
+    ratio = float(weighted_quantile(inferred, weights, [0.5])[0]) / cylinder.quantile(0.5)
     yield published_picture(
-        run, figure, "plant-drag", caption, "Density of inferred plant drag beside that of rigid cylinders."
-    )
-
-
-def _weights(run: Run) -> Picture:
-    caption = weights_in_words(run.posterior, html_notation({}))[0]
-    figure = draw_weights(run.posterior.sample.weights)
-    return published_picture(run, figure, "weights", caption, "Cumulated weight of the members.")
+        run, figure, "plant-drag", "caption_plant_drag", posterior.marginals.identified[name], ratio, corrected,
+        cylinder.mean, cylinder.standard_deviation,
+    )  # fmt: skip

@@ -1,8 +1,6 @@
 """What one report is about: everything known of a run, and where in its channel things stand."""
 
-import html
 import re
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +25,7 @@ from vegglue.results.model_comparison import ModelComparison
 from vegglue.results.open_questions import Question
 from vegglue.results.posterior import Posterior
 from vegglue.whole_files import folder_within
+from vegglue.wording.sentences import page_phrase, phrase
 
 SYNTHETIC = "synthetic record"  # stamped on every figure of one
 LONGEST_FILE_NAME = 120  # letters: encrypted disks take 143, with the ending
@@ -74,23 +73,25 @@ class Run:
         own, first = self.diagnosis, self.loop.behind
         if own is None or first is None:
             return own or first
-        return first if _names_something(first) and not _has_calibrated(own) else own
+        calibrated = bool(own.steps or own.places or own.instruments or own.field)
+        return first if names_something(first) and not calibrated else own
 
     @property
     def before(self) -> Diagnosis | None:
         """The diagnosis of the model that the case extends, where that named something; None for a case of its own."""
         own, first = self.diagnosis, self.loop.behind
         other = first is not None and (own is None or own.name != first.name)
-        return first if first is not None and other and _names_something(first) else None
+        return first if first is not None and other and names_something(first) else None
 
 
-def _has_calibrated(found: Diagnosis) -> bool:
-    """Whether something was calibrated in; laws are only suspected, to first order."""
-    return bool(found.steps or found.places or found.instruments or found.field)
+def names_something(found: Diagnosis) -> bool:
+    """Whether it named a cause: one that was calibrated, or a law, which is only suspected to first order."""
+    return bool(found.steps or found.places or found.instruments or found.field or found.laws)
 
 
-def _names_something(found: Diagnosis) -> bool:
-    return _has_calibrated(found) or bool(found.laws)
+def accepted_causes(found: Diagnosis) -> str:
+    """What was taken into the model, places and effects, in words; '' for nothing."""
+    return phrase("accepted_causes", found.places, [step.accepted for step in found.steps])
 
 
 def is_synthetic(case: Case) -> bool:
@@ -99,29 +100,22 @@ def is_synthetic(case: Case) -> bool:
     return made_with or any(observation.synthetic for observation in case.observations)
 
 
-def command_about(run: Run, verb: str, *options: str) -> str:
-    """`vegglue VERB CONFIG` of the case of a run, to be copied (HTML)."""
-    return f"<code>vegglue {html.escape(shlex.join([verb, run.case.source.name, *options]))}</code>"
+def published_picture(run: Run, figure: Figure | str, name: str, caption: str, *values: object) -> Picture:
+    """A figure, or SVG text, as a file of the run and as a part of its page; caption: macro of its words."""
+    folder, text = folder_within(run.folder, "figures"), (page_phrase(caption, *values), phrase(caption, *values))
+    if isinstance(figure, str):
+        return publish_text(figure, folder, file_name(name), *text)
+    return publish(figure, folder, file_name(name), *text, SYNTHETIC if is_synthetic(run.case) else "")
 
 
-def published_picture(run: Run, figure: Figure, name: str, caption: str, alt: str) -> Picture:
-    """The figure as a file of the run and as a part of its page."""
-    return publish(figure, folder_within(run.folder, "figures"), file_name(name), caption, alt, stamp(run.case))
-
-
-def published_svg(run: Run, svg: str, name: str, caption: str, alt: str) -> Picture:
-    """A picture that is SVG text already, as a file of the run and as a part of its page."""
-    return publish_text(svg, folder_within(run.folder, "figures"), file_name(name), caption, alt)
-
-
-def file_name(words: str) -> str:
-    """Words as the name of a file, of a length that every disk takes: a user names experiments and sections. With a
+def file_name(text: str) -> str:
+    """A text as the name of a file, of a length that every disk takes: a user names experiments and sections. With a
     checksum where letters are lost that may be all that tells it from another.
     """
-    plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", words)
-    if words.isascii() and len(plain) <= LONGEST_FILE_NAME:
+    plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", text)
+    if text.isascii() and len(plain) <= LONGEST_FILE_NAME:
         return plain
-    return f"{plain[: LONGEST_FILE_NAME - 9]}-{crc32(words.encode(errors='replace')):08x}"
+    return f"{plain[: LONGEST_FILE_NAME - 9]}-{crc32(text.encode(errors='replace')):08x}"
 
 
 def stamp(case: Case) -> str:

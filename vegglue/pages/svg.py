@@ -12,7 +12,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.pages.style import COLOUR
-from vegglue.pages.typography import decimals, fixed
+from vegglue.wording.numbers import decimals, fixed
 
 Scale = Callable[[Any], Array]  # values to places [px]
 # A number this near to the left edge [px] begins there instead of standing amid its stroke.

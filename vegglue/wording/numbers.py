@@ -1,22 +1,44 @@
-"""How values show themselves where they are printed: a heading, and below it a few lines with units."""
+"""How numbers, units and symbols are written: as plain text, as HTML of the page and as mathtext of figures."""
 
+import html
 import math
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
-# Of a unit of time, from which it is told in the next: below two, whole ones may be off by more than a quarter.
+# Of a unit of time, from which the next one is used; below two of it, a whole number may be off by more than a quarter.
 LEAST_OF_A_UNIT = 2.0
 # Sizes up to which a number is written in full; beyond, as a power of ten.
 LARGEST_IN_FULL = 1e5
+NARROW = "\u202f"  # between a number and its unit, never broken
+FIRM = "\u00a0"  # a space at which a line must not break
+MINUS = "\u2212"
+# Parts of a symbol that mathtext draws as they are.
+LETTER, LOWERED = re.compile(r"[^\W_]+"), re.compile(r"(?:[^\W_]|[\[\] .,:+-])*")
+POWER = re.compile(r"\^\(?(-?[\d/.]+)\)?|(?<=[a-z])(\d)")  # in a unit: ^(-1/3), ^2, or the 3 of m3/s
+
+
+@dataclass(frozen=True)
+class Written:
+    """Something as it is written in plain text and, as HTML, on the page."""
+
+    plain: str
+    page: str
+
+    def __str__(self) -> str:
+        return self.plain
+
+    def __html__(self) -> str:
+        return self.page
 
 
 def in_short(heading: str, lines: Iterable[str]) -> str:
-    """The heading, and the lines that say something, indented below it."""
+    """The heading, and below it the lines that are not empty, indented."""
     return "\n".join([heading, *(f"  {line}" for line in lines if line)])
 
 
 def so_many(number: int, one: str, many: str = "") -> str:
-    """`1 station`, `1,024 stations`; many: where it is not the one with an s."""
+    """`1 station`, `1,024 stations`; many: if it is not the one with an s."""
     return f"{number:,} {one if number == 1 else many or one + 's'}"
 
 
@@ -33,7 +55,7 @@ def listed(parts: Sequence[str]) -> str:
 
 
 def without_asides(sentence: str) -> str:
-    """A sentence without what stands in round brackets, but for shares and chances, `(7%)`: for who reads one line."""
+    """A sentence without what stands in round brackets, except for shares and probabilities, `(7%)`."""
     shorter = re.sub(r"\s*\([^()%]*\)", "", sentence)
     return shorter if shorter == sentence else without_asides(shorter)
 
@@ -44,30 +66,16 @@ def experiments_in_words(names: Sequence[str]) -> str:
 
 
 def in_digits(value: float, digits: int = 3) -> str:
-    """A number to so many significant digits, for people: `0.00965`, `1500`, `1.5e+06`; every sentence and table of the
-    terminal that may hold a large one asks for it here, the page by `short` of figures/typography.
-    """
+    """A number to so many significant digits in plain text, `0.00965`, `1500`, `1.5e+06`; the page has `short`."""
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if "e+" in text and abs(float(text)) <= LARGEST_IN_FULL else text
 
 
 def chance_in_words(chance: float) -> str:
-    """A chance as a per cent, neither 0 nor 100 %: `under 1%`, `37%`, `over 99%`."""
+    """A chance as a per cent, neither 0 nor 100 %: `under 1 %`, `37 %`, `over 99 %`."""
     if chance < 0.01:
-        return "under 1%"
-    return "over 99%" if chance > 0.99 else f"{chance:.0%}"
-
-
-def odds_in_digits(odds: float) -> str:
-    """`30 to 1`, `1 to 3` below one, `over 1,000 to 1`."""
-    if odds < 1.0:
-        return f"1 to {1.0 / odds:.0f}" if odds > 0.001 else "1 to over 1,000"
-    return "over 1,000 to 1" if odds > 1000 else f"{odds:.0f} to 1"
-
-
-def place_in_digits(x: float, y: float) -> str:
-    """`x = 14.3, y = 1.5`, without what is NaN."""
-    return ", ".join(f"{name} = {in_digits(value, 4)}" for name, value in (("x", x), ("y", y)) if math.isfinite(value))
+        return "under 1 %"
+    return "over 99 %" if chance > 0.99 else f"{100 * chance:.0f} %"
 
 
 def range_in_digits(bounds: Sequence[float], digits: int = 3) -> str:
@@ -83,15 +91,114 @@ def section_in_words(name: str, x: float) -> str:
 
 
 def interval_in_short(name: str, value: float, low: float, high: float, unit: str = "") -> str:
-    """`phi: 8.1, 95 % 7.2 to 9.3`, with the unit behind unless it is none."""
+    """`phi: 8.1, 95 % 7.2 to 9.3`, with the unit at the end if there is one."""
     digits = telling_digits(low, high)
     middle, least, most = (in_digits(one, digits) for one in (value, low, high))
     return f"{name}: {middle}, 95 % {least} to {most} {unit.removesuffix('-')}".rstrip()
 
 
 def telling_digits(low: float, high: float) -> int:
-    """Significant digits of both ends of a range: three, more where these would not tell one end from the other."""
+    """Significant digits of both ends of a range: three, more if these would not tell one end from the other."""
     apart, largest = high - low, max(abs(low), abs(high))
     if not (math.isfinite(apart) and apart > 0.0):
         return 3
     return max(math.floor(math.log10(largest)) - math.floor(math.log10(apart)) + 1, 3)
+
+
+def decimals(scale: float, figures: int = 2) -> int:
+    """Decimal places that show `scale` to this many significant figures; 0 for scales above that."""
+    if not math.isfinite(scale) or scale == 0:
+        return 3
+    return max(figures - 1 - math.floor(math.log10(abs(scale)) + 1e-9), 0)
+
+
+def fixed(value: float, places: int) -> str:
+    """value with so many decimals and a true minus; an en dash if it is no number."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{round(value, places) + 0.0:.{places}f}".replace("-", MINUS)  # + 0.0 makes a negative zero positive
+
+
+def short(value: float, figures: int = 3) -> str:
+    """value to so many significant figures, never in E notation: powers of ten as 1.2·10⁻⁵."""
+    if not math.isfinite(value):
+        return "–"
+    if value != 0 and not 1e-3 <= abs(value) < 1e6:
+        power = math.floor(math.log10(abs(value)))
+        leading = fixed(value / 10**power, 1)
+        raised = str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return f"{'' if leading == '1.0' else leading + '·'}10{raised}"
+    return fixed(value, decimals(value, figures) if value else 0)
+
+
+def plus_minus(value: float, sd: float) -> str:
+    """value ± sd, both to two significant figures of sd; to one of them if value would have more than four."""
+    if not math.isfinite(sd):
+        return short(value)
+    places = min(decimals(sd), max(decimals(value, 4), decimals(sd, 1))) if value else decimals(sd)
+    return f"{fixed(value, places)}{FIRM}±{FIRM}{fixed(sd, places)}"
+
+
+def as_given(value: float, sd: float = math.nan) -> str:
+    """value ± sd of another study with the decimals they are stated with, no more."""
+    if not math.isfinite(sd):
+        return f"{value:g}".replace("-", MINUS)
+    places = max(len(f"{number:g}".partition(".")[2]) for number in (value, sd))
+    return f"{fixed(value, places)}{FIRM}±{FIRM}{fixed(sd, places)}"
+
+
+def decimals_between(low: float, high: float) -> int:
+    """Decimal places of both ends of a 95 % range and of what lies in it: two figures of its standard deviation."""
+    return decimals((high - low) / 4) if high > low else 3
+
+
+def interval(low: float, high: float) -> str:
+    """low to high, to as many decimals as their distance deserves."""
+    places = decimals_between(low, high)
+    return f"{fixed(low, places)} to {fixed(high, places)}"
+
+
+def percent(share: float) -> str:
+    """A share as '37 %'; small ones as '0.4 %' or '< 0.1 %'."""
+    if 0 < share < 0.0005:
+        return f"<{NARROW}0.1{NARROW}%"
+    return f"{fixed(100 * share, 0 if share >= 0.0995 or share == 0 else 1)}{NARROW}%"
+
+
+def symbol_html(symbol: str) -> str:
+    """n_b as n with a lowered b, the letter slanted; a name of words as it is."""
+    letter, _, lowered = symbol.partition("_")
+    if len(letter) > 1 and lowered:
+        return f"<code>{html.escape(symbol)}</code>"
+    return f"<var>{html.escape(letter)}</var>" + (f"<sub>{html.escape(lowered)}</sub>" if lowered else "")
+
+
+def symbol_math(symbol: str) -> str:
+    """The same for matplotlib's mathtext; a symbol with signs that mean something there is written as it is."""
+    letter, _, lowered = symbol.partition("_")
+    if not (LETTER.fullmatch(letter) and LOWERED.fullmatch(lowered)):
+        return no_formula(symbol)
+    return f"${letter}_{{{lowered}}}$" if lowered else f"${letter}$"
+
+
+def unit_html(unit: str) -> str:
+    """'s m^(-1/3)' or 'm3/s' with its powers raised; nothing for '-'."""
+    if unit == "-":
+        return ""
+    return POWER.sub(lambda power: f"<sup>{(power[1] or power[2]).replace('-', MINUS)}</sup>", html.escape(unit))
+
+
+def unit_math(unit: str) -> str:
+    """The same for matplotlib's mathtext, with a dash for what has no unit."""
+    return POWER.sub(lambda power: f"$^{{{power[1] or power[2]}}}$", no_formula(unit)) if unit != "-" else "–"
+
+
+def no_formula(text: str) -> str:
+    """Text as it is within mathtext."""
+    return text.replace("$", r"\$")
+
+
+def with_unit(value: float, unit: str, figures: int = 2) -> Written:
+    """A number and its unit."""
+    plain, page = ("", "") if unit in ("", "-") else (f" {unit}", f"{NARROW}{unit_html(unit)}")
+    return Written(f"{in_digits(value, figures)}{plain}", f"{short(value, figures)}{page}")

@@ -1,28 +1,45 @@
-"""Values as sentences: each class of findings has one macro of its own name in `templates/`."""
+"""Values as words: each class of values has one macro of its own name in `templates/`, for terminal and page."""
 
+import html
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
-from pathlib import PurePath
-from typing import Any
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
 
 from vegglue.errors import shown_path
 from vegglue.wording.numbers import (
+    NARROW,
+    Written,
+    as_given,
     chance_in_words,
+    decimals_between,
     duration_in_short,
     experiments_in_words,
+    fixed,
     in_digits,
+    interval,
     listed,
-    odds_in_digits,
-    place_in_digits,
+    percent,
+    plus_minus,
     range_in_digits,
     section_in_words,
+    short,
     so_many,
+    symbol_html,
     telling_digits,
-)  # fmt: skip
+    unit_html,
+    with_unit,
+)
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+# What every page has in it, by its name in the templates.
+INLINED = (("style", "page.css"), ("script", "sections.js"))
 
 
 def sentence(value: Any) -> str:
@@ -48,14 +65,39 @@ def sentence(value: Any) -> str:
     return phrase(tag_of(value), value)
 
 
+def sentences(values: Iterable[Any]) -> tuple[str, ...]:
+    """Render several values, without those that render to nothing."""
+    return tuple(text for text in map(sentence, values) if text)
+
+
+def page_sentence(value: Any) -> str:
+    """Render a value as HTML of the page by the same macro: symbols and units set as in print, commands as code."""
+    return as_code(html.escape(value)) if isinstance(value, str) else page_phrase(tag_of(value), value)
+
+
+def lines_of(value: Any) -> list[str]:
+    """Render a value that is laid out in several lines of plain text."""
+    return layout(tag_of(value), value).split("\n")
+
+
+def layout(macro: str, *values: Any) -> str:
+    """The macro of that name as it is laid out, in several lines of plain text."""
+    return "\n".join(line.rstrip() for line in str(macros()[macro](*values)).strip("\n").split("\n"))
+
+
 def phrase(macro: str, *values: Any) -> str:
-    """A part of a sentence: the macro of that name, rendered on one line."""
+    """A part of a sentence: the macro of that name, rendered on one line of plain text."""
     return " ".join(str(macros()[macro](*values)).split())
 
 
-def sentences(values: Any) -> tuple[str, ...]:
-    """Render several values, without those that render to nothing."""
-    return tuple(text for text in map(sentence, values) if text)
+def page_phrase(macro: str, *values: Any) -> str:
+    """The same as HTML of the page."""
+    return as_code(re.sub(r"[ \t\n]+", " ", str(macros(page=True)[macro](*values))).strip())
+
+
+def as_code(text: str) -> str:
+    """HTML with commands in `backticks` set as code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
 
 
 def tag_of(value: Any) -> str:
@@ -80,43 +122,79 @@ def tagged(value: Any) -> Any:
     return value
 
 
+def _listed(parts: Iterable[Any]) -> Written:
+    given = list(parts)
+    marked = [one.__html__() if hasattr(one, "__html__") else html.escape(str(one)) for one in given]
+    return Written(listed([str(one) for one in given]), listed(marked))
+
+
+# How templates write what they are given: plain text, and HTML of the page.
+WRITTEN_BY: dict[str, Callable[..., Any]] = {
+    "digits": lambda value, figures=3: Written(in_digits(value, figures), short(value, figures)),
+    "fixed": lambda value, places: Written(f"{round(value, places) + 0.0:.{places}f}", fixed(value, places)),
+    "quantity": with_unit,
+    "unit": lambda unit: with_unit_only(unit),
+    "percent": lambda share: Written(f"{100 * share:.0f} %", percent(share)),
+    "p_equals": lambda p: Written(
+        "p < 0.001" if p < 0.001 else f"p = {p:.2g}", f"p &lt;{NARROW}0.001" if p < 0.001 else f"p = {short(p, 2)}"
+    ),
+    "p_value": lambda p: Written(
+        "< 0.001" if p < 0.001 else f"{p:.2g}", f"&lt;{NARROW}0.001" if p < 0.001 else short(p, 2)
+    ),
+    "plus_minus": lambda value, sd: Written(
+        f"{in_digits(value, telling_digits(value - sd, value + sd))} ± {in_digits(sd, 2)}", plus_minus(value, sd)
+    ),
+    "power_of_ten": lambda value, sd: Written(f"10^({value:.2f} ± {sd:.2f})", f"10<sup>{plus_minus(value, sd)}</sup>"),
+    "as_given": lambda value, sd=float("nan"): as_given(value, sd),
+    "interval": lambda ends: Written(
+        " to ".join(f"{round(end, decimals_between(*ends)) + 0.0:.{decimals_between(*ends)}f}" for end in ends),
+        interval(*ends),
+    ),
+    "fixed_between": lambda value, ends: Written(
+        f"{round(value, decimals_between(*ends)) + 0.0:.{decimals_between(*ends)}f}",
+        fixed(value, decimals_between(*ends)),
+    ),
+    "symbol": lambda name, written="": Written(name, symbol_html(written or name)),
+    "code": lambda text: Written(text, f"<code>{html.escape(text)}</code>"),
+    "command": lambda text: Written(f"`{text}`", f"<code>{html.escape(text)}</code>"),
+    "strong": lambda text: Written(str(text), f"<b>{html.escape(str(text))}</b>"),
+    "link": lambda text, target: Written(text, f'<a href="{html.escape(target)}">{html.escape(text)}</a>'),
+    "bare_unit": lambda unit: Written(unit, unit_html(unit)),
+    "lower_first": lambda text: f"{str(text)[:1].lower()}{str(text)[1:]}",
+    "upper_first": lambda text: f"{str(text)[:1].upper()}{str(text)[1:]}",
+    "listed": _listed,
+    "many": so_many,
+    "chance": chance_in_words,
+    "experiments": experiments_in_words,
+    "path": shown_path,
+    "quoted": lambda names: [f"`{name}`" for name in names],
+    "range": range_in_digits,
+    "duration": duration_in_short,
+}
+
+
+def with_unit_only(unit: str) -> Written:
+    """A unit with the space before it; nothing for '-'."""
+    return Written("", "") if unit in ("", "-") else Written(f" {unit}", f"{NARROW}{unit_html(unit)}")
+
+
+def page_document(template: str, **values: Any) -> str:
+    """A page of `page/`, with the style and the script that all pages share."""
+    environment = _environment(page=True, folder="page")
+    shared = {name: (Path(__file__).parent / "page" / file).read_text(encoding="utf-8") for name, file in INLINED}
+    return environment.get_template(template).render(**shared, **values)
+
+
 @cache
-def macros() -> dict[str, Callable[..., str]]:
-    """All macros of all templates by name.
+def macros(page: bool = False) -> dict[str, Callable[..., str]]:
+    """All macros of all templates by name; page: those that write HTML.
 
     Raises
     ------
     ValueError
         If two templates define the same macro.
     """
-    # Jinja takes 50 ms to import, which a refused config need not wait for.
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("vegglue", "wording/templates"), undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True, autoescape=False,
-    )  # fmt: skip
-    environment.filters |= {
-        "digits": in_digits,
-        "listed": listed,
-        "many": so_many,
-        "duration": duration_in_short,
-        "chance": chance_in_words,
-        "odds": odds_in_digits,
-        "experiments": experiments_in_words,
-        "range": range_in_digits,
-        "path": shown_path,
-        "percent": lambda share: f"{share:.0%}",
-        "quoted": lambda names: [f"`{name}`" for name in names],
-    }
-    environment.globals |= {
-        "sentence": sentence,
-        "digits_of_range": telling_digits,
-        "section_at": section_in_words,
-        "place_at": place_in_digits,
-        "tag_of": tag_of,
-        "infinity": math.inf,
-    }
+    environment = _environment(page, "templates")
     found: dict[str, Callable[..., str]] = {}
     for name in environment.list_templates():
         for macro, render in vars(environment.get_template(name).module).items():
@@ -126,3 +204,23 @@ def macros() -> dict[str, Callable[..., str]]:
                 raise ValueError(f"{name}: expected each macro once, got {macro} again; rename one of the two.")
             found[macro] = render
     return found
+
+
+def _environment(page: bool, folder: str) -> "Environment":
+    # Jinja takes 50 ms to import, which a refused config need not wait for.
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("vegglue", f"wording/{folder}"), undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, autoescape=page,
+    )  # fmt: skip
+    environment.filters |= WRITTEN_BY
+    environment.globals |= {
+        "digits_of_range": telling_digits,
+        "sentence": (lambda value: Written(sentence(value), page_sentence(value))) if page else sentence,
+        "phrase": (lambda *given: Written(phrase(*given), page_phrase(*given))) if page else phrase,
+        "infinity": math.inf,
+        "section_at": section_in_words,
+        "tag_of": tag_of,
+    }
+    return environment

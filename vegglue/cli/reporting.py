@@ -1,33 +1,36 @@
-"""How a long command is heard: one line that moves on a terminal, a line now and then in a file or a pipe."""
+"""How a command reports: its progress in a moving line or in lines now and then, and its result in the end."""
 
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from vegglue.cli.output import console
+from vegglue.cli.output import console, print_object
 from vegglue.progress import Progress, Watch, silent
 from vegglue.wording.numbers import duration_in_short
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from vegglue.case.schema import Case
+
 # Seconds between two lines about one phase in a file or a pipe, at least: a log of an hour stays readable.
 BETWEEN_LINES = 10.0
-# Share [-] that is done, or seconds gone, before the time left is told: an inference begins with few draws a minute.
-LEFT_TOLD_FROM, LEFT_TOLD_AFTER = 0.02, 60.0
+# Share [-] that is done, or seconds gone, before the time left is printed: an inference begins with few draws a minute.
+LEFT_SHOWN_FROM, LEFT_SHOWN_AFTER = 0.02, 60.0
 # Terminals that cannot take a line back.
 PLAIN_TERMINALS = ("dumb", "unknown")
 
 
 @contextmanager
-def heard(quiet: bool, as_object: bool) -> Iterator[Watch]:
-    """Whoever watches a verb and tells the user. Nothing is told if quiet.
+def progress_reporter(quiet: bool, as_object: bool) -> Iterator[Watch]:
+    """What receives the progress of a verb and prints it; nothing if quiet.
 
-    Where standard output is kept for an object, a terminal is told on standard error, and nobody else.
+    If standard output is kept for an object, progress goes to standard error, and to a terminal only.
     """
     screen = sys.stderr if as_object else sys.stdout
     moving = screen.isatty() and os.environ.get("TERM") not in PLAIN_TERMINALS
@@ -67,23 +70,23 @@ def moving_line(screen: "Console") -> Iterator[Watch]:
         yield watch
 
 
-def now_and_then(say: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> Watch:
-    """Says a line when a phase begins, and within it at most one in BETWEEN_LINES seconds."""
-    timed, said_at, lock = with_pace(clock), -BETWEEN_LINES, Lock()
+def now_and_then(write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> Watch:
+    """Prints a line when a phase begins, and within it at most one in BETWEEN_LINES seconds."""
+    timed, written_at, lock = with_pace(clock), -BETWEEN_LINES, Lock()
 
     def watch(progress: Progress) -> None:
-        nonlocal said_at
+        nonlocal written_at
         with lock:  # phases of one command may run side by side
             new, pace = timed(progress)
-            if new or clock() - said_at >= BETWEEN_LINES:
-                say(f"... {progress}{pace}")
-                said_at = clock()
+            if new or clock() - written_at >= BETWEEN_LINES:
+                write(f"... {progress}{pace}")
+                written_at = clock()
 
     return watch
 
 
 def with_pace(clock: Callable[[], float] = time.monotonic) -> Callable[[Progress], tuple[bool, str]]:
-    """Tells of each progress whether its phase is new, and its rate and the time left in words."""
+    """Gives for each progress whether its phase is new, and its rate and the time left in words."""
     phase, began, first = "", 0.0, 0
 
     def timed(progress: Progress) -> tuple[bool, str]:
@@ -96,17 +99,26 @@ def with_pace(clock: Callable[[], float] = time.monotonic) -> Callable[[Progress
 
 
 def pace_in_words(progress: Progress, done: int, seconds: float) -> str:
-    """', 53 a second, 12 s left' after so many were done in so many seconds; nothing where that tells nothing."""
+    """', 53 a second, 12 s left' after so many were done in so many seconds; nothing if that is unknown."""
     if progress.total is None or done <= 0 or seconds <= 0.0:
         return ""
     rate, waiting = done / seconds, progress.total - progress.done
-    told = waiting > 0 and (done >= LEFT_TOLD_FROM * (done + waiting) or seconds >= LEFT_TOLD_AFTER)
-    return f", {_rate(rate)}, {duration_in_short(waiting / rate)} left" if told else f", {_rate(rate)}"
-
-
-def _rate(each_second: float) -> str:
-    """In the shortest span of time in which at least one is done."""
+    told = waiting > 0 and (done >= LEFT_SHOWN_FROM * (done + waiting) or seconds >= LEFT_SHOWN_AFTER)
+    # In the shortest span of time in which at least one is done.
     spans = ((1.0, "a second"), (60.0, "a minute"), (3600.0, "an hour"))
-    seconds, words = next((span for span in spans if each_second * span[0] >= 1.0), spans[-1])
-    count = each_second * seconds
-    return f"{count:,.0f} {words}" if count >= 10.0 else f"{count:.1f} {words}"
+    span, words = next((one for one in spans if rate * one[0] >= 1.0), spans[-1])
+    count = rate * span
+    pace = f", {count:,.0f} {words}" if count >= 10.0 else f", {count:.1f} {words}"
+    return f"{pace}, {duration_in_short(waiting / rate)} left" if told else pace
+
+
+def print_result(case: "Case", runs: Path, result: Any, as_object: bool, details: bool = False, more: str = "") -> None:
+    """Print a result of a verb, kept in runs/<name>/, as an object or in words."""
+    if as_object:
+        from vegglue.cli.objects import object_of
+
+        print_object(object_of(case, runs, result))
+    else:
+        from vegglue.cli.printed import show
+
+        show(case, runs, result, details, more)

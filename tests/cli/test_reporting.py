@@ -6,7 +6,7 @@ import sys
 import pytest
 from rich.console import Console
 
-from vegglue.cli.hearing import heard, moving_line, now_and_then, pace_in_words
+from vegglue.cli.reporting import moving_line, now_and_then, pace_in_words, progress_reporter
 from vegglue.progress import Progress, Watch, counted
 
 
@@ -75,10 +75,10 @@ class Terminal(io.StringIO):
 def test_an_object_has_standard_output_for_itself(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], quiet: bool
 ) -> None:
-    with heard(quiet, as_object=True) as watch:
+    with progress_reporter(quiet, as_object=True) as watch:
         watch(Progress("calibrating"))
     assert capsys.readouterr() == ("", "")
-    with heard(quiet, as_object=False) as watch:
+    with progress_reporter(quiet, as_object=False) as watch:
         watch(Progress("calibrating"))
     assert capsys.readouterr() == ("" if quiet else "... calibrating\n", "")
 
@@ -87,6 +87,6 @@ def test_a_terminal_that_takes_no_line_back_gets_lines(monkeypatch: pytest.Monke
     screen = Terminal()
     monkeypatch.setattr(sys, "stdout", screen)
     monkeypatch.setenv("TERM", "dumb")
-    with heard(quiet=False, as_object=False) as watch:
+    with progress_reporter(quiet=False, as_object=False) as watch:
         watch(Progress("calibrating"))
     assert screen.getvalue() == "... calibrating\n"
