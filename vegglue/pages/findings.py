@@ -40,7 +40,7 @@ class CylinderCompared:
     sd: float
     median: float
     ratio: float | None
-    undergrowth: float
+    undergrowth: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,8 @@ def _cylinders(run: Run) -> Iterator[CylinderCompared]:
     median = cylinder.quantile(0.5)
     ratio = inferred / median if posterior.marginals.identified[name] else None
     parameter = parameter_of(posterior, name, symbols_of(run.case))
-    yield CylinderCompared(parameter, cylinder.mean, cylinder.standard_deviation, median, ratio, cylinder.undergrowth_density)
+    size = cylinder.mean, cylinder.standard_deviation, median
+    yield CylinderCompared(parameter, *size, ratio, cylinder.undergrowth_density)
 
 
 def _canopy_heights(run: Run) -> Iterator[CanopyHeightRead]:
