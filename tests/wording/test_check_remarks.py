@@ -1,0 +1,131 @@
+"""Remarks of checks as they are printed: a person read `check_remarks.txt` once, and each change is to be read again.
+
+`PYTHONPATH=tests python tests/wording/test_check_remarks.py` writes the file anew.
+"""
+
+import re
+from pathlib import Path
+
+from vegglue.diagnosis.channel_check import (
+    BankLawHeld,
+    BeyondGrid,
+    CanopyEmergent,
+    CanopyUnlikeMeasured,
+    ErrorsRefused,
+    PatchAreaMissed,
+    PatchWithoutCells,
+    SteepCellsLikeFloor,
+    UnitOfPrior,
+)
+from vegglue.diagnosis.effect_contract import Breach, ContractRule
+from vegglue.diagnosis.flow_check import (
+    ComponentsExchanged,
+    FlowUpstream,
+    GridEndInBend,
+    LevelsRiseDownstream,
+    OutletAboveGauge,
+    OutletDry,
+    SectionsUpstream,
+    Supercritical,
+    VelocitiesTurned,
+)
+from vegglue.diagnosis.station_check import (
+    AxesExchanged,
+    PlacesInOtherUnit,
+    SharedPlaces,
+    StationsOnLand,
+    StationsOnMap,
+    StationsOnPatchEdge,
+    StationsOutsideGrid,
+)
+from vegglue.diagnosis.vertical_check import (
+    ErrorsAcrossPlants,
+    HeightsExchanged,
+    HeightsFromSurface,
+    HeightsTakenForLevels,
+    PointsOutsideWater,
+)
+from vegglue.measurements.adv_section import DeadProbe
+from vegglue.measurements.kinds import UnstatedErrors
+from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues, Symptom
+from vegglue.measurements.section_discharge import CarriedDischarge, DischargeMismatch
+from vegglue.wording.sentences import macros, sentence, tag_of
+
+FILE = Path(__file__).with_suffix("").parent / "check_remarks.txt"
+BEYOND = BeyondGrid("y", (4.0, 9.0), (-5.0, 5.0), False)
+CARRIED = CarriedDischarge("low", "D0", 36.0, 2.07, (1.9, 2.24), (1.4, 1.4), 0.85, 17, True)
+UNSTATED = UnstatedErrors((("velocity", 1), ("level", 2)), (8.0, 2.0), ("u_se",), ("level_se",), (0.015, "m/s"))
+
+
+def values(symptom: Symptom, unit: str = "", size: float = 101.0, count: int = 5) -> ImplausibleValues:
+    level = symptom in (Symptom.LEVEL_UNIT, Symptom.DATUM, Symptom.BELOW_BED, Symptom.HIGH, Symptom.LOW)
+    quantity, instrument, si_unit = ("level", "gauge", "m") if level else ("velocity", "probe", "m/s")
+    places = (("low", "G1"), ("mid", None)) if level else (("low", "D0"),)
+    return ImplausibleValues(quantity, instrument, si_unit, symptom, unit, size, count, 15, (47.7, 20.0, -2.0), places)
+
+
+EXAMPLES = [
+    *(values(one, size=0.65) for one in Symptom),
+    values(Symptom.FAST, "cm/s", count=15),
+    values(Symptom.MISSING_MARK, count=1),
+    values(Symptom.LEVEL_UNIT, "ft", 2.2, 1),
+    ImplausibleOutlet("June", 95.0, 95.0, 9.0, 0.0024),
+    DischargeMismatch((CARRIED, CARRIED)),
+    DeadProbe(25, 0.009, 0.48, 0.004, 0.068),
+    UNSTATED,
+    ErrorsRefused(("infer", "diagnose", "run"), UNSTATED),
+    PatchWithoutCells("p1", True, None),
+    PatchWithoutCells("p1", False, BEYOND),
+    PatchAreaMissed("p1", 20.0, 4.0, BEYOND),
+    SteepCellsLikeFloor(0.36, 0.2),
+    CanopyEmergent("reed", (0.7, 1.4), ("low", "mid"), (0.85, 1.1), False, "constant"),
+    CanopyUnlikeMeasured("D3", "D3b", 1.06, "willow", (0.8, 0.8)),
+    BankLawHeld("bank", 5.0, True, 0.54, 1.3, (("low", 0.5), ("mid", 0.29))),
+    UnitOfPrior("d", "cm/s", "zero_offset", "offset", "m/s"),
+    GridEndInBend(False, 25.0),
+    OutletDry("dry", -0.5, 0.04, False),
+    Supercritical("June", 0.05, 1.7),
+    OutletAboveGauge(36.0, 4.0, (("low", 0.95, 0.05), ("mid", 1.05, 0.03))),
+    ComponentsExchanged(("low", "high"), 0.01, 0.33),
+    FlowUpstream(("low",), -0.4, False),
+    SectionsUpstream("June", ("A", "B"), -0.2),
+    LevelsRiseDownstream(("low", "high"), (0.4, 0.41), 20.0, 38.0),
+    VelocitiesTurned("right", ("low",), (12.2,), 3, (("high", 0.2),)),
+    StationsOutsideGrid("low", 2, (-1.0, 0.0)),
+    StationsOnLand("low", 1, (12.0, 4.6), 0.34, True),
+    SharedPlaces("velocity", "low", 2, (12.0, -0.7), ("A", "B")),
+    AxesExchanged(4, (-1.0, 12.0)),
+    StationsOnMap((683132.0, 247479.0)),
+    PlacesInOtherUnit(4, 6, (65.6168, -3.28084), "ft"),
+    StationsOnPatchEdge("D3", "p1", (4.0, 5.5)),
+    HeightsFromSurface(4, 4, (20.0, -1.0)),
+    HeightsExchanged(Path("velocities.csv"), "z", 4, 4, (30.0, -1.0)),
+    HeightsTakenForLevels("points.csv", ("low",), (0.051,), 5.0, 35.0, 0.03, "z [mm]"),
+    PointsOutsideWater(2, ("s20",), ("low",), "below the bed", (20.0, -1.0), -0.1, 1.04, False),
+    ErrorsAcrossPlants((("low", "D3"),), (0.03, 0.03), (0.002, 0.004), (0.005, 0.005)),
+    Breach(ContractRule.OFF_IS_OFF, "strength", water="moving"),
+    Breach(ContractRule.POWER, "strength", (2,)),
+]
+
+
+def rendered() -> str:
+    return "".join(f"{tag_of(one)}: {sentence(one)}\n" for one in EXAMPLES)
+
+
+def test_remarks_are_worded_as_they_were_read() -> None:
+    assert rendered() == FILE.read_text(encoding="utf-8")
+
+
+def test_programs_are_no_persons() -> None:
+    persons = re.compile(r"\b(who|whoever|nobody|tells?|told|says?|said|hears?|heard|asks?|asked|speaks?)\b", re.I)
+    assert [line for line in rendered().splitlines() if persons.search(line)] == []
+
+
+def test_every_rule_and_symptom_has_words() -> None:
+    assert {rule for rule in ContractRule if not sentence(Breach(rule, "c", (1.0, 2.0, 3.0), "still"))} == set()
+    assert len({sentence(values(one)).partition(": ")[2] for one in Symptom}) == len(Symptom)
+    assert {"no_parameters", "outlet_without_cells", "parameter_idle"} <= macros().keys()
+
+
+if __name__ == "__main__":
+    FILE.write_text(rendered(), encoding="utf-8")
