@@ -8,8 +8,11 @@ import pytest
 from reach import COARSE, said_to, write_reach
 
 from vegglue.case.config import load_case
+from vegglue.case.grid import build_grid
 from vegglue.case.schema import Case
 from vegglue.errors import InputError
+from vegglue.flow.sensor import FlowFields
+from vegglue.results.field_exports import write_mesh
 from vegglue.workflow.export import Exported, export
 
 FRAME = "frame: {origin: [683120.0, 247480.0], angle: 32.0, crs: EPSG:2056}\n"
@@ -83,6 +86,50 @@ def test_a_missing_library_is_named_before_anything_is_solved(done: Done, monkey
     with pytest.raises(InputError, match=r"the library xarray, .* 'vegglue\[field\]'`, or choose --only csv"):
         export(done[0], runs=done[2].parent.parent, forms=("netcdf",), watch=told.append)
     assert told == []
+
+
+def test_map_programs_find_texts_vectors_and_the_system(done: Done) -> None:
+    """As QGIS's reader of meshes wants it: text of fixed length, `, x-component` and `, y-component`, nodes on a map."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(done[2] / "flow.nc") as file:
+        texts = 0
+        for owner in (file, *file.values()):
+            for name in owner.attrs:
+                info = h5py.check_string_dtype(owner.attrs.get_id(name).dtype)
+                assert info is None or info.length is not None, name
+                texts += info is not None
+        assert texts > 40
+        called = {name: str(np.char.decode(np.bytes_(one.attrs.get("long_name", b"")))) for name, one in file.items()}
+        assert "_FillValue" not in file["node_x"].attrs
+    mesh = pytest.importorskip("xarray").load_dataset(done[2] / "flow.nc", engine="h5netcdf", decode_coords=False)
+    for east, north in (("east_velocity_june", "north_velocity_june"),):
+        assert called[east].endswith(", x-component")
+        assert called[east].removesuffix("x-component") == called[north].removesuffix("y-component")
+    assert not called["u_june"].endswith("component"), "along a turned grid it is no component on the map"
+    for name in mesh["mesh"].attrs["node_coordinates"].split():
+        assert mesh[name].attrs["grid_mapping"] == "map"
+    assert mesh["map"].attrs["epsg_code"] == "EPSG:2056"
+    assert "\nparameters:" in mesh.attrs["config"]
+
+
+def test_without_a_map_the_velocity_along_the_grid_is_the_vector(done: Done, tmp_path: Path) -> None:
+    xarray, grid = pytest.importorskip("xarray"), build_grid(done[0])
+    flow = FlowFields(grid.x, grid.y, *(np.full((grid.x.size, grid.y.size), one) for one in (0.0, 1.0, 1.0, 0.4, 0.1)))
+    write_mesh(tmp_path / "flow.nc", {"June °": flow}, grid, None, {"title": "über"})
+    mesh = xarray.load_dataset(tmp_path / "flow.nc", engine="h5netcdf")
+    names = [mesh[name].attrs["long_name"] for name in mesh if str(name)[:2] in ("u_", "v_")]
+    assert names == ["velocity, June °, x-component", "velocity, June °, y-component"]
+    assert mesh.attrs["title"] == "über"
+    assert "grid_mapping" not in mesh["node_x"].attrs | mesh["node_x"].encoding
+
+
+def test_stations_have_what_the_model_gives_there(done: Done) -> None:
+    """At the middle of the priors, as nothing was inferred; apart from the nearest cell by what a coarse cell spans."""
+    table, cells = pd.read_csv(done[2] / "stations.csv"), at_cells(done)
+    assert table["predicted"].between(0.0, cells["u [m/s]"].max() + 0.02).all()
+    nearest = [((cells["x [m]"] - x) ** 2 + (cells["y [m]"] - y) ** 2).idxmin()
+               for x, y in zip(table["x [m]"], table["y [m]"], strict=True)]  # fmt: skip
+    np.testing.assert_allclose(table["predicted"], cells["u [m/s]"].to_numpy()[nearest], atol=0.15)
 
 
 def test_another_library_opens_the_mesh(done: Done) -> None:

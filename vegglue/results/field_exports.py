@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import h5py
 import numpy as np
 
 from vegglue.arrays import Array
@@ -26,6 +27,7 @@ TRANSFORMATION, GEO_KEYS, MARKS_NO_DATA = 34264, 34735, 42113
 # Keys: a projected model, pixels as areas, the code of the system.
 MODEL_TYPE, RASTER_TYPE, PROJECTED = 1024, 1025, 3072
 NO_LEVEL_THERE = -9999.0
+LONGEST_ATTRIBUTE = 60_000  # bytes of a text of fixed length; HDF5 has room for 64 KiB
 
 
 def write_geotiff(path: Path, values: Array, grid: Grid, frame: Frame | None) -> None:
@@ -116,21 +118,35 @@ def write_mesh(
 ) -> None:
     """Write the fields of all experiments, one variable for each quantity and experiment, u_June; NaN where dry.
 
+    For map programs all text has a fixed length, the components of the velocity on the map have long names that make
+    them a vector, and nodes name the coordinate system: QGIS's reader of meshes finds these in no other way.
+
     Errors: InputError without xarray; StorageError.
     """
     xarray = extra_library("xarray", "field", "vegglue export")
     extra_library(ENGINE, "field", "vegglue export")
     variables, called = _mesh(grid, frame), names_in_files(flows)
+    on_map = ("u", "v") if frame is None and grid.centreline is None else ("east_velocity", "north_velocity")
     for experiment, flow in flows.items():
         for name, values in quantities(flow, grid, frame).items():
             words, unit = QUANTITIES_OF_FLOW[name]
-            at_faces = {"mesh": "mesh", "location": "face", "coordinates": "face_x face_y", "grid_mapping": "map"}
-            told = {"long_name": f"{words}, {experiment}", "units": unit, **at_faces}
+            long_name = f"{words}, {experiment}"
+            if name in on_map:
+                long_name = f"velocity, {experiment}, {'xy'[on_map.index(name)]}-component"
+            at_faces = {"mesh": "mesh", "location": "face", "coordinates": "face_x face_y", **_mapped(frame)}
+            told = {"long_name": long_name, "units": unit, **at_faces}
             variables[f"{name}_{called[experiment]}"] = ("face", values.ravel(), told)
     dataset = xarray.Dataset(variables, attrs={"Conventions": "CF-1.8 UGRID-1.0", **attributes})
     with failed_writes_told(path, MAKE_ROOM), TemporaryDirectory() as folder:  # the library writes to a name only
         whole = Path(folder) / path.name
-        dataset.to_netcdf(whole, engine=ENGINE)
+        coordinates = {name: {"_FillValue": None} for name in ("node_x", "node_y", "face_x", "face_y")}
+        dataset.to_netcdf(whole, engine=ENGINE, encoding=coordinates)
+        with h5py.File(whole, "r+") as file:
+            for owner in (file, *file.values()):
+                for name, text in list(owner.attrs.items()):
+                    size = len(text.encode()) if isinstance(text, str) else 0
+                    if 0 < size < LONGEST_ATTRIBUTE:
+                        owner.attrs.create(name, text.encode(), dtype=h5py.string_dtype("utf-8", size))
         content = whole.read_bytes()
     write_file(path, content, MAKE_ROOM)
 
@@ -152,10 +168,10 @@ def _mesh(grid: Grid, frame: Frame | None) -> dict[str, Any]:
     return {
         "mesh": ((), np.int32(0), topology),
         "map": ((), np.int32(0), _system(frame)),
-        "node_x": ("node", node_x, _axis("x")),
-        "node_y": ("node", node_y, _axis("y")),
-        "face_x": ("face", face_x, _axis("x")),
-        "face_y": ("face", face_y, _axis("y")),
+        "node_x": ("node", node_x, _axis("x") | _mapped(frame)),
+        "node_y": ("node", node_y, _axis("y") | _mapped(frame)),
+        "face_x": ("face", face_x, _axis("x") | _mapped(frame)),
+        "face_y": ("face", face_y, _axis("y") | _mapped(frame)),
         "face_nodes": (("face", "corner"), corners.astype(np.int32), nodes),
     }
 
@@ -167,6 +183,10 @@ def _placed(x: Array, y: Array, grid: Grid, frame: Frame | None) -> tuple[Array,
 
 def _axis(name: str) -> dict[str, str]:
     return {"standard_name": f"projection_{name}_coordinate", "units": "m"}
+
+
+def _mapped(frame: Frame | None) -> dict[str, str]:
+    return {} if frame is None else {"grid_mapping": "map"}
 
 
 def _system(frame: Frame | None) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from vegglue.case.resolved_config import case_hash, resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.case.text_files import names_in_files
 from vegglue.diagnosis.comparison import without_stations
+from vegglue.engine.interface import linearise
 from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
@@ -92,7 +93,7 @@ def export(
 
 
 def flow_to_export(run: CaseRun) -> tuple[dict[str, FlowFields], Array | None, str]:
-    """The flow by experiment, predictions at the stations if they are kept, and whose parameters these are."""
+    """The flow by experiment, predictions at the stations, None if no flow is found, and whose parameters these are."""
     case, folder = run.case, run.folder
     sized = run.of(as_solved(case, folder))
     wanted = sized.config_hash
@@ -106,4 +107,5 @@ def flow_to_export(run: CaseRun) -> tuple[dict[str, FlowFields], Array | None, s
     words = "the middle of the priors" if best is None else "the best fit that was found"
     if (folder / "posterior.h5").exists():
         words += ", as the posterior that is kept is of another state of the config or its data"
-    return solve_flow(case, theta), None, words
+    point = linearise(run.model, z)
+    return solve_flow(case, theta), None if point is None else point.prediction, words
