@@ -105,7 +105,7 @@ def effects_command(
     for key, entry in ({} if case is None else case.effects).items():
         if case is not None and (entry.effect or key) == name:
             of = {one: case.parameters[one].distribution for one in entry.values.values() if isinstance(one, str)}
-            values = [(shape, value, of.get(value, "")) for shape, value in entry.values.items()]
+            values = [(shape, value, of.get(str(value), "")) for shape, value in entry.values.items()]
             limits = [(kind, getattr(entry, kind) or ()) for kind in ("experiments", "sections", "devices")]
             doing.append(phrase("effect_in_case", case.name, key, values, limits))
     if case is not None and not doing:

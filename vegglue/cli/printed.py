@@ -140,7 +140,7 @@ def wrapped(paragraphs: Iterable[str], width: int = TERMINAL_WIDTH) -> list[str]
     """Each paragraph in lines of so many letters, all but its first indented; names, and numbers with what belongs to
     them, stay whole.
     """
-    look = {"subsequent_indent": "  ", "break_long_words": False, "break_on_hyphens": False}
+    look: dict[str, Any] = {"subsequent_indent": "  ", "break_long_words": False, "break_on_hyphens": False}
     kept = (KEPT_TOGETHER.sub(FIRM, text) for text in paragraphs)
     return [line.replace(FIRM, " ") for text in kept for line in textwrap.wrap(text, width, **look)]
 

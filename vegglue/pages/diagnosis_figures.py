@@ -276,9 +276,9 @@ def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture
     wide += [*place_picture(run, diagnosis), *field_picture(run, diagnosis)]
     if diagnosis.misfit.worst is not None:
         worst, size = diagnosis.misfit.worst
-        said = worst["experiment"], worst["section"], worst["zone"], size, diagnosis.errors.scale
+        missed = worst["experiment"], worst["section"], worst["zone"], size, diagnosis.errors.scale
         narrow.append(
-            published_picture(run, draw_zones(diagnosis.misfit.zones), "missing-zones", "caption_zones", *said)
+            published_picture(run, draw_zones(diagnosis.misfit.zones), "missing-zones", "caption_zones", *missed)
         )
     if len(screening.compared) > 1:
         families = [group for group in alike_groups(screening.compared, screening.cosine) if len(group) > 1]

@@ -323,7 +323,8 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
     gauges, levels = None, rows[rows["kind"] == WATER_LEVEL]
     if len(levels):
         low, high = run.posterior.predicted.model_band[[0, -1]][:, levels.index.to_numpy()]
-        gauges = Gauges(*(levels[name].to_numpy(float) for name in ("x", "value", "standard_error")), low, high)
+        x, value, error = (levels[name].to_numpy(float) for name in ("x", "value", "standard_error"))
+        gauges = Gauges(x, value, error, low, high)
     drawn = draw_plan(flow, patches, stations, gauges, note)
     wet = np.isfinite(flow.depth).any(axis=1)
     level, depth = np.nanmean(flow.level[wet], axis=1), np.nanmax(flow.depth[wet], axis=1)

@@ -64,9 +64,8 @@ def suspects_a_law_only(found: Diagnosis) -> bool:
 def verdict_fit(found: Diagnosis) -> VerdictFit:
     """How well the first and the last model fit what they were calibrated to."""
     both, misfit = (found.predictions.first, found.predictions.last), found.misfit
-    velocity, level = (
-        tuple(rms_residual(found, each, kind) for each in both) for kind in (STREAMWISE, WATER_LEVEL)
-    )
+    velocity = rms_residual(found, both[0], STREAMWISE), rms_residual(found, both[1], STREAMWISE)
+    level = rms_residual(found, both[0], WATER_LEVEL), rms_residual(found, both[1], WATER_LEVEL)
     chi2 = misfit.chi2_first, misfit.chi2
     return VerdictFit(found.changed, velocity, level, chi2, misfit.freedom, misfit.p, found.errors.scale)
 

@@ -93,8 +93,9 @@ def _paint_errors(
     for name, (line, _, colour, thick) in LINES.items():
         face = COLOUR["paper" if name == "held_out_experiments" else colour]
         size = 10 if line[0] in "*_" else 5.5
-        look = {"color": COLOUR[colour], "linewidth": thick, "markersize": size, "markerfacecolor": face}
-        axes.plot(place, known[name], line, **look)
+        axes.plot(
+            place, known[name], line, color=COLOUR[colour], linewidth=thick, markersize=size, markerfacecolor=face
+        )
     held = known["held_out_sections"]
     axes.errorbar(place, held, np.nan_to_num(spread), fmt="none", ecolor=COLOUR["model"], elinewidth=1.1, capsize=3)
     for x, value in zip(place, held, strict=True):
@@ -104,8 +105,10 @@ def _paint_errors(
     lowest, right = -np.inf, place[-1]
     for (words, colour), value in sorted(ends.items(), key=lambda one: one[1]):
         lowest = max(value, lowest + 0.065 * top)  # names are pushed apart that would cover each other
-        look = {"fontsize": SMALL + 0.5, "color": COLOUR[colour], "va": "center", "annotation_clip": False}
-        axes.annotate(words, (right + 0.32, lowest), **look)
+        axes.annotate(
+            words, (right + 0.32, lowest), fontsize=SMALL + 0.5, color=COLOUR[colour], va="center",
+            annotation_clip=False,
+        )  # fmt: skip
         axes.plot([right + 0.05, right + 0.3], [value, lowest], color=COLOUR["rule"], linewidth=0.7)
     axes.set(ylim=(0, 1.12 * top), xlim=(0.6, len(models) + 0.9), ylabel="velocity error, RMSE [m/s]")
     letters = max(int(LETTERS_PER_INCH * width / (len(models) + 1)), 12)

@@ -194,8 +194,10 @@ def _side_by_side(folder: Path, name: str, runs: Sequence[Run]) -> Picture:
         stated = study_value(run.case, posterior, name)
         if reference is not None and stated is not None:
             reach, powers = 0.0 if math.isnan(stated[1]) else BOTH_SIDES * stated[1], as_power(posterior, name)
-            ends = (stated[0] - reach, stated[0], stated[0] + reach)
-            drawn = DrawnInterval(*(10.0**one if powers else one for one in ends), others=True)
+            least, middle, most = (
+                10.0**end if powers else end for end in (stated[0] - reach, stated[0], stated[0] + reach)
+            )
+            drawn = DrawnInterval(least, middle, most, others=True)
             of_others.setdefault((reference.source, drawn), []).append(run.case.name)
         if reference is not None and name in reference.made_with:
             made = float(reference.made_with[name])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.special
@@ -110,10 +111,11 @@ def posterior_verdict(case: Case, posterior: Posterior) -> PosteriorVerdict:
     at_bound = [name for name in named if pressed_bounds(posterior, name)]
     known = [name for name in named if posterior.marginals.identified[name] and name not in at_bound]
     unknown = [name for name in named if name not in {*known, *at_bound}]
-    groups = (tuple(named[name] for name in group) for group in (known, at_bound, unknown))
+    sure, bound, unsure = (tuple(named[name] for name in group) for group in (known, at_bound, unknown))
     kind = next(iter(posterior.fit.rmse))
     return PosteriorVerdict(
-        *groups, posterior.fit.used, posterior.claimed, posterior.weighting.effective_size, posterior.sample.members,
+        sure, bound, unsure, posterior.fit.used, posterior.claimed, posterior.weighting.effective_size,
+        posterior.sample.members,
         residual_compared(posterior, kind, posterior.fit.rmse[kind]),
     )  # fmt: skip
 
@@ -191,7 +193,7 @@ def as_power(posterior: Posterior, name: str) -> bool:
     return name in posterior.marginals.log10_median and bool(high > 10 * low)
 
 
-def _compared(run: Run, name: str, centre: float, sd: float, powers: bool) -> dict[str, object]:
+def _compared(run: Run, name: str, centre: float, sd: float, powers: bool) -> dict[str, Any]:
     """Values of others, and how far off centre ± sd lies (log10 if powers)."""
     stated = study_value(run.case, run.posterior, name)
     known = (run.case.reference.made_with if run.case.reference else {}).get(name)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -91,13 +92,13 @@ def paint_places(axes: Axes, x: Array, y: Array, score: Array, term: str, marks:
         for sign, colour, line in ((1.0, "model", "solid"), (-1.0, "measured", "dashed")):
             faces = [to_rgba(COLOUR[colour], shade) for shade in SHADES]
             axes.contourf(along, across, sign * shown, levels=quarters, colors=faces)
-            look = {"colors": COLOUR[colour], "linewidths": 0.7, "linestyles": line}
+            look: dict[str, Any] = {"colors": COLOUR[colour], "linewidths": 0.7, "linestyles": line}
             axes.contour(along, across, sign * shown, levels=quarters[:-1], **look)
         text = f"steps of {fixed(0.25 * full, 1)} standard errors; largest {fixed(largest, 1)}"
         axes.text(1.0, 1.02, text, transform=axes.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
         for place, line, sign, colour in ((0.0, "━", 1, "model"), (0.28, "╌", -1, "measured")):
-            acting, look = phrase("acting", term, sign), {"fontsize": SMALL, "color": COLOUR[colour]}
-            axes.text(place, 1.02, f"{line} {acting} here would help", transform=axes.transAxes, **look)
+            acting = f"{line} {phrase('acting', term, sign)} here would help"
+            axes.text(place, 1.02, acting, transform=axes.transAxes, fontsize=SMALL, color=COLOUR[colour])
     _paint_marks(axes, marks)
     if len(marks.aside):
         axes.text(0.56, 1.02, "× excluded", transform=axes.transAxes, fontsize=SMALL, color=COLOUR["ink"])

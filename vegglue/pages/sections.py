@@ -108,7 +108,7 @@ def draw_panel(panel: SectionPanel, values: tuple[float, float], unit: str, note
     across, down = linear_scale(*ends, PANEL_LEFT, PANEL_RIGHT), linear_scale(*values, PANEL_LOWEST, PANEL_TOP)
 
     def line(path: str, colour: str, width: float, **look: object) -> str:
-        return svg_element("path", d=path, stroke=COLOUR[colour], stroke_width=width, **look)
+        return svg_element("path", "", d=path, stroke=COLOUR[colour], stroke_width=width, **look)
 
     # The bed in a strip below, and the plants as shaded stretches through the panel.
     ground = panel.ground
@@ -124,7 +124,7 @@ def draw_panel(panel: SectionPanel, values: tuple[float, float], unit: str, note
         left, right = map(float, across(np.clip([y[start] - 0.5 * step, y[stop] + 0.5 * step], *ends)))
         box = {"x": left, "y": PANEL_TOP, "width": right - left, "height": PANEL_BED_FOOT - PANEL_TOP}
         look = {"text_anchor": "middle", "font_size": 10}
-        parts.append(svg_element("rect", fill=COLOUR["plants"], opacity=0.45, **box))
+        parts.append(svg_element("rect", "", fill=COLOUR["plants"], opacity=0.45, **box))
         parts.append(svg_words(0.5 * (left + right), PANEL_BED_TOP + 8, "plants", "stems", **look))
     # Axes.
     ticks = round_ticks(*values, PANEL_TICKS)
@@ -166,7 +166,7 @@ def draw_panel(panel: SectionPanel, values: tuple[float, float], unit: str, note
     cursor = line(f"M0,{PANEL_TOP:g}V{PANEL_BED_FOOT:g}", "ink", 0.8)
     for name, colour in (("measured", "measured"), ("before", "muted"), ("after", "model")):
         ring = {"r": RING, "fill": "none", "stroke": COLOUR[colour], "stroke_width": 1.8}
-        cursor += svg_element("circle", class_=name, **ring)
+        cursor += svg_element("circle", "", class_=name, **ring)
     parts.append(svg_element("g", cursor, class_="cursor", visibility="hidden"))
     parts.append(svg_words(0.0, 13.0, within_width(panel.title, PANEL_TITLE, PANEL_LETTERS), font_weight="bold"))
     corner = {"font_size": NOTE_LETTERS, "text_anchor": "end"}

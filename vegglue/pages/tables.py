@@ -80,7 +80,8 @@ def station_rows(run: Run) -> list[StationRow]:
 def run_health(run: Run) -> RunHealth:
     """By what the numbers of a run are trusted or not."""
     ensemble, posterior = run.ensemble, run.posterior
-    bounds = ((name, *map(float, posterior.marginals.bound_mass[name])) for name in posterior.parameters)
+    ends = {name: posterior.marginals.bound_mass[name] for name in posterior.parameters}
+    bounds = [(name, float(low), float(high)) for name, (low, high) in ends.items()]
     mass = tuple(one for one in bounds if not np.isnan(one[1:]).all())  # NaN: its prior has no bounds
     weights, sample = posterior.weighting, posterior.sample
     shared = (weights.effective_size, sample.members, weights.largest_weight, weights.pareto_k)
