@@ -66,8 +66,7 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
     # The compiler takes settings from the working folder, which may be a stranger's, and runs the code they name.
     if not trust and Path(COMPILER_SETTINGS).exists():
         raise InputError(
-            f"{COMPILER_SETTINGS}: can make numba run code of a stranger: remove it, or add --trust if you "
-            "trust it."
+            f"{COMPILER_SETTINGS}: can make numba run code of a stranger: remove it, or add --trust if you trust it."
         )
     layers = _layers(path, ())
     file, layer = layers[0]

@@ -115,7 +115,10 @@ def unsolved(header: Header) -> dict[str, Group]:
         "section": np.array([name for name, _ in header.sections], object),
     }
     sizes = {dim: len(values) for dim, values in coordinates.items()}
-    rows = {name: _filled(row, sizes) for name, row in ROWS.items()}
+    rows = {
+        name: Variable(row.dims, np.full([sizes[dim] for dim in row.dims], row.fill, row.type), row.unit)
+        for name, row in ROWS.items()
+    }
     rows["section_x"] = Variable(("section",), np.array([x for _, x in header.sections], float), "m")
     parameters = {name: Variable(("member",), values, header.units[name]) for name, values in header.parameters.items()}
     progress = {
@@ -130,10 +133,6 @@ def unsolved(header: Header) -> dict[str, Group]:
         "stations": table_group(header.station, "station", STATION_UNITS),
         "progress": Group({"chunk": np.arange(header.chunks)}, progress),
     }
-
-
-def _filled(row: Stored, sizes: Mapping[str, int]) -> Variable:
-    return Variable(row.dims, np.full([sizes[dim] for dim in row.dims], row.fill, row.type), row.unit)
 
 
 def ensemble_from(groups: Mapping[str, Mapping[str, np.ndarray]], attributes: Mapping[str, Any]) -> Ensemble:

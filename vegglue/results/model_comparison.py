@@ -81,7 +81,7 @@ def model_score_from(tree: Mapping[str, Any]) -> ModelScore:
         name=str(tree["name"]),
         title=str(tree["title"]),
         effects=tuple(tree["effects"]),
-        values={name: _interval(*value) for name, value in tree["values"].items()},
+        values={name: (number_kept(a), number_kept(b), number_kept(c)) for name, (a, b, c) in tree["values"].items()},
         in_sample=InSample(
             rmse={kind: number_kept(seen["rmse"][kind]) for kind in KINDS},
             chi2=number_kept(seen["chi2"]),
@@ -98,10 +98,6 @@ def model_score_from(tree: Mapping[str, Any]) -> ModelScore:
         homogeneity={name: number_kept(p) for name, p in tree["homogeneity"].items()},
         validation=number_kept(tree["validation"]),
     )
-
-
-def _interval(value: float | None, low: float | None, high: float | None) -> tuple[float, float, float]:
-    return number_kept(value), number_kept(low), number_kept(high)
 
 
 # Errors of a step, which may be unknown.
@@ -147,12 +143,9 @@ def comparison_from(tree: Mapping[str, Any]) -> ModelComparison:
 
     Errors: KeyError, TypeError or ValueError where it is none.
     """
-    steps = tuple(_step_from(step) for step in tree["steps"])
-    return ModelComparison(
-        steps, int(tree["left_out"]), str(tree["reason"]), str(tree["verdict"]), tuple(map(str, tree["unclear"]))
-    )
-
-
-def _step_from(step: Mapping[str, Any]) -> ComparedModel:
-    errors = {name: number_kept(step[name]) for name in ERRORS}
-    return ComparedModel(**{**step, **errors, "added": tuple(step["added"])})
+    steps = []
+    for step in tree["steps"]:
+        errors = {name: number_kept(step[name]) for name in ERRORS}
+        steps.append(ComparedModel(**{**step, **errors, "added": tuple(step["added"])}))
+    reason, verdict, unclear = str(tree["reason"]), str(tree["verdict"]), tuple(map(str, tree["unclear"]))
+    return ModelComparison(tuple(steps), int(tree["left_out"]), reason, verdict, unclear)

@@ -33,10 +33,22 @@ PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement, "transfer": Transf
 
 def posterior_groups(posterior: Posterior) -> dict[str, Group]:
     """All groups of posterior.h5: those ArviZ knows, `members` with every array, `stations` with the whole table."""
-    named = _named_coordinates(posterior)
-    own = {name: _group(part, named) for name, part in ({"members": posterior} | _parts(posterior)).items()}
-    own["stations"] = table_group(posterior.station, "station", STATION_UNITS)
-    return own | _arviz_groups(posterior)
+    names = np.array(posterior.parameters, object)
+    named = {
+        "parameter": names,
+        "other_parameter": names,
+        "log_parameter": np.array(list(posterior.marginals.log10_median), object),
+        "kind": np.array(list(posterior.fit.sigma), object),
+        "level": np.array(LEVELS),
+        "side": np.array(["low", "high"], object),
+    }
+    groups = {}
+    for name, part in ({"members": posterior} | _parts(posterior)).items():
+        own = _variables(part)
+        sizes = {dim: size for each in own.values() for dim, size in zip(each.dims, each.values.shape, strict=True)}
+        groups[name] = Group({dim: named.get(dim, np.arange(size)) for dim, size in sizes.items()}, own)
+    groups["stations"] = table_group(posterior.station, "station", STATION_UNITS)
+    return groups | _arviz_groups(posterior)
 
 
 def posterior_attributes(posterior: Posterior) -> dict[str, Any]:
@@ -48,7 +60,13 @@ def posterior_attributes(posterior: Posterior) -> dict[str, Any]:
 
 
 def posterior_from(read: Mapping[str, Mapping[str, np.ndarray]], stated: Mapping[str, Any]) -> Posterior:
-    """The posterior whose file has these groups and attributes."""
+    """The posterior whose file has these groups and attributes.
+
+    Raises
+    ------
+    KeyError, ValueError
+        If a part is missing or does not fit, weights do not sum to 1, a draw is no member, or a kind is unknown.
+    """
     station, parameters = stations_from(read["stations"]), names_of(read["members"], "parameter")
     sizes = {"member": stated_as(int, stated, "members"), "station": len(station), "level": len(LEVELS), "side": 2}
     sizes |= {"parameter": len(parameters), "other_parameter": len(parameters)}
@@ -59,12 +77,6 @@ def posterior_from(read: Mapping[str, Mapping[str, np.ndarray]], stated: Mapping
         name: kind(**_fields_from(kind, read[name], stated, f"{name}_")) for name, kind in PARTS.items() if name in read
     }
     posterior = Posterior(**_fields_from(Posterior, read["members"], stated), station=station, **parts)
-    _refuse_what_cannot_be(posterior)
-    return posterior
-
-
-def _refuse_what_cannot_be(posterior: Posterior) -> None:
-    """Errors: ValueError where parameters or weights are none, a draw is no member, or a kind is unknown."""
     drawn, sample = posterior.predicted.draws, posterior.sample
     if not all((np.abs(values) <= LARGEST_PARAMETER).all() for values in sample.theta.values()):
         raise ValueError("theta holds what no parameter can be")
@@ -74,6 +86,7 @@ def _refuse_what_cannot_be(posterior: Posterior) -> None:
         raise ValueError("a draw is no member")
     if not set(posterior.fit.sigma) <= set(KINDS):
         raise ValueError("an error is of no kind of observation")
+    return posterior
 
 
 def _parts(posterior: Posterior) -> dict[str, Any]:
@@ -107,7 +120,12 @@ def _attributes(value: Any) -> dict[str, Any]:
 
 def _variables(value: Any) -> dict[str, Variable]:
     """Arrays of a value and of the values in it, by name."""
-    own = {name: _variable(getattr(value, name), stored) for name, stored in stored_fields(type(value)).items()}
+    own = {}
+    for name, stored in stored_fields(type(value)).items():
+        array = getattr(value, name)
+        values = np.array(list(array.values()) if isinstance(array, dict) else array)
+        empty = isinstance(array, dict) and not array
+        own[name] = Variable(stored.dims, np.zeros((0,) * len(stored.dims)) if empty else values, stored.unit)
     for name in _values_in(type(value)):
         own |= _variables(getattr(value, name))
     return own
@@ -121,37 +139,12 @@ def _fields_from(kind: type, group: Mapping[str, np.ndarray], stated: Mapping[st
     return own | {name: inner(**_fields_from(inner, group, stated, prefix)) for name, inner in _values_in(kind).items()}
 
 
-def _group(value: Any, named: Mapping[str, np.ndarray]) -> Group:
-    variables = _variables(value)
-    sizes = {dim: size for each in variables.values() for dim, size in zip(each.dims, each.values.shape, strict=True)}
-    return Group({dim: named.get(dim, np.arange(size)) for dim, size in sizes.items()}, variables)
-
-
-def _variable(value: Any, stored: Stored) -> Variable:
-    values = list(value.values()) if isinstance(value, dict) else value
-    shape = None if not isinstance(value, dict) or value else (0,) * len(stored.dims)
-    return Variable(stored.dims, np.zeros(shape) if shape else np.array(values), stored.unit)
-
-
 def _array(group: Mapping[str, np.ndarray], name: str, stored: Stored, hint: Any) -> Any:
     if get_origin(hint) is not dict:
         return group[name]
     entry = get_args(hint)[1]
     convert = entry if entry in (str, float, bool) else np.asarray
     return {key: convert(value) for key, value in zip(names_of(group, stored.dims[0]), group[name], strict=True)}
-
-
-def _named_coordinates(posterior: Posterior) -> dict[str, np.ndarray]:
-    """What stands along the dimensions whose entries have a name or a value; the others are counted from 0."""
-    names = np.array(posterior.parameters, object)
-    return {
-        "parameter": names,
-        "other_parameter": names,
-        "log_parameter": np.array(list(posterior.marginals.log10_median), object),
-        "kind": np.array(list(posterior.fit.sigma), object),
-        "level": np.array(LEVELS),
-        "side": np.array(["low", "high"], object),
-    }
 
 
 def _arviz_groups(posterior: Posterior) -> dict[str, Group]:

@@ -37,7 +37,6 @@ from vegglue.results.hdf5 import (
     write_to_grow,
     write_whole,
 )
-from vegglue.results.layout import Group
 from vegglue.whole_files import NOT_FOLLOWED, failed_writes_told, lock
 
 
@@ -236,29 +235,45 @@ def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
     part, unfinished = part_file(path), unfinished_fields(path.parent, header)
     with hold_lock(path.parent):
         kept = _kept_rows(part, header) if unfinished is None or is_reserved(unfinished) else None
-        set_aside = _set_aside(part) if kept is None and _is_there(part) else None
-        _lay_out(part, unfinished, header, kept)
+        set_aside = None
+        if kept is None and (part.exists() or part.is_symlink()):
+            with failed_writes_told(part, f"remove {part} and run the same command again"):
+                set_aside = part.replace(part.with_name(part.name + ".old"))
+        # All room a run needs, the fields first: a part of an ensemble without its fields cannot be.
+        if unfinished is not None and kept is None:
+            with failed_writes_told(unfinished.path, WRITTEN_STAYS):
+                reserve(unfinished)
+        # What an earlier run has kept is laid out anew as well: nothing is ever written into a file as it was found.
+        groups = unsolved(header)
+        for name, rows in (kept or {}).items():
+            own = dict(groups[name].variables)
+            for key, values in rows.items():
+                own[key] = replace(own[key], values=np.asarray(values, own[key].values.dtype))
+            groups[name] = replace(groups[name], variables=own)
+        write_to_grow(part, groups, _attributes(header))
         with open_hdf5(part, "r+") as file:
             writer = EnsembleWriter(file, part, set_aside, unfinished)
             yield writer
             complete = len(writer.done) == header.chunks
-            _refuse_replaced(file, part)
+            # Locks of some network disks do not reach other machines.
+            mine = os.fstat(file.id.get_vfd_handle())
+            there = part.stat() if part.exists() else None
+            if there is None or (there.st_dev, there.st_ino) != (mine.st_dev, mine.st_ino):
+                raise StorageError(
+                    f"{part}: was replaced by another run, on a machine that the lock of this one does not reach; wait "
+                    "for that run to end, then give the same command again."
+                )
         if complete:
             with failed_writes_told(path, WRITTEN_STAYS):
-                _finish(path, unfinished, header)
-
-
-def _refuse_replaced(file: h5py.File, part: Path) -> None:
-    """Errors: StorageError when the open file is no longer the one of its name: locks of some network disks do not
-    reach other machines, and another run has begun there.
-    """
-    mine = os.fstat(file.id.get_vfd_handle())
-    there = part.stat() if part.exists() else None
-    if there is None or (there.st_dev, there.st_ino) != (mine.st_dev, mine.st_ino):
-        raise StorageError(
-            f"{part}: was replaced by another run, on a machine that the lock of this one does not reach; wait for "
-            "that run to end, then give the same command again."
-        )
+                # Fields before the ensemble, which stands for both: a run killed in between only has this to do again.
+                if unfinished is not None:
+                    group = fields_group(unfinished.window, header.experiments, all_fields(unfinished))
+                    own_words = {"format": FIELDS_FORMAT, "range": unfinished.window.range}
+                    write_whole(path.with_name("fields.h5"), {"fields": group}, _attributes(header) | own_words)
+                append_digest(part)
+                os.replace(part, path)
+                if unfinished is not None:
+                    unfinished.path.unlink()
 
 
 def remove_left_over_fields(path: Path) -> None:
@@ -284,82 +299,29 @@ def begun_or_finished(path: Path) -> bool:
     return path.exists() or part_file(path).exists()
 
 
-def _lay_out(part: Path, unfinished: UnfinishedFields | None, header: Header, kept: KeptRows | None) -> None:
-    """All room a run will need, the fields first: a part of an ensemble without its fields cannot be.
-
-    What an earlier run has kept is laid out anew as well: nothing is ever written into a file as it was found.
-    """
-    if unfinished is not None and kept is None:
-        with failed_writes_told(unfinished.path, WRITTEN_STAYS):
-            reserve(unfinished)
-    groups = unsolved(header) if kept is None else _with_rows(unsolved(header), kept)
-    write_to_grow(part, groups, _attributes(header))
-
-
-def _finish(path: Path, unfinished: UnfinishedFields | None, header: Header) -> None:
-    """Fields before the ensemble, which stands for both: a run killed in between only has this to do again."""
-    if unfinished is not None:
-        group = fields_group(unfinished.window, header.experiments, all_fields(unfinished))
-        own = {"format": FIELDS_FORMAT, "range": unfinished.window.range}
-        write_whole(path.with_name("fields.h5"), {"fields": group}, _attributes(header) | own)
-    append_digest(part_file(path))
-    os.replace(part_file(path), path)
-    if unfinished is not None:
-        unfinished.path.unlink()
-
-
 def _kept_rows(part: Path, header: Header) -> KeptRows | None:
     """What is stored of members and progress by a run of exactly this header; None where there is no such file."""
     if part.is_symlink():
         return None
+    growing, groups = {key for keys in GROWING.values() for key in keys}, unsolved(header)
     try:
         with open_hdf5(part, "r") as file:
             if any(file.attrs[name] != value for name, value in _attributes(header).items()):
                 return None
             kept = {name: {key: file[name][key][...] for key in keys} for name, keys in GROWING.items()}
-            groups = unsolved(header)
             for name, rows in kept.items():
                 if any(values.shape != groups[name].variables[key].values.shape for key, values in rows.items()):
                     return None
-            return kept if all(_is_laid_out(file[name], group) for name, group in groups.items()) else None
+            for name, group in groups.items():  # whether it holds the values that do not change
+                laid_out = {**group.coordinates, **{key: one.values for key, one in group.variables.items()}}
+                for key in laid_out.keys() - growing:
+                    found, values = read_values(file[name][key]), np.asarray(laid_out[key])
+                    text = values.dtype.kind in "OUS"
+                    if not ((found == values).all() if text else np.array_equal(found, values, equal_nan=True)):
+                        return None
+            return kept
     except UNREADABLE:
-        pass
-    return None
-
-
-def _is_laid_out(stored: h5py.Group, group: Group) -> bool:
-    """Whether a group holds the values that do not change."""
-    growing = {key for keys in GROWING.values() for key in keys}
-    values = {**group.coordinates, **{key: one.values for key, one in group.variables.items()}}
-    return all(_equal(read_values(stored[name]), np.asarray(values[name])) for name in values.keys() - growing)
-
-
-def _with_rows(groups: Mapping[str, Group], kept: KeptRows) -> dict[str, Group]:
-    """The groups with the values of the rows kept."""
-
-    def filled(group: Group, rows: Mapping[str, np.ndarray]) -> Group:
-        variables = {
-            key: replace(group.variables[key], values=np.asarray(values, group.variables[key].values.dtype))
-            for key, values in rows.items()
-        }
-        return replace(group, variables={**group.variables, **variables})
-
-    return {name: filled(group, kept[name]) if name in kept else group for name, group in groups.items()}
-
-
-def _equal(found: np.ndarray, values: np.ndarray) -> bool:
-    return bool(
-        (found == values).all() if values.dtype.kind in "OUS" else np.array_equal(found, values, equal_nan=True)
-    )
-
-
-def _is_there(path: Path) -> bool:
-    return path.exists() or path.is_symlink()
-
-
-def _set_aside(part: Path) -> Path:
-    with failed_writes_told(part, f"remove {part} and run the same command again"):
-        return part.replace(part.with_name(part.name + ".old"))
+        return None
 
 
 def _digest(arrays: Sequence[np.ndarray]) -> int:
