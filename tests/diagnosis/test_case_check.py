@@ -3,14 +3,13 @@
 import re
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from field_folders import CHANNEL, JUNE, folder_of
 from sound_case import ROWS, SOUND, found_in, odd, read_case
 
 import vegglue
-from vegglue.calibration import baseline
+from vegglue.calibration.baseline import baseline
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
 from vegglue.diagnosis import channel_check, effect_contract, flow_check, station_check, vertical_check
@@ -19,6 +18,7 @@ from vegglue.diagnosis.channel_check import BankLawHeld, CanopyUnlikeMeasured, M
 from vegglue.diagnosis.flow_check import ComponentsExchanged, FlowUpstream, LevelsRiseDownstream
 from vegglue.diagnosis.station_check import StationsOnLand, StationsOnPatchEdge
 from vegglue.diagnosis.vertical_check import PointsOutsideWater
+from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements import kinds, plausibility, section_discharge
 from vegglue.measurements.adv_section import ABOVE_SURFACE
@@ -150,12 +150,11 @@ def test_a_survey_on_land_is_a_warning_of_every_command(tmp_path, dry, doubtful)
     assert [one.most for one in found_in(remarks, StationsOnLand)] == [doubtful]
 
 
-def test_a_model_without_any_flow_is_refused(monkeypatch):
-    monkeypatch.setattr(baseline, "linearise", lambda *_: None)
-    monkeypatch.setattr(baseline, "in_threads", lambda work, tasks: [None for _ in tasks])
-    model = SimpleNamespace(names=("n_b",), case=SimpleNamespace(name="brook"))
-    with pytest.raises(InputError, match=r"brook: .*vegglue check"):
-        baseline._starts(model, None)
+@pytest.mark.slow
+def test_a_model_without_any_flow_is_refused(tmp_path):
+    case, _, observations = read_case(tmp_path, SOUND.replace("level: 1.0}", "level: -0.5}"))
+    with pytest.raises(InputError, match=r"sound: .*`vegglue check`"):
+        baseline(model_of(case, observations))
 
 
 @pytest.mark.parametrize("name", ["d0", "d3a"])

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from vegglue.arrays import Array
 from vegglue.case.case_effects import effect_of
 from vegglue.case.channel_geometry import expected_depth, patches_present
 from vegglue.case.config import values
@@ -260,12 +259,16 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[object]:
         corners = corners_of(case, patch)
         area, share = area_of(corners), share_in_patch(case, patch, site.grid)
         covered, hidden = float(share.sum() * cell), int(((share > 0.5) & (site.patch != index)).sum())
-        beyond = _beyond_grid(case, corners)
+        beyond = None
+        for axis, along, (low, high) in reversed([*zip("xy", corners.T, (case.grid.x, case.grid.y), strict=True)]):
+            first, last = float(along.min()), float(along.max())
+            if first < low or last > high:
+                beyond = BeyondGrid(axis, (first, last), (low, high), last <= low or first >= high)
         if not share.any():
             on_map = False
             if case.frame is not None:
-                along, across = case.frame.to_model(*corners.mean(axis=0))
-                on_map = bool(x[0] <= along <= x[-1] and y[0] <= across <= y[-1])
+                at_x, at_y = case.frame.to_model(*corners.mean(axis=0))
+                on_map = bool(x[0] <= at_x <= x[-1] and y[0] <= at_y <= y[-1])
             yield PatchWithoutCells(patch.name, on_map, beyond)
         elif abs(covered - area) > LARGEST_MISS * area:
             yield PatchAreaMissed(patch.name, area, covered, beyond)
@@ -275,15 +278,6 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[object]:
             yield PatchHidden(patch.name, hidden)
     unused = case.plants.stands.keys() - {patch.stand for patch in case.plants.patches}
     yield from map(StandUnused, sorted(unused))
-
-
-def _beyond_grid(case: Case, corners: Array) -> BeyondGrid | None:
-    """corners of a patch (k, 2) [m]."""
-    for axis, across, (low, high) in zip("xy", corners.T, (case.grid.x, case.grid.y), strict=True):
-        first, last = float(across.min()), float(across.max())
-        if first < low or last > high:
-            return BeyondGrid(axis, (first, last), (low, high), last <= low or first >= high)
-    return None
 
 
 def remarks_on_bed(case: Case, site: Site) -> Iterator[object]:

@@ -375,11 +375,21 @@ def _rising(case: Case, observations: Observations) -> dict[str, tuple[float, fl
 
 
 def remarks_on_turned_velocities(case: Case, observations: Observations) -> Iterator[VelocitiesTurned]:
-    """Experiments whose velocities are turned to one side at nearly all sections; none with odd directions besides."""
+    """Experiments whose velocities are turned to one side at nearly all sections, by more than chance makes; none with
+    odd directions besides.
+    """
+
+    def to_one_side(angles: Array) -> bool:
+        if len(angles) < FEWEST_CROSSED:
+            return False
+        mean, error = float(angles.mean()), float(angles.std(ddof=1)) / float(np.sqrt(len(angles)))
+        alike = int((np.sign(angles) == np.sign(mean)).sum())
+        return abs(mean) > max(LEAST_ANGLE, SURE_OF_AN_ANGLE * error) and alike >= MOST_ON_ONE_SIDE * len(angles)
+
     odd = misdirected(case, observations)
     by = {name: rows for name, rows in _by_experiment(case, observations).items() if name not in odd}
     angles = {name: _section_angles(rows) for name, rows in by.items()}
-    turned = {name: one for name, one in angles.items() if _to_one_side(one.to_numpy())}
+    turned = {name: one for name, one in angles.items() if to_one_side(one.to_numpy())}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         ones = {name: one for name, one in turned.items() if sign * one.mean() > 0.0}
         sections = {section for one in ones.values() for section in one.index}
@@ -403,12 +413,3 @@ def _section_angles(rows: pd.DataFrame) -> "pd.Series[float]":
     wide = sums[sums[("value_along", "size")] >= FEWEST_OF_A_MEAN]
     angles = np.arctan2(wide[("value_across", "sum")].to_numpy(float), wide[("value_along", "sum")].to_numpy(float))
     return pd.Series(np.degrees(angles), index=wide.index)
-
-
-def _to_one_side(angles: Array) -> bool:
-    """Whether angles (section,) [degrees] have one sign nearly all, and a mean that chance does not make."""
-    if len(angles) < FEWEST_CROSSED:
-        return False
-    mean, error = float(angles.mean()), float(angles.std(ddof=1)) / float(np.sqrt(len(angles)))
-    alike = int((np.sign(angles) == np.sign(mean)).sum())
-    return abs(mean) > max(LEAST_ANGLE, SURE_OF_AN_ANGLE * error) and alike >= MOST_ON_ONE_SIDE * len(angles)

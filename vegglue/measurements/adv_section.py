@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.bed import bed_levels
@@ -236,13 +235,20 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame, gauges: 
             f"{'whether heights and `u` are exchanged, ' if exchanged else ''}x, y, the water levels, and `floor`, "
             "`surface` and `offset` of the observation."
         )
+    # In plants of the experiment, at least EDGE inside their patch.
+    present, line = case.experiments[str(observation.experiment)].plants, centreline_in(case)
+    plants = np.zeros(len(y), dtype=bool)
+    for patch in case.plants.patches:
+        if present is True or (present and patch.name in present):
+            sides = [Grid(np.array([x]), y + side, 1.0, 1.0, line) for side in (-EDGE, EDGE)]
+            plants |= np.logical_and(*(cells_of_patch(patch, grid)[0] for grid in sides))
     return points.assign(
         experiment=observation.experiment,
         section=observation.section,
         bed=bed,
         depth=surface - bed,
         height=points["z"] - bed,
-        plants=_among_plants(case, observation, x, y),
+        plants=plants,
         used=reason == "",
         reason=reason,
     )
@@ -295,19 +301,6 @@ def _local_bed(case: Case, experiment: str, x: float, y: Array) -> Array:
 def _across(case: Case) -> Array:
     low, high = case.grid.y
     return np.arange(low + GRID_STEP / 2.0, high, GRID_STEP)
-
-
-def _among_plants(case: Case, observation: Observation, x: float, y: Array) -> NDArray[np.bool_]:
-    """Whether the verticals at y stand in plants of the experiment, at least EDGE inside their patch."""
-    present = case.experiments[str(observation.experiment)].plants
-    patches = [patch for patch in case.plants.patches if present is True or (present and patch.name in present)]
-    result, line = np.zeros(len(y), dtype=bool), centreline_in(case)
-    for patch in patches:
-        left, right = (
-            cells_of_patch(patch, Grid(np.array([x]), y + side, 1.0, 1.0, line))[0] for side in (-EDGE, EDGE)
-        )
-        result |= left & right
-    return result
 
 
 def _column(points: pd.DataFrame) -> Column:

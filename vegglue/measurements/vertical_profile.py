@@ -4,7 +4,7 @@ Heights count from the bed [m]; arrays have shape (points,), sorted upwards. The
 stands in `linear_average`, the rule `profile` in `fit_log_law` and `fit_two_layers`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -164,7 +164,7 @@ def fit_log_law(column: Column) -> ProfileFit | None:
     fewer than FEWEST_POINTS points, or the velocity does not rise with height.
     """
     tops = np.geomspace(SMOOTHEST_BED * column.depth, 0.9 * column.height[-1], HEIGHTS_TRIED)
-    return _fit(column, tops, _through_zero, within_free=False)
+    return _fit(column, tops, within_free=False)
 
 
 def fit_two_layers(column: Column) -> ProfileFit | None:
@@ -176,7 +176,7 @@ def fit_two_layers(column: Column) -> ProfileFit | None:
     """
     if len(column.height) < FEWEST_POINTS:
         return None
-    return _fit(column, np.linspace(column.height[1], column.height[-2], HEIGHTS_TRIED), _with_offset, within_free=True)
+    return _fit(column, np.linspace(column.height[1], column.height[-2], HEIGHTS_TRIED), within_free=True)
 
 
 def fit_canopy_height(columns: Sequence[Column]) -> CanopyHeight:
@@ -212,13 +212,6 @@ def _rise(column: Column, tops: Array) -> Array:
     return np.log(np.maximum(column.height / tops[:, None], 1.0))
 
 
-def _through_zero(column: Column, tops: Array) -> LeastSquares:
-    rise, weight = _rise(column, tops), column.standard_error**-2
-    slope = (rise * weight) @ column.velocity / np.maximum((rise**2) @ weight, TINY)
-    misfit = ((column.velocity - slope[:, None] * rise) ** 2) @ weight
-    return np.zeros(len(tops)), slope, misfit
-
-
 def _with_offset(column: Column, tops: Array) -> LeastSquares:
     rise, weight = _rise(column, tops), column.standard_error**-2
     share = weight / weight.sum()
@@ -229,12 +222,16 @@ def _with_offset(column: Column, tops: Array) -> LeastSquares:
     return mean_velocity - slope * mean_rise, slope, misfit
 
 
-def _fit(
-    column: Column, tops: Array, solve: Callable[[Column, Array], LeastSquares], within_free: bool
-) -> ProfileFit | None:
+def _fit(column: Column, tops: Array, within_free: bool) -> ProfileFit | None:
+    """The best of the tops; within is 0 unless it is free."""
     if len(column.height) < FEWEST_POINTS:
         return None
-    withins, slopes, misfits = solve(column, tops)
+    if within_free:
+        withins, slopes, misfits = _with_offset(column, tops)
+    else:
+        rise, weight = _rise(column, tops), column.standard_error**-2
+        slopes = (rise * weight) @ column.velocity / np.maximum((rise**2) @ weight, TINY)
+        withins, misfits = np.zeros(len(tops)), ((column.velocity - slopes[:, None] * rise) ** 2) @ weight
     best = int(np.argmin(misfits))
     within, slope, top = float(withins[best]), float(slopes[best]), float(tops[best])
     free = [0, 1, 2] if within_free else [1, 2]
