@@ -68,7 +68,7 @@ def test_xarray_opens_the_mesh_with_the_same_numbers(done: Done) -> None:
     xarray = pytest.importorskip("xarray")
     mesh, table = xarray.load_dataset(done[2] / "flow.nc", engine="h5netcdf"), at_cells(done)
     for name, unit in (("bed", "m"), ("level", "m"), ("u", "m/s"), ("east_velocity", "m/s")):
-        np.testing.assert_array_equal(mesh[f"{name}_june"], table[f"{name} [{unit}]"])
+        np.testing.assert_array_equal(np.squeeze(mesh[f"{name}_june"].to_numpy()), table[f"{name} [{unit}]"])
         assert mesh[f"{name}_june"].attrs["units"] == unit
     np.testing.assert_array_equal(mesh["face_x"], table["east [m]"])
     corners = mesh["node_x"].to_numpy()[mesh["face_nodes"].to_numpy()]
@@ -89,7 +89,7 @@ def test_a_missing_library_is_named_before_anything_is_solved(done: Done, monkey
 
 
 def test_map_programs_find_texts_vectors_and_the_system(done: Done) -> None:
-    """As QGIS's reader of meshes wants it: text of fixed length, `, x-component` and `, y-component`, nodes on a map."""
+    """As QGIS's reader wants it: text of fixed length, vectors by long names and with a time, nodes on a map."""
     h5py = pytest.importorskip("h5py")
     with h5py.File(done[2] / "flow.nc") as file:
         texts = 0
@@ -105,6 +105,7 @@ def test_map_programs_find_texts_vectors_and_the_system(done: Done) -> None:
     for east, north in (("east_velocity_june", "north_velocity_june"),):
         assert called[east].endswith(", x-component")
         assert called[east].removesuffix("x-component") == called[north].removesuffix("y-component")
+    assert mesh["east_velocity_june"].dims == mesh["north_velocity_june"].dims == ("time", "face")
     assert not called["u_june"].endswith("component"), "along a turned grid it is no component on the map"
     for name in mesh["mesh"].attrs["node_coordinates"].split():
         assert mesh[name].attrs["grid_mapping"] == "map"

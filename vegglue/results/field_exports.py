@@ -135,11 +135,14 @@ def write_mesh(
                 long_name = f"velocity, {experiment}, {'xy'[on_map.index(name)]}-component"
             at_faces = {"mesh": "mesh", "location": "face", "coordinates": "face_x face_y", **_mapped(frame)}
             told = {"long_name": long_name, "units": unit, **at_faces}
-            variables[f"{name}_{called[experiment]}"] = ("face", values.ravel(), told)
+            # QGIS's reader takes the x-component for both if a vector has no time (lutraconsulting/MDAL issue 521).
+            vector = name in on_map
+            dims, data = (("time", "face"), values.reshape(1, -1)) if vector else (("face",), values.ravel())
+            variables[f"{name}_{called[experiment]}"] = (dims, data, told)
     dataset = xarray.Dataset(variables, attrs={"Conventions": "CF-1.8 UGRID-1.0", **attributes})
     with failed_writes_told(path, MAKE_ROOM), TemporaryDirectory() as folder:  # the library writes to a name only
         whole = Path(folder) / path.name
-        coordinates = {name: {"_FillValue": None} for name in ("node_x", "node_y", "face_x", "face_y")}
+        coordinates = {name: {"_FillValue": None} for name in ("time", "node_x", "node_y", "face_x", "face_y")}
         dataset.to_netcdf(whole, engine=ENGINE, encoding=coordinates)
         with h5py.File(whole, "r+") as file:
             for owner in (file, *file.values()):
@@ -166,6 +169,15 @@ def _mesh(grid: Grid, frame: Frame | None) -> dict[str, Any]:
     }  # fmt: skip
     nodes = {"cf_role": "face_node_connectivity", "start_index": np.int32(0)}
     return {
+        "time": (
+            "time",
+            np.zeros(1),
+            {
+                "standard_name": "time",
+                "units": "hours since 2000-01-01 00:00:00",
+                "long_name": "any time, as the flow is steady",
+            },
+        ),
         "mesh": ((), np.int32(0), topology),
         "map": ((), np.int32(0), _system(frame)),
         "node_x": ("node", node_x, _axis("x") | _mapped(frame)),
