@@ -153,6 +153,17 @@ def test_a_task_that_ends_its_workers_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_task_that_ends_the_only_worker_ends_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask itself waits for another one without end."""
+    monkeypatch.setattr(cluster, "LONGEST_ALONE", 3)
+    with workers_in(tmp_path, 1) as workers, on_cluster(workers.address):
+        began = time.monotonic()
+        with pytest.raises(InputError, match="--cluster: expected workers to live, got none for 3 s"):
+            parallel_map(os._exit, [(1,)])
+        assert time.monotonic() - began < 15.0
+
+
+@pytest.mark.slow
 def test_results_stream_back_and_stand_in_order(two: Workers) -> None:
     with on_cluster(two.address):
         ended = list[int]()

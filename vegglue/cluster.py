@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from functools import cache, partial
 from importlib.metadata import version
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from distributed import Client
 
 LONGEST_WAIT = 10  # [s] for a scheduler. Chosen, not measured: long for a network, short after a mistyped address.
+# Time [s] without any worker, after there were some, until a command ends; and how often it looks. Chosen: one that
+# takes the place of another starts in 3 to 10 s; before the first one a command waits without end.
+LONGEST_ALONE, LOOK_EVERY = 30, 1.0
 EACH_CORE = 16  # processes of local:N for each core at most; more than one only serves to try how workers come and go
 # Tasks under way [-]: for each thread of a worker one at work and one that waits; and a least number for new workers.
 EACH_THREAD, AT_LEAST = 2, 16
@@ -167,6 +171,7 @@ def results_of_tasks(client: "Client", work: Work, tasks: Iterable[tuple[Any, ..
 
     # A task that any worker can repeat, and no value that is lost with its holder.
     shared = client.submit(_unpacked, dumps(work), key=f"shared-{uuid4().hex}")
+    looked, had_workers = monotonic(), False
     waiting, under_way, ends = enumerate(tasks), dict[Any, int](), as_completed(loop=client.loop)
     try:
         while True:
@@ -174,6 +179,7 @@ def results_of_tasks(client: "Client", work: Work, tasks: Iterable[tuple[Any, ..
                 threads = sum(client.nthreads().values())
             except (OSError, ValueError):
                 raise InputError(GONE) from None
+            had_workers |= threads > 0
             room = max(EACH_THREAD * threads, AT_LEAST) - len(under_way)
             for _, (position, task) in zip(range(room), waiting, strict=False):
                 one = client.submit(_at_work, versions_here(), shared, dumps(task), key=f"task-{uuid4().hex}")
@@ -181,6 +187,24 @@ def results_of_tasks(client: "Client", work: Work, tasks: Iterable[tuple[Any, ..
                 ends.add(one)
             if not under_way:
                 return
+            alone_since = None  # [s] when the last worker left
+            while not ends.has_ready():
+                with ends.thread_condition:
+                    ends.thread_condition.wait(0.1)
+                if monotonic() < looked + LOOK_EVERY:
+                    continue
+                looked = monotonic()
+                try:
+                    there = len(client.nthreads())
+                except (OSError, ValueError):
+                    raise InputError(GONE) from None
+                had_workers |= there > 0
+                alone_since = None if there or not had_workers else alone_since or looked
+                if alone_since is not None and looked > alone_since + LONGEST_ALONE:
+                    raise InputError(
+                        f"--cluster: expected workers to live, got none for {LONGEST_ALONE} s, most likely for want of "
+                        f"memory; {GOES_ON}. Start workers with more memory."
+                    )
             future = next(ends)
             try:
                 result = future.result()
