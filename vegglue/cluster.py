@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 LONGEST_WAIT = 10  # [s] for a scheduler. Chosen, not measured: long for a network, short after a mistyped address.
 # Time [s] without any worker, after there were some, until a command ends; and how often it looks. Chosen: one that
 # takes the place of another starts in 3 to 10 s; before the first one a command waits without end.
-LONGEST_ALONE, LOOK_EVERY = 30, 1.0
+LONGEST_ALONE, COUNT_EVERY = 30, 1.0
 EACH_CORE = 16  # processes of local:N for each core at most; more than one only serves to try how workers come and go
 # Tasks under way [-]: for each thread of a worker one at work and one that waits; and a least number for new workers.
 EACH_THREAD, AT_LEAST = 2, 16
@@ -191,7 +191,7 @@ def results_of_tasks(client: "Client", work: Work, tasks: Iterable[tuple[Any, ..
             while not ends.has_ready():
                 with ends.thread_condition:
                     ends.thread_condition.wait(0.1)
-                if monotonic() < looked + LOOK_EVERY:
+                if monotonic() < looked + COUNT_EVERY:
                     continue
                 looked = monotonic()
                 try:
