@@ -17,7 +17,7 @@ from vegglue.results.json_store import write_model_score
 from vegglue.workflow import extend
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.compare import Comparison, comparison_of, keep_comparison, rows_set_aside
-from vegglue.workflow.extend import kept_extension
+from vegglue.workflow.extend import kept_extension, verdict_digest
 
 FOUND = a_diagnosis()
 ASIDE = excluded_by(FOUND)
@@ -32,7 +32,7 @@ def family(tmp_path: Path) -> tuple[Case, Case]:
     comparison = Comparison(tuple(a_model_score(one.name) for one in cases), ASIDE)
     for run, model_score in zip(several, comparison.model_scores, strict=True):
         write_model_score(run.folder, model_score, rows_set_aside(ASIDE), run.config_hash)
-    keep_comparison(comparison_of(comparison, several, "Added: streamlining.", FOUND.verdict.sentence), several)
+    keep_comparison(comparison_of(comparison, several, "Added: streamlining.", verdict_digest(FOUND)), several)
     return cases
 
 

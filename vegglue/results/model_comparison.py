@@ -127,7 +127,7 @@ class ComparedModel:
 @dataclass(frozen=True)
 class ModelComparison:
     """Models side by side; left_out: measurements that none of them uses; reason: why it ends where it does, in words;
-    verdict: the sentence of the diagnosis that named what was added. Both are '' where nobody searched. unclear: names
+    verdict: digest of the verdict that named what was added. Both are '' where nobody searched. unclear: names
     of what was added whose fall of held-out errors cannot be told from none.
     """
 

@@ -1,7 +1,9 @@
 """case -> child case: a config that extends its parent by effects, named, or found by the diagnosis."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +35,7 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import comparison_that_fits, write_model_score
 from vegglue.results.result_files import diagnosis_that_fits
 from vegglue.wording.numbers import in_digits, in_short
-from vegglue.wording.sentences import sentence
+from vegglue.wording.sentences import sentence, tagged
 from vegglue.workflow.case_run import (
     CaseRun,
     best_parameters,
@@ -132,7 +134,7 @@ def extend_stepwise(
         raise InputError(f"{source}: a file that it names changed while it was extended; run `vegglue extend` again.")
     for one, errors in zip(several, extension.comparison.model_scores, strict=True):
         write_model_score(one.folder, errors, rows_set_aside(extension.comparison.left_out), one.config_hash)
-    ladder = comparison_of(extension.comparison, several, extension.reason, extension.sentence)
+    ladder = comparison_of(extension.comparison, several, extension.reason, verdict_digest(found))
     keep_comparison(replace(ladder, unclear=extension.unclear), several)
     return extension
 
@@ -171,6 +173,11 @@ def extended(run: CaseRun, found: Diagnosis) -> StepwiseExtension:
     )
 
 
+def verdict_digest(found: Diagnosis) -> str:
+    """SHA-256 of the verdict as a value, whatever its words."""
+    return sha256(json.dumps(tagged(found.verdict), sort_keys=True, default=str).encode()).hexdigest()
+
+
 def kept_extension(run: CaseRun, found: Diagnosis) -> StepwiseExtension | None:
     """How exactly this case was extended before, by exactly this diagnosis and with its children unchanged, or None.
 
@@ -180,8 +187,8 @@ def kept_extension(run: CaseRun, found: Diagnosis) -> StepwiseExtension | None:
     if kept is None or run.case.effect_file is not None or run.case.engine is not None:
         return None
     first, *others = kept.steps
-    sentence, aside = found.verdict.sentence, excluded_by(found)
-    if (first.config_hash, kept.verdict) != (run.config_hash, sentence):
+    aside = excluded_by(found)
+    if (first.config_hash, kept.verdict) != (run.config_hash, verdict_digest(found)):
         return None
     several = [run]
     for step in others:
@@ -195,7 +202,8 @@ def kept_extension(run: CaseRun, found: Diagnosis) -> StepwiseExtension | None:
     if len(model_scores) < len(kept.steps):
         return None
     cases = tuple(one.case for one in several)
-    return StepwiseExtension(cases, Comparison(tuple(model_scores), aside), sentence, kept.reason, kept.unclear)
+    compared = Comparison(tuple(model_scores), aside)
+    return StepwiseExtension(cases, compared, found.verdict.sentence, kept.reason, kept.unclear)
 
 
 def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
