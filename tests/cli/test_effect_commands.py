@@ -117,17 +117,17 @@ def test_a_file_that_holds_no_effects_is_refused(text, complaint, tmp_path, monk
     assert (code, complaint in said, said.count("\n")) == (2, True, 1)
 
 
-REFUSED = {
-    "of the effect": ("streamlinin: {values: {vogel_exponent: -0.5}}", "did you mean `streamlining`?"),
-    "by `effect`": ("mine: {effect: winds, values: {speed: 3}}", "did you mean `wind`?"),
-    "of a parameter": ("wind: {values: {sped: 3}}", "did you mean `speed`?"),
-    "without amplitude": ("debris_screen: {values: {length: 1.0}}", "says nothing about `excess`"),
-    "too large": ("wind: {values: {speed: 300}}", "from -30 to 30 m/s, got 300"),
-    "prior too wide": ("steep_bank: {values: {share: phi}}", "may leave 0 to 3 -"),
-    "of an experiment": ("wind: {values: {speed: 3}, experiments: [high]}", "experiment"),
-    "of a section": ("probe_gain: {values: {gain: 0.1}, sections: [Z]}", "section `Z`"),
-    "of a device": ("device_gain: {values: {gain: 0.1}, devices: [Z]}", "device `Z`"),
-    "sections of the flow": ("wind: {values: {speed: 3}, sections: [A]}", "acts on the flow"),
+REFUSED = {  # what is refused, and the names that the message has
+    "of the effect": ("streamlinin: {values: {vogel_exponent: -0.5}}", "`streamlining`"),
+    "by `effect`": ("mine: {effect: winds, values: {speed: 3}}", "`wind`"),
+    "of a parameter": ("wind: {values: {sped: 3}}", "`speed`"),
+    "without amplitude": ("debris_screen: {values: {length: 1.0}}", "`excess`"),
+    "too large": ("wind: {values: {speed: 300}}", "300"),
+    "prior too wide": ("steep_bank: {values: {share: phi}}", "phi"),
+    "of an experiment": ("wind: {values: {speed: 3}, experiments: [high]}", "high"),
+    "of a section": ("probe_gain: {values: {gain: 0.1}, sections: [Z]}", "`Z`"),
+    "of a device": ("device_gain: {values: {gain: 0.1}, devices: [Z]}", "`Z`"),
+    "sections of the flow": ("wind: {values: {speed: 3}, sections: [A]}", "sections"),
 }
 
 

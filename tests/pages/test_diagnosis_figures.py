@@ -44,7 +44,7 @@ from vegglue.results.model_comparison import (
     ModelScore,
     PredictiveScores,
 )
-from vegglue.wording.sentences import sentence
+from vegglue.wording.sentences import phrase, sentence
 
 pytestmark = pytest.mark.slow
 
@@ -284,7 +284,7 @@ def test_ladder_draws_held_out_errors_with_their_paired_error() -> None:
     bar = axes.collections[0].get_segments()[1]
     assert (bar[1, 1] - bar[0, 1]) / 2 == pytest.approx(improvement(before, after)[1] / (2 * held_out_rmse(after)))
     assert "+ eddies" in axes.get_xticklabels()[1].get_text()
-    named = {name for name, (_, words, _, _) in LINES.items() if words in texts(axes)}
+    named = {name for name, (_, words, _, _) in LINES.items() if phrase("label", words) in texts(axes)}
     assert named == {"held_out_sections", "in_sample", "noise_floor"}
 
 
@@ -329,6 +329,6 @@ def test_the_errors_of_a_kept_ladder_are_drawn_for_the_page() -> None:
     (axes,) = figure.axes
     held = next(line for line in axes.lines if line.get_linestyle() == "-" and line.get_marker() == "o")
     assert list(held.get_ydata()) == [0.041, 0.013]
-    assert LINES["held_out_experiments"][1] not in texts(axes), "of the last model it is not known"
+    assert phrase("label", LINES["held_out_experiments"][1]) not in texts(axes), "of the last model it is not known"
     assert "wind" in axes.get_xticklabels()[1].get_text()
     assert off_the_sheet(figure) == []

@@ -22,6 +22,7 @@ from vegglue.cli.options import (
 from vegglue.cli.output import command_line, print_object
 from vegglue.cli.reporting import print_result, progress_reporter
 from vegglue.errors import shown_path
+from vegglue.wording.commands import HELP
 
 
 def check_command(
@@ -74,7 +75,7 @@ def infer_command(
     config: Config,
     method: Annotated[
         Literal["refine", "glue"] | None,
-        typer.Option(help="Draws around the best members, or these members weighed; instead of the config's."),
+        typer.Option(help=HELP["infer.method"]),
     ] = None,
     members: Members = None,
     jobs: Jobs = -1,

@@ -10,6 +10,7 @@ from vegglue.cli.options import FLAG, RUNS, Config, Force, Json, Quiet, Runs, Tr
 from vegglue.cli.output import command_line, print_object
 from vegglue.cli.reporting import progress_reporter
 from vegglue.errors import InputError, shown_path
+from vegglue.wording.commands import HELP
 
 if TYPE_CHECKING:
     from vegglue.effects.definition import Effect
@@ -19,14 +20,14 @@ FORMS: tuple[Literal["csv", "geotiff", "netcdf"], ...] = ("csv", "geotiff", "net
 
 
 def new_command(
-    name: Annotated[str, typer.Argument(help="Name of the folder to be made.", show_default=False)],
-    length: Annotated[float, typer.Option(help=r"Length of the reach \[m].")] = 40.0,
-    width: Annotated[float, typer.Option(help=r"Width of its floor \[m].")] = 3.0,
-    slope: Annotated[float, typer.Option(help="Fall of the bed per length [-].")] = 0.001,
-    depth: Annotated[float, typer.Option(help=r"Depth of the water at the outlet \[m].")] = 0.9,
-    discharge: Annotated[float, typer.Option(help=r"Discharge \[m3/s].")] = 1.5,
-    plants: Annotated[bool, typer.Option(metavar=FLAG, help="Whether there is a patch of plants.")] = True,
-    folder: Annotated[Path, typer.Option(help="Folder to make it in.")] = Path("."),
+    name: Annotated[str, typer.Argument(help=HELP["new.name"], show_default=False)],
+    length: Annotated[float, typer.Option(help=HELP["new.length"])] = 40.0,
+    width: Annotated[float, typer.Option(help=HELP["new.width"])] = 3.0,
+    slope: Annotated[float, typer.Option(help=HELP["new.slope"])] = 0.001,
+    depth: Annotated[float, typer.Option(help=HELP["new.depth"])] = 0.9,
+    discharge: Annotated[float, typer.Option(help=HELP["new.discharge"])] = 1.5,
+    plants: Annotated[bool, typer.Option(metavar=FLAG, help=HELP["new.plants"])] = True,
+    folder: Annotated[Path, typer.Option(help=HELP["new.folder"])] = Path("."),
     as_object: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -47,7 +48,7 @@ def new_command(
 def export_command(
     config: Config,
     only: Annotated[
-        Literal["csv", "geotiff", "netcdf"] | None, typer.Option(help="The one form to write; all if not given.")
+        Literal["csv", "geotiff", "netcdf"] | None, typer.Option(help=HELP["export.only"])
     ] = None,
     runs: Runs = RUNS,
     as_object: Json = False,
@@ -68,14 +69,14 @@ def export_command(
 
 def effects_command(
     name: Annotated[
-        str | None, typer.Argument(help="One effect; all of them if not given.", show_default=False)
+        str | None, typer.Argument(help=HELP["effects.name"], show_default=False)
     ] = None,
-    config: Annotated[Path | None, typer.Option(help="Say also what this case does with it.")] = None,
-    check: Annotated[Path | None, typer.Option(help="Check the effects of a Python file of your own.")] = None,
+    config: Annotated[Path | None, typer.Option(help=HELP["effects.config"])] = None,
+    check: Annotated[Path | None, typer.Option(help=HELP["effects.check"])] = None,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Annotated[
-        bool, typer.Option("--trust", metavar=FLAG, help="Run the Python file of effects that is named.")
+        bool, typer.Option("--trust", metavar=FLAG, help=HELP["effects.trust"])
     ] = False,
     runs: Runs = RUNS,
 ) -> None:
@@ -145,15 +146,15 @@ def effect_json(effect: "Effect") -> dict[str, object]:
 
 
 def twin_command(
-    config: Annotated[Path, typer.Argument(help="The case whose stations and errors are used.", show_default=False)],
-    to: Annotated[Path, typer.Option(help="Folder for measurements, config and sealed answer.", show_default=False)],
+    config: Annotated[Path, typer.Argument(help=HELP["twin.config"], show_default=False)],
+    to: Annotated[Path, typer.Option(help=HELP["twin.to"], show_default=False)],
     hide: Annotated[
         list[str] | None,
-        typer.Option(help="EFFECT, EFFECT=SIZE, unlisted:NAME, bad_probe, nothing, or ? for any; may be repeated."),
+        typer.Option(help=HELP["twin.hide"]),
     ] = None,
-    snr: Annotated[float, typer.Option(min=0.1, help="How visible an effect without a size is made.")] = 6.0,
-    noise: Annotated[str, typer.Option(help="white, ar1:0.5 or understated:1.5.")] = "white",
-    seed: Annotated[int, typer.Option(min=0, help="Decides parameters, errors and what `?` is.")] = 1,
+    snr: Annotated[float, typer.Option(min=0.1, help=HELP["twin.snr"])] = 6.0,
+    noise: Annotated[str, typer.Option(help=HELP["twin.noise"])] = "white",
+    seed: Annotated[int, typer.Option(min=0, help=HELP["twin.seed"])] = 1,
     as_object: Json = False,
     quiet: Quiet = False,
     force: Force = False,
@@ -175,7 +176,7 @@ def twin_command(
 
 
 def reveal_command(
-    folder: Annotated[Path, typer.Argument(help="Folder that `vegglue twin` made.", show_default=False)],
+    folder: Annotated[Path, typer.Argument(help=HELP["reveal.folder"], show_default=False)],
     runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,

@@ -25,15 +25,16 @@ from vegglue.cli.options import (
 from vegglue.cli.output import command_line, print_object
 from vegglue.cli.reporting import print_result, progress_reporter
 from vegglue.errors import InputError, shown_path
+from vegglue.wording.commands import HELP
 from vegglue.wording.numbers import so_many
 
 
 def import_command(
     folder: Annotated[
-        Path, typer.Argument(help="Folder with site.json or site.yaml and what was measured; or a known set.")
+        Path, typer.Argument(help=HELP["import.folder"])
     ],
     to: Annotated[
-        Path | None, typer.Option(help="Config to write; configs/<folder>.yaml or <folder>.yaml if not given.")
+        Path | None, typer.Option(help=HELP["import.to"])
     ] = None,
     as_object: Json = False,
     quiet: Quiet = False,
@@ -72,7 +73,7 @@ def import_command(
 def diagnose_command(
     config: Config,
     details: Annotated[
-        bool, typer.Option("--details", metavar=FLAG, help="Print the whole verdict, remarks and candidate effects.")
+        bool, typer.Option("--details", metavar=FLAG, help=HELP["diagnose.details"])
     ] = False,
     jobs: Jobs = -1,
     cluster: Cluster = None,
@@ -101,9 +102,9 @@ def diagnose_command(
 def discover_command(
     config: Config,
     without: Annotated[
-        list[str] | None, typer.Option(help="Listed effect that is left out of the competition, e.g. bank_trend.")
+        list[str] | None, typer.Option(help=HELP["discover.without"])
     ] = None,
-    to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
+    to: Annotated[Path | None, typer.Option(help=HELP["discover.to"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,
@@ -122,13 +123,13 @@ def discover_command(
 def extend_command(
     config: Config,
     add: Annotated[
-        list[str] | None, typer.Option(help=r"Effect to add, e.g. streamlining or discharge_error\[high].")
+        list[str] | None, typer.Option(help=HELP["extend.add"])
     ] = None,
-    shape: Annotated[list[str] | None, typer.Option(help="Value of a shape of it, NAME=NUMBER.")] = None,
+    shape: Annotated[list[str] | None, typer.Option(help=HELP["extend.shape"])] = None,
     auto: Annotated[
-        bool, typer.Option("--auto", metavar=FLAG, help="Add what the diagnosis finds, while held-out errors fall.")
+        bool, typer.Option("--auto", metavar=FLAG, help=HELP["extend.auto"])
     ] = False,
-    to: Annotated[Path | None, typer.Option(help="Config to write, beside the parent if not given.")] = None,
+    to: Annotated[Path | None, typer.Option(help=HELP["discover.to"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,
@@ -163,7 +164,7 @@ def extend_command(
 
 
 def compare_command(
-    configs: Annotated[list[Path], typer.Argument(help="Cases, the baseline first.", show_default=False)],
+    configs: Annotated[list[Path], typer.Argument(help=HELP["compare.configs"], show_default=False)],
     jobs: Jobs = -1,
     runs: Runs = RUNS,
     as_object: Json = False,
@@ -178,7 +179,7 @@ def compare_command(
 
 
 def overview_command(
-    configs: Annotated[list[Path], typer.Argument(help="Cases with a posterior, the best first.", show_default=False)],
+    configs: Annotated[list[Path], typer.Argument(help=HELP["overview.configs"], show_default=False)],
     runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
@@ -193,7 +194,7 @@ def overview_command(
 
 def next_command(
     config: Config,
-    between: Annotated[list[str] | None, typer.Option(help="Effects to tell apart, else those left over.")] = None,
+    between: Annotated[list[str] | None, typer.Option(help=HELP["next.between"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,

@@ -24,9 +24,9 @@ from vegglue.cli.loop_commands import (
 from vegglue.cli.options import FLAG
 from vegglue.errors import InputError, StorageError
 from vegglue.version import VERSION
+from vegglue.wording.commands import ENDINGS, HELP
 
 MISTAKE, MACHINE, STOPPED = 2, 3, 130  # exit codes
-KEPT_ANYWAY = "what was finished is kept"
 
 
 def ending_well(command: Callable[[], object]) -> None:
@@ -34,7 +34,9 @@ def ending_well(command: Callable[[], object]) -> None:
     lock, no memory) 3, Ctrl-C or a plain kill 130.
     """
     _make_printable()
-    _heed_kill()
+    # A plain kill, with which queues of clusters end a job at its time, is as Ctrl-C: what was started ends, too.
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         command()
     except InputError as error:
@@ -42,17 +44,17 @@ def ending_well(command: Callable[[], object]) -> None:
     except StorageError as error:
         _end(str(error), MACHINE)
     except OSError as error:
-        where = "The output, or a file," if error.filename is None else error.filename
-        _end(f"{where} cannot be used ({error.strerror or error}); {KEPT_ANYWAY}: mend that, run it again.", MACHINE)
+        where = ENDINGS["output"] if error.filename is None else error.filename
+        _end(ENDINGS["file"].format(where, error.strerror or error), MACHINE)
     except MemoryError:
-        _end(f"The memory is full; {KEPT_ANYWAY}: run it again with fewer --jobs, or a coarser grid.", MACHINE)
+        _end(ENDINGS["memory"], MACHINE)
     except RuntimeError as error:
         if not str(error).startswith("Symlink loop"):  # of Python before 3.13; later it is an OSError
             raise
-        _end(f"A link leads back to itself ({error}); give another path.", MISTAKE)
+        _end(ENDINGS["link"].format(error), MISTAKE)
     except SystemExit as ended:
         if ended.code == STOPPED:  # typer has made this of Ctrl-C
-            _end("Stopped; solved members and finished steps are kept: run the same command again.", STOPPED)
+            _end(ENDINGS["stopped"], STOPPED)
         _flush()
         raise
     _flush()
@@ -76,12 +78,6 @@ def _make_printable() -> None:
         reconfigure(errors="replace")
 
 
-def _heed_kill() -> None:
-    """A plain kill, with which queues of clusters end a job at its time, is as Ctrl-C: what was started ends, too."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-
-
 def _flush() -> None:
     """Print what waits, now, while a full disk can still be told."""
     try:
@@ -89,7 +85,7 @@ def _flush() -> None:
     except OSError as error:
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python tries, and complains, again
-        _end(f"The output cannot be used ({error.strerror}); {KEPT_ANYWAY}: mend that, run it again.", MACHINE)
+        _end(ENDINGS["file"].format(ENDINGS["output"], error.strerror), MACHINE)
 
 
 app = typer.Typer(rich_markup_mode="rich", no_args_is_help=True, pretty_exceptions_enable=False)
@@ -110,7 +106,7 @@ def _print_version(asked: bool) -> None:
 def about(
     version: Annotated[
         bool,
-        typer.Option("--version", metavar=FLAG, callback=_print_version, is_eager=True, help="Print the version."),
+        typer.Option("--version", metavar=FLAG, callback=_print_version, is_eager=True, help=HELP["about.version"]),
     ] = False,
 ) -> None:
     """Calibrate a model of flow through plants against measured velocities, and see where it fails.

@@ -10,6 +10,7 @@ import typer
 
 import vegglue
 from vegglue.errors import InputError
+from vegglue.wording.commands import HELP
 
 if TYPE_CHECKING:
     from vegglue.workflow.case_run import CaseRun
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
 # What stands for the value of an option that takes none: typer 0.29 would write `<bool>`, as if it took one.
 FLAG = " "
 
-Config = Annotated[Path, typer.Argument(help="The case, a YAML file.", show_default=False)]
-Runs = Annotated[Path, typer.Option(help="Folder that holds one folder for each run.")]
+Config = Annotated[Path, typer.Argument(help=HELP["config"], show_default=False)]
+Runs = Annotated[Path, typer.Option(help=HELP["runs"])]
 # Where results lie unless told.
 RUNS = Path("runs")
 
@@ -29,30 +30,22 @@ def _some(jobs: int) -> int:
     return jobs
 
 
-Jobs = Annotated[
-    int, typer.Option(min=-1, callback=_some, help="Cores at once; -1 for all. Results do not depend on it.")
-]
+Jobs = Annotated[int, typer.Option(min=-1, callback=_some, help=HELP["jobs"])]
 Cluster = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Dask scheduler whose workers compute, tcp://HOST:PORT; or local:N, for N processes here.",
+        help=HELP["cluster"],
     ),
 ]
 Members = Annotated[
     int | None,
-    typer.Option(min=1, help="Size of the ensemble instead of the config's; powers of two use the Sobol' points best."),
+    typer.Option(min=1, help=HELP["members"]),
 ]
-Json = Annotated[bool, typer.Option("--json", metavar=FLAG, help="Print one JSON object instead of words.")]
-Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", metavar=FLAG, help="Print results only, not how far the command is.")
-]
-Force = Annotated[
-    bool, typer.Option("--force", metavar=FLAG, help="Replace also what you made or edited, or a larger ensemble.")
-]
-Trust = Annotated[
-    bool, typer.Option("--trust", metavar=FLAG, help="Run the config's `effect_file` and the command of its `engine`.")
-]
+Json = Annotated[bool, typer.Option("--json", metavar=FLAG, help=HELP["json"])]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", metavar=FLAG, help=HELP["quiet"])]
+Force = Annotated[bool, typer.Option("--force", metavar=FLAG, help=HELP["force"])]
+Trust = Annotated[bool, typer.Option("--trust", metavar=FLAG, help=HELP["trust"])]
 
 
 def number_given(text: str) -> tuple[str, float]:

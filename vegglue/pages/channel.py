@@ -20,6 +20,7 @@ from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of
 from vegglue.measurements.observations import Observations
 from vegglue.pages.style import COLOUR, SMALL, canvas, label, save, styled
+from vegglue.wording.sentences import phrase
 
 # Half of the width of a letter, of a line and of a point in a plan 9.4 inches wide, over the axes [-].
 HALF_LETTER, HALF_LINE, HALF_POINT = 0.0045, 0.035, 0.004
@@ -77,13 +78,13 @@ def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
     figure, (whole, *between, across) = canvas(9.4, 7.2 if apart else 5.6, nrows=len(heights), height_ratios=heights)
     for axes in (whole, *between):
         _draw_plan(axes, case, site, observations)
-    whole.set(xlim=case.grid.x, title=f"{case.title or case.name}: classes, boundaries and stations (not to scale)")
+    whole.set(xlim=case.grid.x, title=f"{case.title or case.name}: {phrase('label', 'channel')}")
     _draw_boundaries(whole, case, observations)
     for axes in between:
         whole.axvspan(low, high, fill=False, edgecolor=COLOUR["ink"], linewidth=0.8, linestyle=":")
-        axes.set(xlim=reach, title="The reach between the dotted lines")
+        axes.set(xlim=reach, title=phrase("label", "reach"))
     nearest = between[0] if between else whole
-    nearest.set(xlabel="x [m], flow to the right")
+    nearest.set(xlabel=phrase("label", "along"))
     for patch in case.plants.patches:
         places = about_a_patch(corners_of(case, patch), nearest)
         _name(nearest, places, patch.name, observations, "ink")
@@ -91,7 +92,7 @@ def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
         Swatch(color=_class_colour(i), label=name) for i, name in enumerate(site.class_names)
     ]
     if case.plants.patches:
-        shown.append(Swatch(color=COLOUR["plants"], label="plants (darker: more stems)"))
+        shown.append(Swatch(color=COLOUR["plants"], label=phrase("label", "plants")))
     shown.append(Line2D([], [], color=COLOUR["model"], linewidth=0.8, label="expected waterline"))
     if len(observations.table):
         shown.append(Line2D([], [], linestyle="", marker="o", markersize=3, color=COLOUR["measured"], label="station"))
@@ -182,4 +183,4 @@ def _draw_section(axes: Axes, case: Case, site: Site, x: float) -> None:
         if (depth > 0).any():
             label(axes, site.grid.y[depth > 0][0], level[0], name, "model")
     axes.set(xlim=case.grid.y, xlabel="y [m]", ylabel="z [m]")
-    axes.set_title(f"Bed across x = {site.grid.x[i]:.4g} m, and the outlet's depth kept along the floor")
+    axes.set_title(f"x = {site.grid.x[i]:.4g} m: {phrase('label', 'bed')}")

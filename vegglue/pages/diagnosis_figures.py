@@ -26,7 +26,7 @@ from vegglue.pages.run import Run, accepted_causes, published_picture
 from vegglue.pages.style import COLOUR, HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, save, styled
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.wording.numbers import fixed, section_in_words, unit_math
-from vegglue.wording.sentences import sentence
+from vegglue.wording.sentences import phrase, sentence
 
 # How each status is drawn: marker, face, edge. Form and fill tell them apart without colour.
 MARKS: dict[str, tuple[str, str, str]] = {
@@ -77,15 +77,15 @@ def paint_candidates(scores: Axes, visible: Axes, suspects: pd.DataFrame, thresh
     scores.axvline(threshold, color=COLOUR["ink"], linewidth=0.9, dashes=(4, 2))
     scores.set_xscale("function", functions=(lambda x: np.sqrt(np.maximum(x, 0.0)), np.square))
     reach = float(np.nanmax([3.2 * threshold, *(1.15 * first), *(1.15 * left)]))  # room right of the threshold
-    scores.set(xlim=(0, reach), ylim=(len(rows) - 0.4, TOP), xlabel="score [standard errors], root scale")
+    scores.set(xlim=(0, reach), ylim=(len(rows) - 0.4, TOP), xlabel=phrase("label", "score"))
     scores.set_xticks([tick for tick in (0, 1, 2, 5, 10, 20, 50, 100, 200) if tick < reach])
-    label(scores, threshold, TOP, "errors alone seldom reach this", xytext=(4, -8), va="center")
+    label(scores, threshold, TOP, phrase("label", "threshold"), xytext=(4, -8), va="center")
     scores.set_yticks(rows, [
         f"{name} (untestable)" if word == "untestable" else name
         for name, word in zip(suspects["name"], status, strict=True)
     ])
     again = [Line2D([], [], linestyle="", marker="o", markersize=3.4, markerfacecolor="none", color=COLOUR["model"],
-                    label="when looked at last")] if np.isfinite(left).any() else []  # fmt: skip
+                    label=phrase("label", "last"))] if np.isfinite(left).any() else []  # fmt: skip
     handles = [*scores.get_legend_handles_labels()[0], *again]
     if handles:
         scores.set_ylim(len(rows) - 0.4 + 0.85 * len(handles), TOP)  # rows of their own below the marks
@@ -135,7 +135,7 @@ def paint_alike(axes: Axes, names: Sequence[str], cosine: Array) -> None:
     axes.tick_params(length=0, labelsize=7.5)
     for edge in ("left", "bottom"):
         axes.spines[edge].set_visible(False)
-    text = f"full: alike, hollow: opposed;\nframe: |cosine| above {fixed(constants().alike_cosine, 2)}"
+    text = f"{phrase('label', 'squares')}\n{phrase('label', 'frame')} {fixed(constants().alike_cosine, 2)}"
     axes.text(0.0, -0.03, text, transform=axes.transAxes, va="top", fontsize=SMALL, color=COLOUR["muted"])
 
 
@@ -208,7 +208,7 @@ def draw_gauges(stations: pd.DataFrame, added: str) -> Figure:
         axes.set_title(experiment, fontsize=8.5)
         axes.set_xlabel("x [m]")
         axes.margins(x=0.1, y=0.12)
-    panels[0, 0].set_ylabel("measured − model [mm]")
+    panels[0, 0].set_ylabel(phrase("label", "level residual"))
     return figure
 
 
@@ -302,8 +302,8 @@ def save_diagnosis_figure(diagnosis: Diagnosis, case: Case, path: Path) -> None:
 ZONE_WIDTH = 0.72
 # What the parts of the picture of a diagnosis show.
 TITLES = (
-    "What would improve the fit, alone", "What leaves a like trace",
-    "Where the model misses, in standard errors (grey: the mean)", "Where a spot would help",
+    "candidates", "alike",
+    "zones", "spots",
 )  # fmt: skip
 
 
@@ -324,8 +324,8 @@ def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
     upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
     suspects, alike, zones = _split(upper, 1, 3, width_ratios=(5.3, 4.0, zones_width))
-    for part, words in zip((suspects, alike, zones, lower), TITLES, strict=True):
-        part.suptitle(words, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
+    for part, title in zip((suspects, alike, zones, lower), TITLES, strict=True):
+        part.suptitle(phrase("label", title), x=0.01, ha="left", fontsize=9.5, fontweight="bold")
     scores, visible = suspects.subplots(1, 2, sharey=True, width_ratios=(3, 1))
     paint_candidates(scores, visible, candidate_table(diagnosis), diagnosis.first_screening.threshold)
     paint_alike(alike.subplots(), diagnosis.first_screening.compared, diagnosis.first_screening.cosine)

@@ -1,7 +1,6 @@
 """What a run states beside its verdict, as values; those that limit the use of the result come first."""
 
 import shlex
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,24 +115,47 @@ class FlowOfBuiltInEngine:
 
 def findings(run: Run) -> list[tuple[object, bool]]:
     """All statements, and of each whether it limits the use of the result; those that do come first."""
-    case, posterior = run.case, run.posterior
-    others = case.reference.table if case.reference else {}
+    case, posterior, observations = run.case, run.posterior, run.observations
+    others, symbols = case.reference.table if case.reference else {}, symbols_of(case)
     found: list[tuple[object, bool]] = []
-    for one in posterior_statements(posterior, others, symbols_of(case)):
+    for one in posterior_statements(posterior, others, symbols):
         found.append((one, limits_use(one)))
         if isinstance(one, BandCoverage):
-            found.append((_model_band(posterior), False))
-    found += [(one, False) for one in (*_cylinders(run), *_canopy_heights(run))]
+            used = posterior.station["used"].to_numpy()
+            value = posterior.station["value"].to_numpy(float)[used]
+            low, high = posterior.predicted.model_band[0][used], posterior.predicted.model_band[-1][used]
+            found.append((ModelBand(int(np.sum((value >= low) & (value <= high))), posterior.fit.used), False))
+    name, cylinder = plant_parameter(case), run.cylinder
+    if name is not None and cylinder is not None:
+        inferred = posterior.marginals.median[name] if posterior.canopy is None else posterior.canopy.median
+        median = cylinder.quantile(0.5)
+        ratio = inferred / median if posterior.marginals.identified[name] else None
+        size = cylinder.mean, cylinder.standard_deviation, median
+        parameter = parameter_of(posterior, name, symbols)
+        found.append((CylinderCompared(parameter, *size, ratio, cylinder.undergrowth_density), False))
+    for (experiment, section), canopy in observations.canopy_height.items():
+        heights = np.unique(median_plants(run, experiment).canopy_height.round(3)) if canopy.unknown is None else ()
+        reason, modelled = "" if canopy.unknown is None else canopy.unknown.value, tuple(map(float, heights))
+        size = canopy.value, canopy.standard_error
+        found.append((CanopyHeightRead(section, experiment, *size, reason, modelled), False))
     for kind, rmse in posterior.fit.best_rmse.items():
         compared = residual_compared(posterior, kind, rmse, best=True)
         found.append((compared, compared.compared == "exceeds"))
-    unused = run.observations.table[~run.observations.table["used"]]
-    for _, row in unused.iterrows():
+    for _, row in observations.table[~observations.table["used"]].iterrows():
         found.append((StationNotUsed(str(row["experiment"]), row["x"], row["y"], str(row["reason"])), False))
     if run.set_aside_since:
         found.append((ReadingsExcludedSince(run.set_aside_since, shlex.quote(case.source.name)), True))
-    for discharge in _discharges(run):
-        found.append((discharge, abs(discharge.off) > DISCHARGE_DOUBTED and not discharge.changed_by))
+    for (experiment, section), rules in observations.discharge.items():
+        x, measured = section_place(observations.table, experiment, section), rules["profile"]
+        given = discharges_upstream_of(case, case.experiments[experiment], x)
+        if given is None:
+            continue
+        prescribed = None if any(isinstance(value, str) for value in given) else sum(map(float, given))
+        off = 0.0 if prescribed is None else (measured.value - prescribed) / measured.standard_error
+        changed = changing_discharge(case, experiment, x) or ""
+        size = measured.value, measured.standard_error
+        discharge = DischargeMeasured(section, experiment, *size, prescribed, changed, off)
+        found.append((discharge, abs(off) > DISCHARGE_DOUBTED and not changed))
     if run.ensemble is not None:
         found += [(one, True) for one in doubts_of_predictions(run.ensemble)]
         newton, marched, failed, commanded = (members_with(run.ensemble.status, number) for number in STATUS_WORDS)
@@ -147,50 +169,6 @@ def findings(run: Run) -> list[tuple[object, bool]]:
     if case.engine is not None:
         found.append((FlowOfBuiltInEngine(), False))
     return sorted(found, key=lambda one: not one[1])
-
-
-def _model_band(posterior: Posterior) -> ModelBand:
-    used = posterior.station["used"].to_numpy()
-    value = posterior.station["value"].to_numpy(float)[used]
-    low, high = posterior.predicted.model_band[0][used], posterior.predicted.model_band[-1][used]
-    return ModelBand(int(np.sum((value >= low) & (value <= high))), posterior.fit.used)
-
-
-def _cylinders(run: Run) -> Iterator[CylinderCompared]:
-    name, cylinder, posterior = plant_parameter(run.case), run.cylinder, run.posterior
-    if name is None or cylinder is None:
-        return
-    inferred = posterior.marginals.median[name] if posterior.canopy is None else posterior.canopy.median
-    median = cylinder.quantile(0.5)
-    ratio = inferred / median if posterior.marginals.identified[name] else None
-    parameter = parameter_of(posterior, name, symbols_of(run.case))
-    size = cylinder.mean, cylinder.standard_deviation, median
-    yield CylinderCompared(parameter, *size, ratio, cylinder.undergrowth_density)
-
-
-def _canopy_heights(run: Run) -> Iterator[CanopyHeightRead]:
-    for (experiment, section), canopy in run.observations.canopy_height.items():
-        known = np.isfinite(canopy.value)
-        heights = np.unique(median_plants(run, experiment).canopy_height.round(3)) if known else np.zeros(0)
-        modelled = tuple(float(height) for height in heights)
-        reason = "" if canopy.unknown is None else canopy.unknown.value
-        yield CanopyHeightRead(section, experiment, canopy.value, canopy.standard_error, reason, modelled)
-
-
-def _discharges(run: Run) -> Iterator[DischargeMeasured]:
-    for (experiment, section), rules in run.observations.discharge.items():
-        x = section_place(run.observations.table, experiment, section)
-        given = discharges_upstream_of(run.case, run.case.experiments[experiment], x)
-        if given is None:
-            continue
-        prescribed = None if any(isinstance(value, str) for value in given) else sum(map(float, given))
-        measured, off = rules["profile"], 0.0
-        if prescribed is not None:
-            off = (measured.value - prescribed) / measured.standard_error
-        yield DischargeMeasured(
-            section, experiment, measured.value, measured.standard_error, prescribed,
-            changing_discharge(run.case, experiment, x) or "", off,
-        )  # fmt: skip
 
 
 def failed_of_weighed(ensemble: Ensemble | None, posterior: Posterior) -> tuple[int, int]:

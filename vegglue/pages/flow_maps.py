@@ -29,6 +29,7 @@ from vegglue.pages.svg import (
     svg_words,
     tick_labels,
 )
+from vegglue.wording.sentences import phrase
 
 # A map as wide as the page, its colours beside it [px].
 MAP_LEFT, MAP_RIGHT, MAP_TOTAL, MAP_LETTERS = 52.0, 800.0, 902.0, 12.0
@@ -108,7 +109,7 @@ def map_axes(frame: MapFrame, along: bool, title: str = "y [m]") -> list[str]:
         parts.append(svg_element("path", d=f"M{at:.1f},{frame.foot + 1:g}v4", stroke=COLOUR["muted"]))
         parts.append(svg_words(at, frame.foot + 18, words, "muted", text_anchor="middle"))
     if along:
-        parts.append(svg_words(MAP_RIGHT, frame.foot + 34, "x [m], flow to the right", text_anchor="end"))
+        parts.append(svg_words(MAP_RIGHT, frame.foot + 34, phrase("label", "along"), text_anchor="end"))
     return parts
 
 
@@ -280,7 +281,7 @@ def draw_levels(flow: FlowFields, gauges: Gauges | None, heights: tuple[float, f
         svg_element("path", d=area_between(x, np.full(x.size, frame.foot), ground), fill=COLOUR["earth"]),
         svg_element("path", d=line_through(x, water), fill="none", stroke=COLOUR["model"], stroke_width=1.6),
         svg_words(MAP_LEFT + 10, float(np.nanmin(water)) - 5, "water level", "model"),
-        svg_words(MAP_LEFT + 10, frame.foot - 8, "bed on the deepest line"),
+        svg_words(MAP_LEFT + 10, frame.foot - 8, phrase("label", "deepest")),
     ]
     parts += map_axes(frame, along=True, title="level [m]")
     if gauges is None:

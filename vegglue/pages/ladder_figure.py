@@ -15,14 +15,15 @@ from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.pages.style import COLOUR, SMALL, WIDTH, canvas, label, save, styled
 from vegglue.results.model_comparison import ModelComparison, ModelScore
 from vegglue.wording.numbers import fixed, short
+from vegglue.wording.sentences import phrase
 
 # How errors are drawn by what they are judged on: line and marker, name beside the line, colour, width.
 LINES = {
-    "held_out_sections": ("o-", "sections left out", "model", 1.6),
-    "held_out_experiments": ("D--", "experiments left out", "model", 1.0),
-    "unseen": ("*-", "never calibrated to", "measured", 1.2),
-    "in_sample": ("o:", "calibrated to", "muted", 1.2),
-    "noise_floor": ("_--", "measurement error", "ink", 0.9),
+    "held_out_sections": ("o-", "sections", "model", 1.6),
+    "held_out_experiments": ("D--", "experiments", "model", 1.0),
+    "unseen": ("*-", "unseen", "measured", 1.2),
+    "in_sample": ("o:", "in sample", "muted", 1.2),
+    "noise_floor": ("_--", "floor", "ink", 0.9),
 }
 # p-value [-] of one value in all experiments, below which a parameter is drawn as one that differs: 1 in 20.
 MOVES_BELOW = 0.05
@@ -103,14 +104,14 @@ def _paint_errors(
             label(axes, float(x), float(value), short(value, 2), "model", xytext=(7, 5), fontweight="bold")
     ends = {LINES[name][1:3]: float(values[-1]) for name, values in known.items() if np.isfinite(values[-1])}
     lowest, right = -np.inf, place[-1]
-    for (words, colour), value in sorted(ends.items(), key=lambda one: one[1]):
+    for (name, colour), value in sorted(ends.items(), key=lambda one: one[1]):
         lowest = max(value, lowest + 0.065 * top)  # names are pushed apart that would cover each other
         axes.annotate(
             words, (right + 0.32, lowest), fontsize=SMALL + 0.5, color=COLOUR[colour], va="center",
             annotation_clip=False,
         )  # fmt: skip
         axes.plot([right + 0.05, right + 0.3], [value, lowest], color=COLOUR["rule"], linewidth=0.7)
-    axes.set(ylim=(0, 1.12 * top), xlim=(0.6, len(models) + 0.9), ylabel="velocity error, RMSE [m/s]")
+    axes.set(ylim=(0, 1.12 * top), xlim=(0.6, len(models) + 0.9), ylabel=phrase("label", "rmse"))
     letters = max(int(LETTERS_PER_INCH * width / (len(models) + 1)), 12)
     axes.set_xticks(place, [_of_model(k, *model, letters) for k, model in enumerate(models, 1)])
     axes.tick_params(axis="x", length=0, labelsize=SMALL + 0.5)

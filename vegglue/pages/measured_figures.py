@@ -19,6 +19,7 @@ from vegglue.normal_range import NORMAL95
 from vegglue.pages.run import Run, published_picture, station_zones
 from vegglue.pages.style import COLOUR, HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, styled
 from vegglue.wording.numbers import as_given, plus_minus, unit_math
+from vegglue.wording.sentences import phrase
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def draw_verticals(verticals: Sequence[Vertical], canopy: tuple[float, float] | 
         "", (start + 0.5 * stretch, foot), (start, foot), arrowprops={"arrowstyle": "|-|,widthA=.2,widthB=.2"}
     )
     label(axes, start + 0.25 * stretch, foot, "0.5 m/s", "ink", ha="center", xytext=(0, 4))
-    axes.set_xlabel("y of the vertical [m], velocity to the right of it")
+    axes.set_xlabel(phrase("label", "vertical"))
     axes.set_ylabel("z [m]")
     return figure
 
@@ -95,7 +96,7 @@ def draw_canopy_profiles(inside: Sequence[Vertical], canopy: tuple[float, float]
         label(axes, right, height, text, "stems", ha="right", va="top", xytext=(0, -7))
     axes.axhline(depth, color=COLOUR["model"], linewidth=0.8)
     label(axes, right, depth, "water surface", "model", ha="right", xytext=(0, 3))
-    axes.set(xlabel="velocity [m/s]", ylabel="height above the bed [m]", ylim=(0, depth * 1.12))
+    axes.set(xlabel="velocity [m/s]", ylabel=phrase("label", "height"), ylim=(0, depth * 1.12))
     return figure
 
 

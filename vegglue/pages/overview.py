@@ -202,7 +202,7 @@ def _side_by_side(folder: Path, name: str, runs: Sequence[Run]) -> Picture:
         if reference is not None and name in reference.made_with:
             made = float(reference.made_with[name])
             drawn = DrawnInterval(made, made, made, others=True)
-            of_others.setdefault(("the record was made with", drawn), []).append(run.case.name)
+            of_others.setdefault((phrase("label", "made with"), drawn), []).append(run.case.name)
     rows |= {IntervalOf(source, runs=tuple(names)): drawn for (source, drawn), names in of_others.items()}
     named = {sentence(of): row for of, row in rows.items()}
     svg = draw_interval_rows(named, as_power(runs[0].posterior, name), name)

@@ -20,7 +20,6 @@ from vegglue.pages.run import Run, published_picture
 from vegglue.pages.style import COLOUR, EDGE_COLOUR, SMALL, WIDTH, Picture, canvas, label, styled
 from vegglue.results.causes import UNIT_OF_FIELD
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.wording.numbers import fixed
 from vegglue.wording.sentences import phrase
 
 # Least score [standard errors] in full colour, so that a map of errors alone (scores of 2 to 3) stays pale.
@@ -94,7 +93,7 @@ def paint_places(axes: Axes, x: Array, y: Array, score: Array, term: str, marks:
             axes.contourf(along, across, sign * shown, levels=quarters, colors=faces)
             look: dict[str, Any] = {"colors": COLOUR[colour], "linewidths": 0.7, "linestyles": line}
             axes.contour(along, across, sign * shown, levels=quarters[:-1], **look)
-        text = f"steps of {fixed(0.25 * full, 1)} standard errors; largest {fixed(largest, 1)}"
+        text = phrase("steps_of_score", 0.25 * full, largest)
         axes.text(1.0, 1.02, text, transform=axes.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
         for place, line, sign, colour in ((0.0, "━", 1, "model"), (0.28, "╌", -1, "measured")):
             acting = f"{line} {phrase('acting', term, sign)} here would help"
@@ -102,7 +101,7 @@ def paint_places(axes: Axes, x: Array, y: Array, score: Array, term: str, marks:
     _paint_marks(axes, marks)
     if len(marks.aside):
         axes.text(0.56, 1.02, "× excluded", transform=axes.transAxes, fontsize=SMALL, color=COLOUR["ink"])
-    axes.set(xlabel="x [m], flow to the right", ylabel="y [m]")
+    axes.set(xlabel=phrase("label", "along"), ylabel="y [m]")
 
 
 def strongest_spots(x: Array, y: Array, score: Array) -> tuple[Array, Array, Array]:
@@ -162,11 +161,11 @@ def draw_field_map(field: DrawnField, marks: PlanMarks) -> Figure:
     _colour_bar(lower, mesh, f"standard error [{field.unit}]")
     _paint_marks(upper, marks)
     _paint_marks(lower, PlanMarks(marks.patches, marks.stations, marks.aside))
-    text = f"outlined: more than {CLEAR_FROM:g} standard errors; pale: less"
+    text = phrase("label", "outlined")
     upper.text(1.0, 1.02, text, transform=upper.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
     for axes in (upper, lower):
         axes.set_ylabel("y [m]")
-    lower.set_xlabel("x [m], flow to the right")
+    lower.set_xlabel(phrase("label", "along"))
     return figure
 
 

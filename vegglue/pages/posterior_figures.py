@@ -30,6 +30,7 @@ from vegglue.pages.run import Run, published_picture
 from vegglue.pages.style import COLOUR, HEIGHT, WIDTH, Picture, canvas, formula_labels, label, styled
 from vegglue.pages.svg import FEWEST_TICKS, round_ticks
 from vegglue.wording.numbers import no_formula, symbol_math, unit_math
+from vegglue.wording.sentences import phrase
 
 # Points of a drawn density: its curve looks smooth at the width of a column.
 DENSITY_POINTS = 240
@@ -219,16 +220,17 @@ def draw_cylinder(inferred: Array, weights: Array, cylinder: Array, low: float, 
     greater = weighted_quantile(inferred, weights, [0.5])[0] > np.median(cylinder)
     sides = ("right", "left") if greater else ("left", "right")
     for values, share, name, line, face, side in (
-        (cylinder, np.ones(len(cylinder)), "rigid cylinders\n(plant survey)", "stems", "plants", sides[0]),
-        (inferred, weights, "inferred\nfrom the flow", "model", "wide", sides[1]),
+        (cylinder, np.ones(len(cylinder)), "cylinders", "stems", "plants", sides[0]),
+        (inferred, weights, "inferred", "model", "wide", sides[1]),
     ):
         grid, height = density(np.log10(values), share, low, high, (low, high))
         axes.fill_between(grid, height, color=COLOUR[face], linewidth=0, alpha=0.75)
         axes.plot(grid, height, color=COLOUR[line], linewidth=1.4)
         at = int(np.argmax(height))
-        label(axes, grid[at], height[at], name, line, ha=side, xytext=(8 if side == "left" else -8, -8))
+        text = phrase("label", name).replace(" (", "\n(").replace(" from", "\nfrom")
+        label(axes, grid[at], height[at], text, line, ha=side, xytext=(8 if side == "left" else -8, -8))
     axes.set(xlim=(low, high), yticks=[])
-    formula_labels(axes, f"{symbol_math(symbol)} of the dense patches [–]")
+    formula_labels(axes, f"{symbol_math(symbol)} [–]")
     axes.set_ylim(0, axes.get_ylim()[1] * 1.05)
     axes.spines["left"].set_visible(False)
     _powers(axes, "x")
@@ -251,8 +253,8 @@ def draw_weights(weights: Array) -> Figure:
         xscale="log",
         xlim=(1, len(weights)),
         ylim=(0, 1.02),
-        xlabel="members, heaviest first",
-        ylabel="share of the weight [–]",
+        xlabel=phrase("label", "members"),
+        ylabel=phrase("label", "weight"),
     )
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
     return figure

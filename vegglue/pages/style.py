@@ -46,15 +46,11 @@ WIDTH, HEIGHT = 4.7, 3.1  # one column of the page [inch]
 SMALL = 7.5  # direct labels [pt]
 
 
-def _face() -> list[str]:
-    """The first of some sober faces that is installed; DejaVu Sans comes with matplotlib and fills missing glyphs."""
+def _settings() -> dict[str, Any]:
+    # The first of some sober faces that is installed; DejaVu Sans comes with matplotlib and fills missing glyphs.
     installed = {font.name for font in font_manager.fontManager.ttflist}
     wanted = ("Source Sans 3", "Inter", "Helvetica", "Arial", "Liberation Sans")
-    return [*[name for name in wanted if name in installed][:1], "DejaVu Sans"]
-
-
-def _settings() -> dict[str, Any]:
-    face = _face()
+    face = [*[name for name in wanted if name in installed][:1], "DejaVu Sans"]
     ink, muted = COLOUR["ink"], COLOUR["muted"]
     return {
         "font.family": face,
