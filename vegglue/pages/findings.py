@@ -136,8 +136,8 @@ def findings(run: Run) -> list[tuple[object, bool]]:
     for (experiment, section), canopy in observations.canopy_height.items():
         heights = np.unique(median_plants(run, experiment).canopy_height.round(3)) if canopy.unknown is None else ()
         reason, modelled = "" if canopy.unknown is None else canopy.unknown.value, tuple(map(float, heights))
-        size = canopy.value, canopy.standard_error
-        found.append((CanopyHeightRead(section, experiment, *size, reason, modelled), False))
+        height = canopy.value, canopy.standard_error
+        found.append((CanopyHeightRead(section, experiment, *height, reason, modelled), False))
     for kind, rmse in posterior.fit.best_rmse.items():
         compared = residual_compared(posterior, kind, rmse, best=True)
         found.append((compared, compared.compared == "exceeds"))
@@ -153,8 +153,8 @@ def findings(run: Run) -> list[tuple[object, bool]]:
         prescribed = None if any(isinstance(value, str) for value in given) else sum(map(float, given))
         off = 0.0 if prescribed is None else (measured.value - prescribed) / measured.standard_error
         changed = changing_discharge(case, experiment, x) or ""
-        size = measured.value, measured.standard_error
-        discharge = DischargeMeasured(section, experiment, *size, prescribed, changed, off)
+        carried = measured.value, measured.standard_error
+        discharge = DischargeMeasured(section, experiment, *carried, prescribed, changed, off)
         found.append((discharge, abs(off) > DISCHARGE_DOUBTED and not changed))
     if run.ensemble is not None:
         found += [(one, True) for one in doubts_of_predictions(run.ensemble)]

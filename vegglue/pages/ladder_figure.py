@@ -107,7 +107,7 @@ def _paint_errors(
     for (name, colour), value in sorted(ends.items(), key=lambda one: one[1]):
         lowest = max(value, lowest + 0.065 * top)  # names are pushed apart that would cover each other
         axes.annotate(
-            words, (right + 0.32, lowest), fontsize=SMALL + 0.5, color=COLOUR[colour], va="center",
+            phrase("label", name), (right + 0.32, lowest), fontsize=SMALL + 0.5, color=COLOUR[colour], va="center",
             annotation_clip=False,
         )  # fmt: skip
         axes.plot([right + 0.05, right + 0.3], [value, lowest], color=COLOUR["rule"], linewidth=0.7)

@@ -96,7 +96,7 @@ def paint_places(axes: Axes, x: Array, y: Array, score: Array, term: str, marks:
         text = phrase("steps_of_score", 0.25 * full, largest)
         axes.text(1.0, 1.02, text, transform=axes.transAxes, ha="right", fontsize=SMALL, color=COLOUR["muted"])
         for place, line, sign, colour in ((0.0, "━", 1, "model"), (0.28, "╌", -1, "measured")):
-            acting = f"{line} {phrase('acting', term, sign)} here would help"
+            acting = f"{line} {phrase('acting', term, sign)} {phrase('label', 'helps')}"
             axes.text(place, 1.02, acting, transform=axes.transAxes, fontsize=SMALL, color=COLOUR[colour])
     _paint_marks(axes, marks)
     if len(marks.aside):
