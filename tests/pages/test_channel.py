@@ -52,7 +52,7 @@ def test_the_place_of_the_section_has_few_digits() -> None:
     site = build_site(case)
     odd = replace(site, grid=replace(site.grid, x=site.grid.x + 1.0 / 3.0))
     title = draw_channel(case, odd, read_observations(case)).axes[-1].get_title(loc="left")
-    place = re.search(r"across x = (\d+(\.\d+)?) m", title)
+    place = re.search(r"x = (\d+(\.\d+)?) m", title)
     assert place is not None
     assert len(place[1]) <= 5
 
