@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from vegglue.errors import InputError
 from vegglue.flow.status import FAILED, RUN_BY_COMMAND
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import read_ensemble
+from vegglue.results.verdict import CommandCompared, CommandDiffers, CommandNotSettled
 from vegglue.workflow import command_model
 
 MEMBERS = 8
@@ -212,8 +214,8 @@ def test_a_command_that_never_rests_gets_no_verdict(tmp_path: Path) -> None:
     case = commanded(tmp_path, RESTLESS, "", COARSE, SMALL, error)
     found = vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1).verdict
     assert found.kind == "cannot-tell"
-    assert "did not settle. Its differences in" in found.sentence
-    assert "`engine.step` larger. What was found with it: " in found.sentence
+    assert isinstance(found.distrust, CommandNotSettled)
+    assert set(found.distrust.parameters) <= set(case.parameters)
 
 
 @pytest.mark.slow
@@ -232,11 +234,12 @@ def test_a_command_far_from_what_was_reckoned_with_gets_no_verdict(
 
     monkeypatch.setattr("vegglue.workflow.diagnose.diagnose_model", found_once)
     believed = vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1).verdict
-    assert "differs from what was reckoned with by" in believed.remarks[0]
-    assert "the command of `engine` differs" not in believed.sentence
+    assert isinstance(believed.notes[0], CommandCompared)
+    assert believed.notes[0].errors > 0.0
+    assert believed.distrust is None
     monkeypatch.setattr(command_model, "BEYOND_BELIEF", -1.0)
     (tmp_path / "runs" / "brook" / "diagnosis.h5").unlink()
     doubted = vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1).verdict
     assert doubted.kind == "cannot-tell"
-    assert doubted.sentence.endswith(f"What was found with it: {believed.sentence}")
-    assert doubted.remarks == believed.remarks
+    assert isinstance(doubted.distrust, CommandDiffers)
+    assert replace(doubted, kind=believed.kind, distrust=None) == believed
