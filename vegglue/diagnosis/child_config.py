@@ -25,7 +25,6 @@ from vegglue.case.messages import nearest_effect
 from vegglue.case.resolved_config import Tree
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LONGEST_NAME, case_name
-from vegglue.effects.definition import Effect
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.errors import InputError
@@ -52,38 +51,25 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
             raise InputError(f"--add: `{name}`: expected a place such as [x47.3,y-0.5]; correct it.")
         shapes = {shape.name: shape.default for shape in effect.shapes}
         return place_candidate(effect, shapes | {"x": place[0], "y": place[1]})
-    kind = _kind_of_place(case, station, effect, name, where) if where else None
-    candidate = _acting_in(case, effect, kind, where)
+    candidate = Candidate(effect)
+    if where:
+        # On a patch act effects that have its number among their shapes: any other would act everywhere.
+        places = where_it_may_act(case, station)
+        kinds = ["experiment", *(["section", "device"] if effect.stage == "sensor" else [])]
+        kinds += ["patch"] if effect.each == "patch" else []
+        kind = next((one for one in kinds if set(where) <= set(places[one])), None)
+        if kind is None:
+            known_places = " or ".join(f"{one}s ({', '.join(places[one]) or 'none'})" for one in kinds)
+            raise InputError(
+                f"--add: `{name}` acts nowhere: expected names of {known_places}, got {', '.join(where)}; correct them."
+            )
+        if kind == "patch" and len(where) > 1:
+            raise InputError(f"--add: `{name}`: expected one patch, got {len(where)}; add them one after the other.")
+        names = [patch.name for patch in case.plants.patches] if kind == "patch" else []
+        candidate = patch_candidate(effect, names.index(where[0]), case) if names else acting_in(effect, kind, where)
     if at_work(case, candidate):
         raise InputError(f"--add: `{name}` is at work in {case.name} already; add another one.")
     return candidate
-
-
-def _kind_of_place(case: Case, station: pd.DataFrame, effect: Effect, name: str, where: tuple[str, ...]) -> str:
-    """What the names in brackets are of: experiments, sections, devices or a patch.
-
-    Errors: InputError where an effect cannot act in one of them alone. On a patch that are effects that have its number
-    among their shapes: any other would act everywhere under the name of a patch.
-    """
-    places = where_it_may_act(case, station)
-    kinds = ["experiment", *(["section", "device"] if effect.stage == "sensor" else [])]
-    kinds += ["patch"] if effect.each == "patch" else []
-    kind = next((one for one in kinds if set(where) <= set(places[one])), None)
-    if kind is None:
-        known = " or ".join(f"{one}s ({', '.join(places[one]) or 'none'})" for one in kinds)
-        raise InputError(
-            f"--add: `{name}` acts nowhere: expected names of {known}, got {', '.join(where)}; correct them."
-        )
-    if kind == "patch" and len(where) > 1:
-        raise InputError(f"--add: `{name}`: expected one patch, got {len(where)}; add them one after the other.")
-    return kind
-
-
-def _acting_in(case: Case, effect: Effect, kind: str | None, where: tuple[str, ...]) -> Candidate:
-    """The effect where it acts: one patch, or some experiments, sections or devices; everywhere without a kind."""
-    if kind == "patch":
-        return patch_candidate(effect, [patch.name for patch in case.plants.patches].index(where[0]), case)
-    return acting_in(effect, kind, where) if kind else Candidate(effect)
 
 
 def spread_over_its_error(anomaly: LocalAnomaly) -> LocalAnomaly:

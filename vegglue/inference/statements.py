@@ -397,9 +397,7 @@ def sample_statements(posterior: Posterior, symbols: Mapping[str, str] | None = 
 def weight_statements(posterior: Posterior) -> Iterator[object]:
     """What the weights are worth, and whether that is too little for a posterior."""
     weights = posterior.weighting
-    yield WeightSummary(
-        weights.effective_size, posterior.sample.members, weights.largest_weight, weights.pareto_k
-    )
+    yield WeightSummary(weights.effective_size, posterior.sample.members, weights.largest_weight, weights.pareto_k)
     if not posterior.claimed:
         yield NoPosteriorClaimed(weights.effective_size, posterior.refinement is not None)
     if weights.pareto_k > TRUSTED_K_HAT:
@@ -412,9 +410,7 @@ def pressed_bounds(posterior: Posterior, name: str) -> list[str]:
     return [side for side, pressed in zip(("lower", "upper"), hit, strict=True) if pressed]
 
 
-def parameters_at_bounds(
-    posterior: Posterior, symbols: Mapping[str, str] | None = None
-) -> ParametersAtBounds | None:
+def parameters_at_bounds(posterior: Posterior, symbols: Mapping[str, str] | None = None) -> ParametersAtBounds | None:
     """All parameters that end at bounds of their priors; None if none does."""
     at = {name: tuple(pressed_bounds(posterior, name)) for name in posterior.parameters}
     found = tuple((parameter_of(posterior, name, symbols), sides) for name, sides in at.items() if sides)
@@ -428,9 +424,7 @@ def off_its_prior(posterior: Posterior, name: str) -> bool:
     return posterior.claimed and not inside and not pressed_bounds(posterior, name)
 
 
-def parameter_statements(
-    posterior: Posterior, name: str, symbols: Mapping[str, str] | None = None
-) -> Iterator[object]:
+def parameter_statements(posterior: Posterior, name: str, symbols: Mapping[str, str] | None = None) -> Iterator[object]:
     """What is known of a parameter, the bounds it presses against, and whether it lies off its prior."""
     marginals, parameter = posterior.marginals, parameter_of(posterior, name, symbols)
     low, high = (float(value) for value in marginals.quantiles[name][[0, -1]])
@@ -503,9 +497,7 @@ def validation_statements(posterior: Posterior) -> Iterator[object]:
     if tested := misfit_tested(posterior):
         yield tested
     alone, groups = refined.leave_one_out, refined.groups
-    yield StationsLeftOut(
-        alone.elpd, alone.elpd_error, posterior.fit.used, int(np.sum(alone.score_k > TRUSTED_K_HAT))
-    )
+    yield StationsLeftOut(alone.elpd, alone.elpd_error, posterior.fit.used, int(np.sum(alone.score_k > TRUSTED_K_HAT)))
     if groups.left_out.size:
         # (ln p(y) + sum_i ln s_i) / n of each group of n stations: the density of y_i / s_i, s_i the errors. That of
         # y_i itself is the higher the smaller its unit, so that velocities would come last beside levels.
@@ -520,9 +512,7 @@ def validation_statements(posterior: Posterior) -> Iterator[object]:
     untrusted = [str(name) for name, k in zip(groups.left_out, groups.left_out_k, strict=True) if k > TRUSTED_K_HAT]
     if untrusted:
         yield GroupsUntrusted(tuple(untrusted))
-    yield BandCoverage(
-        alone.inside50, alone.inside95, alone.p_calibration, not alone.p_calibration < DOUBTED
-    )
+    yield BandCoverage(alone.inside50, alone.inside95, alone.p_calibration, not alone.p_calibration < DOUBTED)
     yield from stations_standing_out(posterior)
 
 

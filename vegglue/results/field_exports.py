@@ -43,9 +43,18 @@ def write_geotiff(path: Path, values: Array, grid: Grid, frame: Frame | None) ->
             f"{path}: GeoTIFFs are written by tifffile, which is not installed; run `pip install 'vegglue[field]'`, or "
             "leave them out by --only csv."
         ) from None
-    keys = _keys(frame)
+    # The directory of keys; without a code of EPSG only that it is a map of areas.
+    code = epsg_code(frame)
+    entries = [(MODEL_TYPE, 0, 1, 1), (RASTER_TYPE, 0, 1, 1)] + ([(PROJECTED, 0, 1, code)] if code else [])
+    keys = (1, 1, 0, len(entries), *(number for entry in entries for number in entry))
+    # The 4 by 4 matrix, row by row, from (column, row) to (east, north).
+    west, north_edge = float(grid.x[0]) - 0.5 * grid.dx, float(grid.y[-1]) + 0.5 * grid.dy
+    place = frame or Frame(origin=(0.0, 0.0), angle=0.0)
+    (a, d), (b, e) = place.turned_to_map(grid.dx, 0.0), place.turned_to_map(0.0, -grid.dy)
+    c, f = place.to_map(west, north_edge)
+    affine = (a, b, 0.0, c, d, e, 0.0, f, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     tags = [
-        (TRANSFORMATION, "d", 16, _affine(grid, frame), True),
+        (TRANSFORMATION, "d", 16, affine, True),
         (GEO_KEYS, "H", len(keys), keys, True),
         (MARKS_NO_DATA, "s", 0, f"{NO_LEVEL_THERE:g}", True),
     ]
@@ -53,22 +62,6 @@ def write_geotiff(path: Path, values: Array, grid: Grid, frame: Frame | None) ->
     content = BytesIO()
     tifffile.imwrite(content, np.ascontiguousarray(north_up), extratags=tags, metadata=None, compression=None)
     write_file(path, content.getvalue(), MAKE_ROOM)
-
-
-def _affine(grid: Grid, frame: Frame | None) -> tuple[float, ...]:
-    """The 4 by 4 matrix, row by row, from (column, row) to (east, north)."""
-    west, north_edge = float(grid.x[0]) - 0.5 * grid.dx, float(grid.y[-1]) + 0.5 * grid.dy
-    place = frame or Frame(origin=(0.0, 0.0), angle=0.0)
-    (a, d), (b, e) = place.turned_to_map(grid.dx, 0.0), place.turned_to_map(0.0, -grid.dy)
-    c, f = place.to_map(west, north_edge)
-    return (a, b, 0.0, c, d, e, 0.0, f, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-
-
-def _keys(frame: Frame | None) -> tuple[int, ...]:
-    """The directory of keys; without a code of EPSG only that it is a map of areas."""
-    code = epsg_code(frame)
-    entries = [(MODEL_TYPE, 0, 1, 1), (RASTER_TYPE, 0, 1, 1)] + ([(PROJECTED, 0, 1, code)] if code else [])
-    return (1, 1, 0, len(entries), *(number for entry in entries for number in entry))
 
 
 def epsg_code(frame: Frame | None) -> int | None:
@@ -93,17 +86,12 @@ def quantities(flow: FlowFields, grid: Grid, frame: Frame | None) -> dict[str, A
     """The fields of one experiment by name (nx, ny); with a frame the components on the map too."""
     found = {name: getattr(flow, name) for name in ("bed", "level", "depth", "u", "v")}
     if frame is not None or grid.centreline is not None:
-        found["east_velocity"], found["north_velocity"] = _components_on_map(flow, grid, frame)
+        u, v = flow.u, flow.v
+        if grid.centreline is not None:  # turned by the direction of the centreline, then by the frame
+            theta = heading_at(grid.centreline, grid.x)[:, None]
+            u, v = u * np.cos(theta) - v * np.sin(theta), u * np.sin(theta) + v * np.cos(theta)
+        found["east_velocity"], found["north_velocity"] = frame.turned_to_map(u, v) if frame is not None else (u, v)
     return found
-
-
-def _components_on_map(flow: FlowFields, grid: Grid, frame: Frame | None) -> tuple[Array, Array]:
-    """u and v along and across a centreline turned by its direction theta, then by the frame of the model."""
-    u, v = flow.u, flow.v
-    if grid.centreline is not None:
-        theta = heading_at(grid.centreline, grid.x)[:, None]
-        u, v = u * np.cos(theta) - v * np.sin(theta), u * np.sin(theta) + v * np.cos(theta)
-    return frame.turned_to_map(u, v) if frame is not None else (u, v)
 
 
 def on_the_map(x: Array, y: Array, grid: Grid, frame: Frame | None) -> tuple[Array, Array]:
@@ -252,12 +240,12 @@ def _write(path: Path, heading: list[str], columns: list[Array]) -> None:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(heading)
-    writer.writerows([_shown(value) for value in row] for row in zip(*columns, strict=True))
+
+    def shown(value: object) -> str:
+        """Numbers in full, so that they are the same when read again; nothing for what is unknown."""
+        if isinstance(value, float | np.floating):
+            return "" if np.isnan(value) else repr(float(value))
+        return str(value)
+
+    writer.writerows([shown(value) for value in row] for row in zip(*columns, strict=True))
     write_text(path, text.getvalue(), MAKE_ROOM_THERE)
-
-
-def _shown(value: object) -> str:
-    """Numbers in full, so that they are the same when read again; nothing for what is unknown."""
-    if isinstance(value, float | np.floating):
-        return "" if np.isnan(value) else repr(float(value))
-    return str(value)

@@ -107,11 +107,27 @@ def write_to_grow(path: Path, groups: Mapping[str, Group], attributes: Mapping[s
 
 
 def _image(groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> bytes:
-    """A file in memory: on a full disk the HDF5 library crashes instead of raising."""
+    """A file in memory: on a full disk the HDF5 library crashes instead of raising.
+
+    Coordinates are dimension scales of a group's own, one attached to every dimension of every variable.
+    """
     with h5py.File("image", "w", driver="core", backing_store=False) as file:
         file.attrs.update(attributes)
         for name, content in groups.items():
-            _write_group(file, name, content)
+            group = file.create_group(name, track_order=True)
+            clash = sorted(set(content.coordinates) & set(content.variables))
+            if clash:
+                raise InputError(f"parameters: {clash} are names of dimensions of the group {name}; rename them.")
+            for dim, values in content.coordinates.items():
+                scale = _dataset(group, dim, values)
+                scale.make_scale(dim)
+                if dim in content.units:
+                    scale.attrs["units"] = content.units[dim]
+            for key, variable in content.variables.items():
+                dataset = _dataset(group, key, variable.values, variable.compressed)
+                dataset.attrs["units"] = variable.unit
+                for axis, dim in enumerate(variable.dims):
+                    dataset.dims[axis].attach_scale(group[dim])
         file.flush()
         return bytes(file.id.get_file_image())
 
@@ -126,8 +142,19 @@ def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
     """
     try:
         if mode == "r":
-            _refuse_damaged(path)
-        file = _without_locks(path, mode)
+            state = state_of(path)
+            if is_unchanged(*state) is False:
+                refuse_in_use(path)
+                raise StorageError(f"{path}: is broken, it has changed since it was written; {AGAIN}.")
+            if (why := why_unreadable(*state, by=READ_HDF5)) is not None:
+                refuse_in_use(path)
+                raise StorageError(f"{path}: cannot be opened ({why}); {AGAIN}.")
+        try:
+            file = h5py.File(path, mode, locking=False)
+        except OSError as error:
+            if "locking flag" not in str(error):
+                raise
+            file = h5py.File(path, mode)  # this very process has it open, with locks
     except StorageError:
         raise
     except UNREADABLE as error:
@@ -142,18 +169,6 @@ def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
         yield file
 
 
-def _refuse_damaged(path: Path) -> None:
-    """Errors: StorageError when a file is not what was written, or cannot be read to its end."""
-    state = state_of(path)
-    if is_unchanged(*state) is False:
-        refuse_in_use(path)
-        raise StorageError(f"{path}: is broken, it has changed since it was written; {AGAIN}.")
-    why = why_unreadable(*state, by=READ_HDF5)
-    if why is not None:
-        refuse_in_use(path)
-        raise StorageError(f"{path}: cannot be opened ({why}); {AGAIN}.")
-
-
 def refuse_in_use(path: Path) -> None:
     """Errors: StorageError when another program has the file open to change it, which locks it; OSError without one."""
     with path.open("rb") as file:
@@ -163,15 +178,6 @@ def refuse_in_use(path: Path) -> None:
             raise StorageError(f"{path} is in use by another program; close it there.") from error
         except OSError:
             pass  # a file system without locks cannot tell
-
-
-def _without_locks(path: Path, mode: str) -> h5py.File:
-    try:
-        return h5py.File(path, mode, locking=False)
-    except OSError as error:
-        if "locking flag" not in str(error):
-            raise
-        return h5py.File(path, mode)  # this very process has it open, with locks
 
 
 def stored_attribute(path: Path, attribute: str) -> str | None:
@@ -191,24 +197,6 @@ def read_groups(file: h5py.File) -> dict[str, dict[str, np.ndarray]]:
 def read_group(group: h5py.Group) -> dict[str, np.ndarray]:
     """All datasets of a group by name, strings as str and booleans as bool."""
     return {name: read_values(dataset) for name, dataset in group.items() if isinstance(dataset, h5py.Dataset)}
-
-
-def _write_group(file: h5py.File, name: str, content: Group) -> None:
-    """Coordinates as dimension scales of the group's own, one attached to every dimension of every variable."""
-    group = file.create_group(name, track_order=True)
-    clash = sorted(set(content.coordinates) & set(content.variables))
-    if clash:
-        raise InputError(f"parameters: {clash} are names of dimensions of the group {name}; rename them.")
-    for dim, values in content.coordinates.items():
-        scale = _dataset(group, dim, values)
-        scale.make_scale(dim)
-        if dim in content.units:
-            scale.attrs["units"] = content.units[dim]
-    for key, variable in content.variables.items():
-        dataset = _dataset(group, key, variable.values, variable.compressed)
-        dataset.attrs["units"] = variable.unit
-        for axis, dim in enumerate(variable.dims):
-            dataset.dims[axis].attach_scale(group[dim])
 
 
 def _dataset(group: h5py.Group, name: str, values: Any, compressed: tuple[int, ...] | None = None) -> h5py.Dataset:

@@ -6,8 +6,6 @@ filters that load code would let a received file read, or fill, any other file o
 as each command starts it anew.
 """
 
-from collections.abc import Iterator
-
 import h5py
 import numpy as np
 from h5py import h5d, h5z
@@ -33,9 +31,15 @@ def why_foreign(file: h5py.File) -> str | None:
             if not _is_hard(group, key):
                 return f"{name}/{key} is a link"
             dataset = group[key]
-            found = _why_not(dataset)
-            if found:
-                return f"{name}/{key} {found}"
+            if not isinstance(dataset, h5py.Dataset):
+                return f"{name}/{key} is no dataset"
+            made = dataset.id.get_create_plist()
+            if made.get_layout() == h5d.VIRTUAL:
+                return f"{name}/{key} is put together from other files"
+            if made.get_external_count():
+                return f"{name}/{key} lies in other files"
+            if {made.get_filter(number)[0] for number in range(made.get_nfilters())} - FILTERS:
+                return f"{name}/{key} is packed in a way that vegglue does not use"
             room -= int(np.prod(dataset.shape or (), dtype=object)) * dataset.dtype.itemsize
             if room < 0:
                 return f"{name}/{key} claims more numbers than the file can hold"
@@ -46,47 +50,24 @@ def _is_hard(group: h5py.Group, name: str) -> bool:
     return isinstance(group.get(name, getlink=True), h5py.HardLink)
 
 
-def _why_not(dataset: h5py.Dataset | h5py.Group) -> str | None:
-    if not isinstance(dataset, h5py.Dataset):
-        return "is no dataset"
-    made = dataset.id.get_create_plist()
-    if made.get_layout() == h5d.VIRTUAL:
-        return "is put together from other files"
-    if made.get_external_count():
-        return "lies in other files"
-    if {made.get_filter(number)[0] for number in range(made.get_nfilters())} - FILTERS:
-        return "is packed in a way that vegglue does not use"
-    return None
-
-
 AT_ONCE = 1 << 26  # [bytes] of values read at once
 READ_HDF5 = f"{__name__}:read_all_values"  # as `sandboxed_reader` names it
 
 
 def read_all_values(path: str) -> None:
-    """Read every value of a file, but of a foreign one, of which the command says so itself; errors of the library."""
+    """Read every value of a file, except of a foreign one, which the command itself refuses. Raises errors of h5py."""
     with h5py.File(path, "r", locking=False) as file:
-        if why_foreign(file) is None:
-            for _ in _all_values(file):
-                pass
-
-
-def _all_values(file: h5py.File) -> Iterator[object]:
-    yield dict(file.attrs)
-    for group in file.values():
-        yield dict(group.attrs)
-        for dataset in group.values():
-            yield dict(dataset.attrs)
-            for rows in _blocks(dataset):
-                yield dataset[rows]
-
-
-def _blocks(dataset: h5py.Dataset) -> Iterator[slice | tuple[()]]:
-    """Rows, so many at once as are one block."""
-    if not dataset.shape:
-        yield ()
-        return
-    row = max(dataset.dtype.itemsize * int(np.prod(dataset.shape[1:], dtype=object)), 1)
-    step = max(AT_ONCE // row, 1)
-    for start in range(0, dataset.shape[0], step):
-        yield slice(start, start + step)
+        if why_foreign(file) is not None:
+            return
+        dict(file.attrs)
+        for group in file.values():
+            dict(group.attrs)
+            for dataset in group.values():
+                dict(dataset.attrs)
+                if not dataset.shape:
+                    dataset[()]
+                    continue
+                row = max(dataset.dtype.itemsize * int(np.prod(dataset.shape[1:], dtype=object)), 1)
+                step = max(AT_ONCE // row, 1)
+                for start in range(0, dataset.shape[0], step):  # so many rows as are one block
+                    dataset[start : start + step]

@@ -76,7 +76,10 @@ def fitting(group: ReadGroup, stored: Mapping[str, Stored], sizes: Mapping[str, 
     known = dict(sizes or {})
     for name, one in stored.items():
         values = group[name]
-        if values.ndim != len(one.dims) or not _has_type(values, one.type):
+        fits = values.dtype.kind in _KINDS[np.dtype(one.type).kind] and (
+            values.dtype.kind != "O" or all(isinstance(text, str) for text in values.flat)
+        )
+        if values.ndim != len(one.dims) or not (fits or not values.size):  # an empty column has no type of its own
             raise ValueError(f"{name} is no array of {len(one.dims)} dimensions and its type")
         for dim, size in zip(one.dims, values.shape, strict=True):
             if known.setdefault(dim, size) != size:
@@ -85,14 +88,6 @@ def fitting(group: ReadGroup, stored: Mapping[str, Stored], sizes: Mapping[str, 
         if dim in group and group[dim].shape != (size,):
             raise ValueError(f"{dim} has not {size} entries")
     return group
-
-
-def _has_type(values: np.ndarray, wanted: Any) -> bool:
-    if not values.size:  # an empty column has no type of its own
-        return True
-    if values.dtype.kind not in _KINDS[np.dtype(wanted).kind]:
-        return False
-    return values.dtype.kind != "O" or all(isinstance(one, str) for one in values.flat)
 
 
 _STATED: dict[type, tuple[tuple[type, ...], str]] = {
