@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 import vegglue
+from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import sample_of
-from vegglue.ensemble.solve_chunk import solve_chunk
+from vegglue.inference.solve_ensemble import solve_chunk
 from vegglue.measurements.observations import read_observations
-from vegglue.site.gridded_site import build_site
 
 case = vegglue.load_case(sys.argv[1])
 given = json.loads(Path("parameters.json").read_text(encoding="utf-8"))["parameters"]

@@ -28,24 +28,24 @@ ERRORS = ("experiment: June}", "experiment: June, standard_error: 0.01}")
 
 
 @pytest.mark.parametrize(
-    ("body", "said"),
+    ("body", "named"),
     [
-        ("raise KeyError('x')", "The effect `slow_stones` fails when it acts, in line 6: KeyError: 'x'; mend it."),
-        ("return {'rate': cells.rate * float('nan')}", "The effect `slow_stones` gives what is no finite number"),
-        ("return {'rate': cells.rate[:2, :2] * excess}", "The effect `slow_stones` gives `rate`; expected the shape"),
-        ("return {'rate': cells.rate * (1 + 0j)}", "gives `rate`; expected real numbers, got complex128."),
-        ("return {'ratte': cells.rate}", "The effect `slow_stones` gives `ratte`; expected a dict with `rate`."),
-        ("cells.rate * (1 + excess)", "The effect `slow_stones` gives NoneType; expected a dict with `rate`."),
+        ("raise KeyError('x')", "KeyError"),
+        ("return {'rate': cells.rate * float('nan')}", "finite"),
+        ("return {'rate': cells.rate[:2, :2] * excess}", "`rate`"),
+        ("return {'rate': cells.rate * (1 + 0j)}", "complex128"),
+        ("return {'ratte': cells.rate}", "`ratte`"),
+        ("cells.rate * (1 + excess)", "NoneType"),
     ],
 )
-def test_what_an_effect_does_wrong_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], body: str, said: str
+def test_what_an_effect_does_wrong_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], body: str, named: str
 ) -> None:
     config = write_reach(tmp_path, COARSE, SMALL, ERRORS)
     (tmp_path / "stones.py").write_text(EFFECT.format(body=body), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     code, told = said_to(monkeypatch, capsys, "diagnose", config, "--trust", "--jobs", 1)
-    assert (code, said in told) == (2, True), told
+    assert (code, "slow_stones" in told, named in told) == (2, True, True), told
 
 
 def test_an_effect_at_work_that_fails_ends_a_simulation(
