@@ -34,7 +34,7 @@ from vegglue.measurements.plausibility import is_mark
 
 # Endings of files that may hold measurements; others need an entry in `files`.
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".dis")
-ENDINGS = (*TEXT_ENDINGS, *WORKBOOKS, *BINARY_ENDINGS)
+TABLE_ENDINGS = (*TEXT_ENDINGS, *WORKBOOKS, *BINARY_ENDINGS)
 # Files of a folder that are none of its measurements.
 OTHERS = ("answer.json", "readme.txt")
 # How names of files begin that programs leave beside a table: locks of workbooks, and what a Mac keeps of every file.
@@ -166,7 +166,7 @@ def _candidates(folder: Path, options: Mapping[Path, FileOptions], used: Sequenc
     def is_read(path: Path) -> bool:
         if path.stem.lower() == HELD_OUT or path in options:
             return path.stem.lower() != HELD_OUT
-        if path.suffix.lower() not in ENDINGS or path.name.lower() in OTHERS:
+        if path.suffix.lower() not in TABLE_ENDINGS or path.name.lower() in OTHERS:
             return False
         exported = re.compile(rf"{re.escape(path.stem)}([^0-9A-Za-z]|$)")  # `mill_000_ASC` of `mill_000`
         return path.suffix.lower() not in BINARY_ENDINGS or not any(map(exported.match, texts))
