@@ -202,12 +202,14 @@ STATEMENTS = (
     StationsStandOut(1, "June", "A", 12.5, -0.3, 4.2), StationsStandOut(9, "June", "A", 12.5, -0.3, 4.2),
     NothingToCompare(),
     ParameterBetweenExperiments(PHI, True, (("low", 0.9, 0.02), ("high", 1.1, 0.03)), 33.0, 1, 1e-8, 16.9, "differs"),
-    ParametersAlike((N_B,), 0.3), MisfitOfExperiments((("low", 20.0, 12.0, 15), ("high", 15.0, np.nan, 15)), 1.2, 8.0, 1, 0.005),
+    MisfitOfExperiments((("low", 20.0, 12.0, 15), ("high", 15.0, np.nan, 15)), 1.2, 8.0, 1, 0.005),
+    ParametersAlike((N_B,), 0.3),
     ErrorsOfComparison(False, 1.2), CalibrationTransfers(), CalibrationDiffers((PHI,), 1.2),
 )  # fmt: skip
 STEPS = (
     *(NextStep(action, "brook.yaml") for action in ("diagnose", "discover", "extend", "extend-again", "mend", "next")),
-    NextStep("go-on", model=("brook+wind.yaml", "../brook-wind/report.html")), NextStep("compare", model=("brook.yaml", "")),
+    NextStep("go-on", model=("brook+wind.yaml", "../brook-wind/report.html")),
+    NextStep("compare", model=("brook.yaml", "")),
     NextStep("measure", measurement=ProposedMeasurement("a gauge at x = 5 m", "June", 5.0, 1, 0.5, 0.2, 9.0),
              purposes=(Purpose("steep_bank", STEEP.title, "k_s"), Purpose("wind from waves", "", ""))),
     NextStep("no-measurement", purposes=(Purpose("wind from waves", "", ""), Purpose("weir", "", "n_b"))),
@@ -232,9 +234,15 @@ FINDINGS = (
     DischargeMeasured("D3", "high", 2.1, 0.1, 1.7, "", 4.0), DischargeMeasured("D3", "high", 2.1, 0.1, None, "", 0.0),
     MembersSolved(2044, 1, 3, None, (2048, 0)), MassError(2e-6), FlowOfBuiltInEngine(),
 )  # fmt: skip
+
+
+def three_days(value: float) -> ProposedMeasurement:
+    return ProposedMeasurement("section 0", "June", 1.0, 3, 1.5, 2.0, value)
+
+
 QUESTIONS = (
-    Question(RivalEffects(("wind", "waves")), (ProposedMeasurement("section 0", "June", 1.0, 3, 1.5, 2.0, 9.0),)),
-    Question(OneOfRivals("wind", ("waves", "weir")), (ProposedMeasurement("section 0", "June", 1.0, 3, 1.5, 2.0, 2.1),)),
+    Question(RivalEffects(("wind", "waves")), (three_days(9.0),)),
+    Question(OneOfRivals("wind", ("waves", "weir")), (three_days(2.1),)),
     Question(HiddenEffect("bed_trend", "n_b"), (ProposedMeasurement("gauge", "June", 1.0, 1, 0.5, 12.0, 60.0),), 25.0),
     Question(HiddenEffect("bed_trend", "n_b"), (ProposedMeasurement("gauge", "June", 1.0, 1, 0.5, 26.0, 60.0),), 25.0),
 )

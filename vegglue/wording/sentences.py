@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from vegglue.errors import shown_path
 from vegglue.wording.numbers import (
+    MINUS,
     NARROW,
     Written,
     as_given,
@@ -135,7 +136,9 @@ WRITTEN_BY: dict[str, Callable[..., Any]] = {
     "fixed": lambda value, places: Written(f"{round(value, places) + 0.0:.{places}f}", fixed(value, places)),
     "quantity": with_unit,
     "unit": lambda unit: with_unit_only(unit),
-    "percent": lambda share: Written(f"{100 * share:.0f} %", percent(share)),
+    "percent": lambda share: Written(
+        percent(share).replace(NARROW, " ").replace(MINUS, "-"), html.escape(percent(share))
+    ),
     "p_equals": lambda p: Written(
         "p < 0.001" if p < 0.001 else f"p = {p:.2g}", f"p &lt;{NARROW}0.001" if p < 0.001 else f"p = {short(p, 2)}"
     ),
