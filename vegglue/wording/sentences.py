@@ -154,7 +154,7 @@ WRITTEN_BY: dict[str, Callable[..., Any]] = {
         " to ".join(f"{round(end, decimals_between(*ends)) + 0.0:.{decimals_between(*ends)}f}" for end in ends),
         interval(*ends),
     ),
-    "sized": lambda value, ends, unit="-": sized(value, *ends, unit),
+    "sized": lambda value, ends, unit="-": sized(value, ends[0], ends[1], unit),
     "symbol": lambda name, written="": Written(name, symbol_html(written or name)),
     "code": lambda text: Written(text, f"<code>{html.escape(text)}</code>"),
     "command": lambda text: Written(f"`{text}`", f"<code>{html.escape(text)}</code>"),
