@@ -94,7 +94,7 @@ def test_the_page_is_true(pair: Pair, tmp_path: Path, monkeypatch: pytest.Monkey
     assert refused.returncode == 2
     assert "which runs as code" in refused.stderr
     assert not (tmp_path / "runs").exists()
-    checked = shell(tmp_path, "check", "brook_by_command.yaml", "--trust").stdout
+    checked = " ".join(shell(tmp_path, "check", "brook_by_command.yaml", "--trust").stdout.split())
     assert re.search(r"The command of `engine` took [\d.]+ s at the medians of the priors: velocity 0\.\d+ to", checked)
     said = shell(tmp_path, "simulate", "brook_by_command.yaml", "--trust", "--members", 2, "--jobs", 2).stdout
     assert "2 members, run by the command, 0 failed" in said
