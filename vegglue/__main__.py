@@ -17,7 +17,9 @@ def enter() -> None:
 
         main()
     except KeyboardInterrupt:
-        print("Stopped; solved members and finished steps are kept: run the same command again.", file=sys.stderr)
+        from vegglue.wording.commands import LAST_WORDS
+
+        print(LAST_WORDS["stopped"], file=sys.stderr)
         sys.exit(130)
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # from here on Python only takes down what it has put up

@@ -17,6 +17,7 @@ from vegglue import parallel
 from vegglue.__main__ import enter
 from vegglue.cli.main import ending_well
 from vegglue.errors import InputError, StorageError
+from vegglue.wording.commands import LAST_WORDS
 
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
 Say = Callable[..., tuple[int, str]]
@@ -36,6 +37,10 @@ def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     return said
 
 
+def _file(name: str, reason: str) -> str:
+    return LAST_WORDS["file"].format(name, reason)
+
+
 def raises(error: BaseException) -> Callable[[], None]:
     def command() -> None:
         raise error
@@ -48,15 +53,11 @@ def raises(error: BaseException) -> Callable[[], None]:
     [
         (InputError("a mistake"), 2, "a mistake\n"),
         (StorageError("a.h5: the disk is full; make room."), 3, "a.h5: the disk is full; make room.\n"),
-        (OSError(errno.EACCES, "Permission denied", "runs"), 3, "runs cannot be used (Permission denied); what was"),
-        (OSError(errno.ESTALE, "Stale file handle"), 3, "The output, or a file, cannot be used (Stale file handle)"),
-        (
-            RuntimeError("Symlink loop from '/x'"),
-            2,
-            "A link leads back to itself (Symlink loop from '/x')",
-        ),
-        (MemoryError(), 3, "The memory is full; what was finished is kept"),
-        (SystemExit(130), 130, "Stopped; solved members and finished steps are kept"),
+        (OSError(errno.EACCES, "Permission denied", "runs"), 3, _file("runs", "Permission denied")),
+        (OSError(errno.ESTALE, "Stale file handle"), 3, _file(LAST_WORDS["output"], "Stale file handle")),
+        (RuntimeError("Symlink loop from '/x'"), 2, LAST_WORDS["link"].format("Symlink loop from '/x'")),
+        (MemoryError(), 3, LAST_WORDS["memory"]),
+        (SystemExit(130), 130, LAST_WORDS["stopped"]),
         (SystemExit(2), 2, ""),
     ],
     ids=["mistake", "storage", "system", "unnamed", "link", "memory", "stopped", "usage"],
@@ -86,9 +87,7 @@ def test_ctrl_c_while_libraries_load_is_one_sentence(
     finally:
         signal.signal(signal.SIGINT, before)
     assert ended.value.code == 130
-    assert (
-        capsys.readouterr().err == "Stopped; solved members and finished steps are kept: run the same command again.\n"
-    )
+    assert capsys.readouterr().err == f"{LAST_WORDS['stopped']}\n"
 
 
 def test_runs_that_are_a_file_are_told(tmp_path: Path, say: Say) -> None:
@@ -141,8 +140,7 @@ def test_an_output_that_is_full_is_told() -> None:
     with open("/dev/full", "w", encoding="utf-8") as full:
         done = subprocess.run(command("version"), stdout=full, stderr=subprocess.PIPE, env=ENVIRONMENT, text=True)
     assert done.returncode == 3
-    assert "No space left on device" in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert done.stderr == _file(LAST_WORDS["output"], "No space left on device") + "\n"
 
 
 def test_an_output_that_nobody_reads_on_ends_the_command_without_a_word() -> None:

@@ -1,7 +1,7 @@
 """From what was found to a verdict: when it names, when it only notes, when it cannot tell, and why."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -41,8 +41,10 @@ from vegglue.results.verdict import (
     NeighboursCorrelated,
     NeighboursExcluded,
     NoFlowHeldOut,
+    Note,
     ParameterFarFromPrior,
     Reason,
+    Remaining,
     StatedErrorsTooSmall,
     UncertainBetweenSections,
     is_too_small,
@@ -343,6 +345,11 @@ def test_a_misfit_far_smaller_than_its_errors_is_noted() -> None:
     assert [is_too_small(150.0 * ratio, 150) for ratio in (0.41, 0.6, 0.9, 3.0)] == [True, True, False, False]
     assert not is_too_small(0.41 * 6, 6)
     assert not is_too_small(0.0, 0)
+
+
+def test_every_reason_and_note_has_words() -> None:
+    kinds = {wording.tag_of(one) for one in (*get_args(Reason), *get_args(Note), *get_args(Remaining))}
+    assert kinds <= wording.macros().keys()
 
 
 def test_the_chance_of_a_misfit() -> None:

@@ -22,6 +22,7 @@ from vegglue.inference.solve_ensemble import chunk_size, solve_ensemble
 from vegglue.measurements.observations import read_observations
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.result_files import read_ensemble
+from vegglue.wording.commands import LAST_WORDS
 
 pytestmark = pytest.mark.slow
 
@@ -133,7 +134,7 @@ def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
         _, error = process.communicate(timeout=60)
     assert process.returncode == 130, error
-    assert "Stopped; solved members and finished steps are kept: run the same command again." in error
+    assert LAST_WORDS["stopped"] in error
     assert "Traceback" not in error
     assert stored(tmp_path / PART)[0].size >= CHUNK
 

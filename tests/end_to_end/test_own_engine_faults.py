@@ -22,6 +22,7 @@ from vegglue.flow.status import FAILED, RUN_BY_COMMAND
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import read_ensemble
 from vegglue.results.verdict import CommandCompared, CommandDiffers, CommandNotSettled
+from vegglue.wording.commands import LAST_WORDS
 from vegglue.workflow import command_model
 
 MEMBERS = 8
@@ -147,7 +148,7 @@ def test_ctrl_c_or_a_plain_kill_ends_what_is_under_way(how: signal.Signals, tmp_
     os.kill(process.pid, how)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert "Stopped; solved members and finished steps are kept" in said
+    assert LAST_WORDS["stopped"] in said
     for line in lines_of(marks):
         with pytest.raises(ProcessLookupError):
             os.kill(int(line.split()[0]), 0)

@@ -47,9 +47,7 @@ def new_command(
 
 def export_command(
     config: Config,
-    only: Annotated[
-        Literal["csv", "geotiff", "netcdf"] | None, typer.Option(help=HELP["export.only"])
-    ] = None,
+    only: Annotated[Literal["csv", "geotiff", "netcdf"] | None, typer.Option(help=HELP["export.only"])] = None,
     runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
@@ -68,16 +66,12 @@ def export_command(
 
 
 def effects_command(
-    name: Annotated[
-        str | None, typer.Argument(help=HELP["effects.name"], show_default=False)
-    ] = None,
+    name: Annotated[str | None, typer.Argument(help=HELP["effects.name"], show_default=False)] = None,
     config: Annotated[Path | None, typer.Option(help=HELP["effects.config"])] = None,
     check: Annotated[Path | None, typer.Option(help=HELP["effects.check"])] = None,
     as_object: Json = False,
     quiet: Quiet = False,
-    trust: Annotated[
-        bool, typer.Option("--trust", metavar=FLAG, help=HELP["effects.trust"])
-    ] = False,
+    trust: Annotated[bool, typer.Option("--trust", metavar=FLAG, help=HELP["effects.trust"])] = False,
     runs: Runs = RUNS,
 ) -> None:
     """List the physical effects that can be added, or show one of them."""

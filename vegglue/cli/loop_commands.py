@@ -30,12 +30,8 @@ from vegglue.wording.numbers import so_many
 
 
 def import_command(
-    folder: Annotated[
-        Path, typer.Argument(help=HELP["import.folder"])
-    ],
-    to: Annotated[
-        Path | None, typer.Option(help=HELP["import.to"])
-    ] = None,
+    folder: Annotated[Path, typer.Argument(help=HELP["import.folder"])],
+    to: Annotated[Path | None, typer.Option(help=HELP["import.to"])] = None,
     as_object: Json = False,
     quiet: Quiet = False,
     force: Force = False,
@@ -72,9 +68,7 @@ def import_command(
 
 def diagnose_command(
     config: Config,
-    details: Annotated[
-        bool, typer.Option("--details", metavar=FLAG, help=HELP["diagnose.details"])
-    ] = False,
+    details: Annotated[bool, typer.Option("--details", metavar=FLAG, help=HELP["diagnose.details"])] = False,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,
@@ -101,9 +95,7 @@ def diagnose_command(
 
 def discover_command(
     config: Config,
-    without: Annotated[
-        list[str] | None, typer.Option(help=HELP["discover.without"])
-    ] = None,
+    without: Annotated[list[str] | None, typer.Option(help=HELP["discover.without"])] = None,
     to: Annotated[Path | None, typer.Option(help=HELP["discover.to"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
@@ -122,13 +114,9 @@ def discover_command(
 
 def extend_command(
     config: Config,
-    add: Annotated[
-        list[str] | None, typer.Option(help=HELP["extend.add"])
-    ] = None,
+    add: Annotated[list[str] | None, typer.Option(help=HELP["extend.add"])] = None,
     shape: Annotated[list[str] | None, typer.Option(help=HELP["extend.shape"])] = None,
-    auto: Annotated[
-        bool, typer.Option("--auto", metavar=FLAG, help=HELP["extend.auto"])
-    ] = False,
+    auto: Annotated[bool, typer.Option("--auto", metavar=FLAG, help=HELP["extend.auto"])] = False,
     to: Annotated[Path | None, typer.Option(help=HELP["discover.to"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,

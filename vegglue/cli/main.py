@@ -24,7 +24,7 @@ from vegglue.cli.loop_commands import (
 from vegglue.cli.options import FLAG
 from vegglue.errors import InputError, StorageError
 from vegglue.version import VERSION
-from vegglue.wording.commands import ENDINGS, HELP
+from vegglue.wording.commands import HELP, LAST_WORDS
 
 MISTAKE, MACHINE, STOPPED = 2, 3, 130  # exit codes
 
@@ -44,17 +44,17 @@ def ending_well(command: Callable[[], object]) -> None:
     except StorageError as error:
         _end(str(error), MACHINE)
     except OSError as error:
-        where = ENDINGS["output"] if error.filename is None else error.filename
-        _end(ENDINGS["file"].format(where, error.strerror or error), MACHINE)
+        where = LAST_WORDS["output"] if error.filename is None else error.filename
+        _end(LAST_WORDS["file"].format(where, error.strerror or error), MACHINE)
     except MemoryError:
-        _end(ENDINGS["memory"], MACHINE)
+        _end(LAST_WORDS["memory"], MACHINE)
     except RuntimeError as error:
         if not str(error).startswith("Symlink loop"):  # of Python before 3.13; later it is an OSError
             raise
-        _end(ENDINGS["link"].format(error), MISTAKE)
+        _end(LAST_WORDS["link"].format(error), MISTAKE)
     except SystemExit as ended:
         if ended.code == STOPPED:  # typer has made this of Ctrl-C
-            _end(ENDINGS["stopped"], STOPPED)
+            _end(LAST_WORDS["stopped"], STOPPED)
         _flush()
         raise
     _flush()
@@ -85,7 +85,7 @@ def _flush() -> None:
     except OSError as error:
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python tries, and complains, again
-        _end(ENDINGS["file"].format(ENDINGS["output"], error.strerror), MACHINE)
+        _end(LAST_WORDS["file"].format(LAST_WORDS["output"], error.strerror), MACHINE)
 
 
 app = typer.Typer(rich_markup_mode="rich", no_args_is_help=True, pretty_exceptions_enable=False)

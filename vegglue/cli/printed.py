@@ -342,6 +342,6 @@ def show_ladder(found: Comparison) -> None:
 def show_questions(name: str, found: Sequence[Question]) -> None:
     """For each question about a model the best measurements, or why none would do."""
     if not found:
-        console().print("\n".join(wrapped([phrase("no_question", name)])))
+        print("\n".join(wrapped([phrase("no_question", name)])))
     for question in found:
-        console().print(repr(question))
+        print("\n".join(wrapped(repr(question).splitlines())))

@@ -80,10 +80,13 @@ def paint_candidates(scores: Axes, visible: Axes, suspects: pd.DataFrame, thresh
     scores.set(xlim=(0, reach), ylim=(len(rows) - 0.4, TOP), xlabel=phrase("label", "score"))
     scores.set_xticks([tick for tick in (0, 1, 2, 5, 10, 20, 50, 100, 200) if tick < reach])
     label(scores, threshold, TOP, phrase("label", "threshold"), xytext=(4, -8), va="center")
-    scores.set_yticks(rows, [
-        f"{name} (untestable)" if word == "untestable" else name
-        for name, word in zip(suspects["name"], status, strict=True)
-    ])
+    scores.set_yticks(
+        rows,
+        [
+            f"{name} (untestable)" if word == "untestable" else name
+            for name, word in zip(suspects["name"], status, strict=True)
+        ],
+    )
     again = [Line2D([], [], linestyle="", marker="o", markersize=3.4, markerfacecolor="none", color=COLOUR["model"],
                     label=phrase("label", "last"))] if np.isfinite(left).any() else []  # fmt: skip
     handles = [*scores.get_legend_handles_labels()[0], *again]
@@ -318,9 +321,7 @@ def draw_diagnosis(diagnosis: Diagnosis, patches: Sequence[Outline]) -> Figure:
     missed = diagnosis.misfit.zones
     zones_width = max(4.7, 1.2 + ZONE_WIDTH * missed["zone"].nunique()) if len(missed) else 4.7
     figure = Figure(figsize=(9.3 + zones_width, 8.6), layout="constrained")
-    title = textwrap.fill(
-        f"{diagnosis.name}: {sentence(Headline(diagnosis.verdict))}", VERDICT_LINE_LETTERS
-    )
+    title = textwrap.fill(f"{diagnosis.name}: {sentence(Headline(diagnosis.verdict))}", VERDICT_LINE_LETTERS)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
     upper, lower = _split(figure, 2, 1, height_ratios=(2.6, 1))
     suspects, alike, zones = _split(upper, 1, 3, width_ratios=(5.3, 4.0, zones_width))

@@ -118,11 +118,6 @@ def file_name(text: str) -> str:
     return f"{plain[: LONGEST_FILE_NAME - 9]}-{crc32(text.encode(errors='replace')):08x}"
 
 
-def stamp(case: Case) -> str:
-    """What stands on every figure of a synthetic record, '' on others."""
-    return SYNTHETIC if is_synthetic(case) else ""
-
-
 def median_plants(run: Run, experiment: str) -> VegetatedCells:
     """The plants present in an experiment, at the medians of the parameters."""
     medians = {name: np.array([value]) for name, value in run.posterior.marginals.median.items()}

@@ -54,12 +54,6 @@ def listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
-def without_asides(sentence: str) -> str:
-    """A sentence without what stands in round brackets, except for shares and probabilities, `(7%)`."""
-    shorter = re.sub(r"\s*\([^()%]*\)", "", sentence)
-    return shorter if shorter == sentence else without_asides(shorter)
-
-
 def experiments_in_words(names: Sequence[str]) -> str:
     """`experiment low`, `experiments low, mid and high`."""
     return f"experiment{'s' if len(names) > 1 else ''} {listed(names)}"
@@ -162,7 +156,7 @@ def percent(share: float) -> str:
     """A share as '37 %'; small ones as '0.4 %' or '< 0.1 %'."""
     if 0 < share < 0.0005:
         return f"<{NARROW}0.1{NARROW}%"
-    return f"{fixed(100 * share, 0 if share >= 0.0995 or share == 0 else 1)}{NARROW}%"
+    return f"{fixed(100 * share, 0 if share >= 0.0995 else 1).removesuffix('.0')}{NARROW}%"
 
 
 def symbol_html(symbol: str) -> str:
@@ -202,3 +196,12 @@ def with_unit(value: float, unit: str, figures: int = 2) -> Written:
     """A number and its unit."""
     plain, page = ("", "") if unit in ("", "-") else (f" {unit}", f"{NARROW}{unit_html(unit)}")
     return Written(f"{in_digits(value, figures)}{plain}", f"{short(value, figures)}{page}")
+
+
+def sized(value: float, low: float, high: float, unit: str = "-") -> Written:
+    """`0.67 m, 95 % 0.54 to 0.79`, to one figure of the standard deviation."""
+    places = decimals((high - low) / 4, 1) if math.isfinite(high - low) and high > low else 3
+    middle, least, most = (f"{round(one, places) + 0.0:.{places}f}" for one in (value, low, high))
+    plain, page = ("", "") if unit in ("", "-") else (f" {unit}", f"{NARROW}{unit_html(unit)}")
+    text = f"{{}}, 95{FIRM}% {least} to {most}"
+    return Written(f"{middle}{plain}, 95 % {least} to {most}", text.format(f"{middle}{page}").replace("-", MINUS))

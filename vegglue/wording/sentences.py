@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from vegglue.errors import shown_path
 from vegglue.wording.numbers import (
+    MINUS,
     NARROW,
     Written,
     as_given,
@@ -28,6 +29,7 @@ from vegglue.wording.numbers import (
     range_in_digits,
     section_in_words,
     short,
+    sized,
     so_many,
     symbol_html,
     telling_digits,
@@ -134,7 +136,9 @@ WRITTEN_BY: dict[str, Callable[..., Any]] = {
     "fixed": lambda value, places: Written(f"{round(value, places) + 0.0:.{places}f}", fixed(value, places)),
     "quantity": with_unit,
     "unit": lambda unit: with_unit_only(unit),
-    "percent": lambda share: Written(f"{100 * share:.0f} %", percent(share)),
+    "percent": lambda share: Written(
+        percent(share).replace(NARROW, " ").replace(MINUS, "-"), html.escape(percent(share))
+    ),
     "p_equals": lambda p: Written(
         "p < 0.001" if p < 0.001 else f"p = {p:.2g}", f"p &lt;{NARROW}0.001" if p < 0.001 else f"p = {short(p, 2)}"
     ),
@@ -150,10 +154,7 @@ WRITTEN_BY: dict[str, Callable[..., Any]] = {
         " to ".join(f"{round(end, decimals_between(*ends)) + 0.0:.{decimals_between(*ends)}f}" for end in ends),
         interval(*ends),
     ),
-    "fixed_between": lambda value, ends: Written(
-        f"{round(value, decimals_between(*ends)) + 0.0:.{decimals_between(*ends)}f}",
-        fixed(value, decimals_between(*ends)),
-    ),
+    "sized": lambda value, ends, unit="-": sized(value, ends[0], ends[1], unit),
     "symbol": lambda name, written="": Written(name, symbol_html(written or name)),
     "code": lambda text: Written(text, f"<code>{html.escape(text)}</code>"),
     "command": lambda text: Written(f"`{text}`", f"<code>{html.escape(text)}</code>"),

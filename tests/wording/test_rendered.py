@@ -1,0 +1,311 @@
+"""What commands and pages print, as rendered examples: a person read each once, and each change is to be read again.
+
+`PYTHONPATH=tests python tests/wording/test_rendered.py` writes the files beside this one anew.
+"""
+
+import textwrap
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from diagnoses import (
+    EVERY_KIND,
+    IMPLAUSIBLE,
+    NOTHING,
+    a_candidate_effect,
+    a_diagnosis,
+    an_anomaly,
+    an_effect_found,
+    an_instrument,
+    candidate_laws_of,
+)
+from model_scores import a_model_score
+from posteriors import a_posterior, a_refinement, changed
+
+from vegglue.cli.printed import (
+    TERMINAL_WIDTH,
+    posterior_lines,
+    show_diagnosis,
+    show_ladder,
+    show_questions,
+    verdict_lines,
+)
+from vegglue.diagnosis.comparison import MEASUREMENT
+from vegglue.effects.library import SHIPPED
+from vegglue.inference.statements import (
+    CalibrationDiffers,
+    CalibrationTransfers,
+    ErrorsEstimated,
+    ErrorsOfComparison,
+    ErrorsScaled,
+    GroupsLeftOutScore,
+    GroupsUntrusted,
+    MisfitOfExperiments,
+    MisfitTested,
+    ModeFound,
+    NamedParameter,
+    NothingToCompare,
+    ParameterAtBound,
+    ParameterBetweenExperiments,
+    ParameterNotIdentified,
+    ParameterOffPrior,
+    ParametersAlike,
+    ParametersAtBounds,
+    ParametersCorrelated,
+    ReadingsExcluded,
+    StationsStandOut,
+    WeightTailHeavy,
+    posterior_statements,
+)
+from vegglue.measurements.kinds import kind_of
+from vegglue.pages.answer import ErrorFall, NextStep, NotReliable, Purpose, SubjectModel
+from vegglue.pages.findings import (
+    CanopyHeightRead,
+    CylinderCompared,
+    DischargeMeasured,
+    FlowOfBuiltInEngine,
+    MassError,
+    MembersSolved,
+    ReadingsExcludedSince,
+    StationNotUsed,
+)
+from vegglue.pages.headline import WorstZone
+from vegglue.pages.parameters import PosteriorVerdict, ResidualCompared
+from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival
+from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.open_questions import HiddenEffect, OneOfRivals, ProposedMeasurement, Question, RivalEffects
+from vegglue.results.verdict import (
+    ChiSquare,
+    CommandCompared,
+    CorrelatedErrors,
+    EffectsNotExcluded,
+    EffectsStillSignificant,
+    EffectsUntestable,
+    ErrorsLargerThanStated,
+    ErrorsStillLarger,
+    FewTestable,
+    HeldOutMissed,
+    ImplausibleAmplitude,
+    InstrumentExcluded,
+    LawStandsOut,
+    MeasuredStretch,
+    MisfitBeyondErrors,
+    MisfitRemains,
+    MisfitTooSmall,
+    MisfitUnexplained,
+    ModelErrorExceeded,
+    NeighboursCorrelated,
+    NoneLeads,
+    ParameterFarFromPrior,
+    StatedErrorsTooSmall,
+    TooManyGroups,
+    TooShallow,
+    UncertainBetweenSections,
+)
+from vegglue.wording.sentences import layout, page_sentence, sentence
+from vegglue.workflow.compare import Comparison
+
+HERE = Path(__file__).parent
+COMMAND = "vegglue diagnose brook.yaml --details"
+STEEP = next(one for one in SHIPPED if one.name == "steep_bank")
+
+
+def brook(**verdict: object) -> Diagnosis:
+    """A diagnosis of the brook with one real effect, and parts of its verdict replaced."""
+    candidates: tuple[CandidateEffect, ...] = (
+        replace(a_candidate_effect("steep_bank", amplitude=BANK), title=STEEP.title),
+        replace(a_candidate_effect("bank_trend", test={"score": 2.1, "p_family": 0.3}), title="The banks change"),
+    )
+    found = a_diagnosis(candidates, (), verdict={"effects": (bank(),), "places": ()} | verdict)
+    return replace(found, name="brook", places=(), instruments=())
+
+
+BANK = {"value": 0.67, "interval95": (0.54, 0.79), "unit": "-", "refitted": True}
+
+
+def bank(**fields: object):
+    usual = {"title": STEEP.title, "amplitude": 0.67, "interval95": (0.54, 0.79), "unit": "-"}
+    return an_effect_found("steep_bank", **(usual | {"rivals": (), "probability": 0.999} | fields))
+
+
+def doubt(*reasons: object, **verdict: object) -> Diagnosis:
+    return brook(kind="cannot-tell", **({"effects": ()} | verdict), reasons=reasons)
+
+
+VERDICTS: dict[str, Diagnosis] = {
+    "identified": brook(kind="identified"),
+    "one of several": brook(kind="one-of", effects=(
+        bank(probability=0.7, rivals=(Rival("bank_trend", "effect", 0.2), Rival("gauge", "gauge", 0.06, 12.0, np.nan))),
+    )),
+    "alike": brook(kind="one-of", effects=(bank(probability=0.9, alike=("bank_level_error",)),)),
+    "a place is likelier": brook(kind="one-of", effects=(
+        bank(probability=0.3, likelier=an_anomaly(x_error=0.4), likelier_probability=0.6),
+    )),
+    "two places": brook(kind="none-of-these", effects=(), places=(
+        an_anomaly(term="bed", amplitude=-0.19, interval95=(-0.22, -0.16), unit="m"),
+        an_anomaly(term="inflow", amplitude=0.05, interval95=(0.03, 0.07), unit="m3/s", x=12.0),
+    )),
+    "a place and an effect": brook(kind="none-of-these", places=(an_anomaly(),)),
+    "a field": brook(kind="none-of-these", effects=(), field=EVERY_KIND.field),
+    "a law": brook(kind="none-of-these", effects=(), laws=candidate_laws_of("law_bank_speed_step")),
+    "perhaps a law": doubt(laws=candidate_laws_of("law_bank_speed_step")),
+    "nothing": replace(NOTHING, name="brook"),
+    "an instrument": brook(kind="instrument", effects=(), instruments=(an_instrument(),), clears_the_model=True),
+    "an instrument and a doubt": brook(
+        kind="instrument", effects=(), instruments=(an_instrument(kind="probe", x=np.nan, factor=1.3),),
+        reasons=(UncertainBetweenSections(1.5),),
+    ),
+    "wrong measurements": doubt(IMPLAUSIBLE),
+    "undecided": doubt(NoneLeads(), undecided=(
+        Rival("unlisted_bed", "bed", 0.79, 9.0, 0.5, 0.1), Rival("steep_bank", "effect", 0.08),
+    )),
+    "too many": doubt(TooManyGroups(tuple(Rival(name, "effect", 0.2) for name in ("wind", "waves", "steep_bank")))),
+    "a far parameter": doubt(ParameterFarFromPrior("n_b", 4.5), effects=(bank(),)),
+    "misfit beyond errors": doubt(MisfitBeyondErrors(2.3), effects=(bank(),)),
+    "misfit unexplained": doubt(MisfitUnexplained()),
+    "larger errors": doubt(ErrorsLargerThanStated(1.8)),
+    "correlated errors": doubt(CorrelatedErrors(0.85)),
+    "model error": doubt(ModelErrorExceeded(1.6, 0.05)),
+    "held out": doubt(HeldOutMissed(1.4)),
+    "few testable": doubt(FewTestable()),
+    "more is left": brook(
+        kind="one-of", remaining=(ErrorsStillLarger(2.1), EffectsStillSignificant((("wind", 0.004),), remainder=True)),
+        not_excluded=(("wind", "waves"), ("weir",)),
+    ),
+}  # fmt: skip
+N_B, PHI = NamedParameter("n_b", "n_b", "s m^(-1/3)"), NamedParameter("phi", "φ", "-")
+VELOCITY = kind_of("velocity")
+NOTES = (
+    MisfitTooSmall(61.5, 150), ImplausibleAmplitude("wind", 3.4), EffectsNotExcluded(("wind", "waves"), beside=True),
+    ModelErrorUsed(0.05, 0.01, 0.6, 0.0), LawStandsOut(candidate_laws_of("law_bank_speed_step"), ("steep_bank",)),
+    NeighboursCorrelated(0.3), StatedErrorsTooSmall(1.2), InstrumentExcluded(an_instrument(), True, 4.5),
+    EffectsUntestable((("k_s", ("wind", "waves")), ("", ("weir",))), 3, 3, False),
+    MeasuredStretch(10.0, 30.0, 200.0, ("bed_trend", "wind")), TooShallow(0.02),
+    MisfitRemains(ChiSquare(260.0, 150, 1e-8)), CommandCompared(2, 3, 0.4, "", ("k_s",), True, False),
+)  # fmt: skip
+STATEMENTS = (
+    ModeFound(1, ((N_B, 0.031), (PHI, 8.1)), 61.5, 0.7), ErrorsEstimated(((VELOCITY, 0.02),), (kind_of("level"),)),
+    ErrorsScaled(1.35), WeightTailHeavy(0.9), ParameterNotIdentified(PHI, 0.1, 80.0, 0.96),
+    ParameterAtBound(PHI, "upper", 100.0, 0.14), ParameterOffPrior(N_B, 0.02, 0.04),
+    ParametersAtBounds(((PHI, ("upper",)),)), ParametersAtBounds(((PHI, ("upper",)), (N_B, ("lower",)))),
+    ParametersCorrelated(N_B, PHI, -0.93), ReadingsExcluded(1, 15),
+    *(MisfitTested(*one) for one in (
+        (3.1, 0, 1.0, "untested"), (300.0, 50, 1e-9, "unexplained"), (70.0, 50, 0.03, "hardly-explained"),
+        (61.5, 150, 1.0, "too-small"), (50.0, 50, 0.5, "explained"),
+    )),
+    GroupsLeftOutScore(3, "June A", -2.92, -1.1), GroupsUntrusted(("June A",)),
+    StationsStandOut(1, "June", "A", 12.5, -0.3, 4.2), StationsStandOut(9, "June", "A", 12.5, -0.3, 4.2),
+    NothingToCompare(),
+    ParameterBetweenExperiments(PHI, True, (("low", 0.9, 0.02), ("high", 1.1, 0.03)), 33.0, 1, 1e-8, 16.9, "differs"),
+    MisfitOfExperiments((("low", 20.0, 12.0, 15), ("high", 15.0, np.nan, 15)), 1.2, 8.0, 1, 0.005),
+    ParametersAlike((N_B,), 0.3),
+    ErrorsOfComparison(False, 1.2), CalibrationTransfers(), CalibrationDiffers((PHI,), 1.2),
+)  # fmt: skip
+STEPS = (
+    *(NextStep(action, "brook.yaml") for action in ("diagnose", "discover", "extend", "extend-again", "mend", "next")),
+    NextStep("go-on", model=("brook+wind.yaml", "../brook-wind/report.html")),
+    NextStep("compare", model=("brook.yaml", "")),
+    NextStep("measure", measurement=ProposedMeasurement("a gauge at x = 5 m", "June", 5.0, 1, 0.5, 0.2, 9.0),
+             purposes=(Purpose("steep_bank", STEEP.title, "k_s"), Purpose("wind from waves", "", ""))),
+    NextStep("no-measurement", purposes=(Purpose("wind from waves", "", ""), Purpose("weir", "", "n_b"))),
+    NextStep("done"), NextStep("done-here", model=("brook-wind", "")), NextStep("none-proposed"),
+    NextStep("check-instrument", instrument=an_instrument()),
+)  # fmt: skip
+TOP = (
+    SubjectModel("brook", ("wind", "steep_bank")),
+    NotReliable(True, True, True, (), (7.0, 2048), False, (40, 2048), 0.002),
+    NotReliable(False, True, False, (), None, True, None, None),
+    ErrorFall("unseen", 2, "steep_bank", 0.039, 0.0033, 0.012, (), False, ""),
+    ErrorFall("held_out_sections", 3, "wind and waves", 0.041, 0.038, np.nan, ("wind",), False, ""),
+    ErrorFall("in_sample", 1, "", 0.02, 0.02, 0.012, (), False, "Nothing is added."),
+    WorstZone("D3", "floor", "low", 2.3, 1.4, False, True),
+)
+FINDINGS = (
+    PosteriorVerdict((N_B,), (PHI,), (), 21, True, 900.0, 2048, ResidualCompared(VELOCITY, 0.02, 0.015, "hardly")),
+    PosteriorVerdict((), (), (), 21, False, 7.0, 2048, ResidualCompared(VELOCITY, 0.02, np.nan, "unknown")),
+    *(ResidualCompared(VELOCITY, 0.02, 0.008, one, best=True) for one in ("exceeds", "explained", "far-less")),
+    CylinderCompared(PHI, 2.3, 0.4, 2.2, 3.6, None), CanopyHeightRead("D3", "high", 0.8, 0.05, "", (0.75,)),
+    ReadingsExcludedSince(2, "brook.yaml"), StationNotUsed("high", 12.0, 3.5, "a dead probe"),
+    DischargeMeasured("D3", "high", 2.1, 0.1, 1.7, "", 4.0), DischargeMeasured("D3", "high", 2.1, 0.1, None, "", 0.0),
+    MembersSolved(2044, 1, 3, None, (2048, 0)), MassError(2e-6), FlowOfBuiltInEngine(),
+)  # fmt: skip
+
+
+def three_days(value: float) -> ProposedMeasurement:
+    return ProposedMeasurement("section 0", "June", 1.0, 3, 1.5, 2.0, value)
+
+
+QUESTIONS = (
+    Question(RivalEffects(("wind", "waves")), (three_days(9.0),)),
+    Question(OneOfRivals("wind", ("waves", "weir")), (three_days(2.1),)),
+    Question(HiddenEffect("bed_trend", "n_b"), (ProposedMeasurement("gauge", "June", 1.0, 1, 0.5, 12.0, 60.0),), 25.0),
+    Question(HiddenEffect("bed_trend", "n_b"), (ProposedMeasurement("gauge", "June", 1.0, 1, 0.5, 26.0, 60.0),), 25.0),
+)
+
+
+def printed(show: Callable[[], None]) -> str:
+    with redirect_stdout(out := StringIO()):
+        show()
+    return out.getvalue().rstrip()
+
+
+def wrapped(values: object) -> str:
+    return "\n".join("\n".join(textwrap.wrap(sentence(one), TERMINAL_WIDTH)) for one in values)  # type: ignore[attr-defined]
+
+
+def ladder() -> str:
+    before, after = a_model_score("brook"), replace(a_model_score("brook-wind", 0.025), homogeneity={"phi": 1e-5})
+    excluded = pd.DataFrame([["June", "velocity", "A", 1.0, 2.0, 0.5]], columns=MEASUREMENT)
+    return printed(lambda: show_ladder(Comparison((before, after), excluded)))
+
+
+def posterior() -> str:
+    found = a_posterior(True)
+    refined = replace(found, refinement=a_refinement(300.0, 50))
+    pressed = changed(refined, bound_hit={"n_b": np.array([False, False]), "phi": np.array([False, True])})
+    lines = posterior_lines(pressed, "runs/brook/posterior.h5", "vegglue report brook.yaml")
+    return "\n".join([*lines, "", wrapped([*posterior_statements(found), *posterior_statements(refined)])])
+
+
+def page() -> str:
+    return "\n".join(page_sentence(one) for one in (brook().verdict, *STATEMENTS[4:6], *STEPS[6:9]))
+
+
+RENDERED: dict[str, Callable[[], str]] = {
+    "verdicts": lambda: "\n\n".join(
+        "\n".join([f"## {name}", *verdict_lines(found, COMMAND, 13), "", wrapped([found.verdict])])
+        for name, found in VERDICTS.items()
+    ),
+    "details": lambda: printed(lambda: show_diagnosis(brook(notes=(NeighboursCorrelated(0.3),)))),
+    "notes": lambda: wrapped(NOTES),
+    "posterior": posterior,
+    "statements": lambda: wrapped(STATEMENTS),
+    "answer": lambda: wrapped([*TOP, *STEPS]),
+    "findings": lambda: wrapped(FINDINGS),
+    "ladder": ladder,
+    "questions": lambda: printed(lambda: (show_questions("brook", QUESTIONS), show_questions("brook", []))[0]),
+    "effect": lambda: layout("effect_described", STEEP),
+    "page": page,
+}
+
+
+@pytest.mark.parametrize("name", RENDERED)
+def test_words_are_those_that_were_read(name: str) -> None:
+    assert RENDERED[name]() + "\n" == (HERE / f"{name}.txt").read_text(encoding="utf-8")
+
+
+def test_a_verdict_is_short_and_a_command_is_whole() -> None:
+    for name, found in VERDICTS.items():
+        lines = verdict_lines(found, COMMAND, 13)
+        assert len(lines) <= 13, name
+        assert max(map(len, lines)) <= TERMINAL_WIDTH, name
+
+
+if __name__ == "__main__":
+    for name, render in RENDERED.items():
+        (HERE / f"{name}.txt").write_text(render() + "\n", encoding="utf-8")
