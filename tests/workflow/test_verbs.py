@@ -130,7 +130,7 @@ def test_draws_and_their_page_need_no_ensemble(tmp_path: Path) -> None:
     posterior = vegglue.infer(case, runs=runs, jobs=2)
     assert posterior.weighting.effective_size >= 1000
     page = vegglue.report(case, runs=runs).read_text(encoding="utf-8")
-    assert f"{posterior.sample.members:,} draws, none of them failed" in page
+    assert f"{posterior.sample.members:,} draws" in page
     assert "mass error" not in page
     assert vegglue.overview([case], runs=runs).exists()
     assert not (runs / "brook" / "ensemble.h5").exists()
