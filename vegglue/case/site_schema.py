@@ -204,7 +204,7 @@ class BedLayer(Part):
         return self
 
 
-# The key of a friction class that holds the coefficient of each law; the laws are those of resistance/bed_laws.
+# The key of a friction class that holds the coefficient of each law; the laws are those of `bed_laws`.
 COEFFICIENT_OF = {"manning": "n", "keulegan": "k_s", "chezy": "c"}
 
 

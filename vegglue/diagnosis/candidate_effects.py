@@ -48,7 +48,7 @@ TESTABLE = 2.0
 def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
     """All effects of a screening by name, none of them refitted, to first order.
 
-    gain = T / |S_perp| a^2 / (1 + a^2) with a standard error of s / (1 + a^2)^(1/2), s and a of `evidence`; objective
+    gain = T / |S_perp| a^2 / (1 + a^2) with a standard error of s / (1 + a^2)^(1/2), s and a of `score_test`; objective
     F - T^2 a^2 / (1 + a^2), F under the errors as they are now: the prior of the amplitude is in all of them, as in
     those of a refit.
     """

@@ -5,7 +5,7 @@
 
 Of each kind the most promising hypotheses are calibrated in earnest, and their evidence E is Laplace's (`refits`); of
 those of its kind that were not, it is the one to first order, corrected as that of the best of them. Instruments change
-no flow: to first order is exact for them but for the parameters. What is how likely before is in `evidence`. Chances
+no flow: to first order is exact for them but for the parameters. Prior weights are in `score_test`. Chances
 are tempered: e is the relative error of a fingerprint. That of an effect in nature differs from the model's, whose
 cells and laws are not nature's: if much is explained, errors count as w^(1/2) times as large.
 
@@ -13,7 +13,7 @@ Where something at a place lies is searched between the spots of the screening, 
 
     ln B(x, y) = ln B_refit + b(x, y) - b(x_refit, y_refit)
 
-b is ln B to first order of the same thing at another place, in the flow with it (see `evidence`): there its own wake is
+b is ln B to first order of the same thing at another place, in the flow with it (`score_test`): there its own wake is
 seen at its true size. The best of such places is refitted, until none promises more. Of the evidence, the spots of the
 screening near by are replaced by the mean over these places, which stand closer.
 

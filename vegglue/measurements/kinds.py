@@ -1,6 +1,6 @@
 """Kinds of observation: what a station measures, in which unit, and what that means for its error.
 
-A new kind is one entry here, its reader in `flow/readers.py`, and roles of its columns in `importers/column_names.py`
+A new kind is one entry here, its reader in `flow/sensor.py`, and roles of its columns in `importers/column_names.py`
 for files that are imported; `adv` in a case is a way of reading that yields velocities, no kind of its own.
 """
 

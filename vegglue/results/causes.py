@@ -298,7 +298,7 @@ class Step:
     rivals: the effects that together hold 95 % of the chances, the accepted one among them; chances: of each, were it
     one of all that were tried, of every kind; others: of the best of each other kind, by its name, where it is not
     negligible; places: those of them that are something at a place. p_family: chance that errors alone sound the alarm
-    as loudly [-], counted, see `evidence.alarm_p`.
+    as loudly [-], counted, see `score_test.alarm_p`.
     """
 
     accepted: str

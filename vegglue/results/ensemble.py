@@ -64,7 +64,7 @@ class Ensemble:
 
     parameters: dict[str, np.ndarray]  # (member,) each
     prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]  # NaN for failed members
-    status: Annotated[np.ndarray, Stored(("member",), fill=NOT_YET, type=np.int8)]  # one of `solver.status`
+    status: Annotated[np.ndarray, Stored(("member",), fill=NOT_YET, type=np.int8)]  # one of `flow.status`
     reason: Annotated[np.ndarray, Stored(("member",), fill=b"", type="S240")]  # '' or a sentence
     iterations: Annotated[np.ndarray, Stored(("member",), fill=0, type=np.int32)]
     mass_error: Annotated[np.ndarray, Stored(("member",))]  # largest |Q - Q_in| over all that enters

@@ -1,4 +1,4 @@
-"""What a result file may hold, and how it is read to its end by a process before the command (`first_look`).
+"""What a result file may hold, and how it is read to its end by a process before the command (`sandboxed_reader`).
 
 Nothing in a file of others leads out of it, or claims more room than it can fill: vegglue writes groups, and datasets
 in them, whose numbers lie in the file itself. External and soft links, virtual datasets, raw storage in other files and
