@@ -60,6 +60,12 @@ def test_shapes_that_are_left_alone_or_calibrated_stop_no_search(
 STATION = stations_of(CASE, ("A",), 3)
 
 
+def test_an_excluded_effect_is_no_candidate() -> None:
+    both = {one.name for one in candidates_of(CASE, STATION)}
+    without = CASE.model_copy(update={"exclude": {"wind": "indoors", "unlisted_bed": "a flume of glass"}})
+    assert both - {one.name for one in candidates_of(without, STATION)} == {"wind"}
+
+
 @pytest.mark.parametrize(
     "beside",
     [

@@ -44,6 +44,13 @@ def places(flowing: tuple[Model, Point]) -> dict[Term, Places]:
     return {one.term: one for one in places_of(*flowing, half_width(flowing[0].site))}
 
 
+def test_an_excluded_term_has_no_places(flowing: tuple[Model, Point], places: dict[Term, Places]) -> None:
+    model, point = flowing
+    case = model.case.model_copy(update={"exclude": {"unlisted_inflow": "glass walls"}})
+    of_case = replace(model, case=case)
+    assert {one.term for one in places_of(of_case, point, half_width(model.site))} == set(places) - {"inflow"}
+
+
 @pytest.mark.parametrize("term", EFFECT_AT_PLACE)
 def test_a_fingerprint_is_the_response_to_the_effect_there(
     flowing: tuple[Model, Point], places: dict[Term, Places], term: Term

@@ -83,6 +83,7 @@ from vegglue.results.verdict import (
     ChiSquare,
     CommandCompared,
     CorrelatedErrors,
+    EffectsExcluded,
     EffectsNotExcluded,
     EffectsStillSignificant,
     EffectsUntestable,
@@ -182,6 +183,7 @@ N_B, PHI = NamedParameter("n_b", "n_b", "s m^(-1/3)"), NamedParameter("phi", "φ
 VELOCITY = kind_of("velocity")
 NOTES = (
     MisfitTooSmall(61.5, 150), ImplausibleAmplitude("wind", 3.4), EffectsNotExcluded(("wind", "waves"), beside=True),
+    EffectsExcluded((("wind", "a laboratory"), ("unlisted_inflow", "glass walls"))),
     ModelErrorUsed(0.05, 0.01, 0.6, 0.0), LawStandsOut(candidate_laws_of("law_bank_speed_step"), ("steep_bank",)),
     NeighboursCorrelated(0.3), StatedErrorsTooSmall(1.2), InstrumentExcluded(an_instrument(), True, 4.5),
     EffectsUntestable((("k_s", ("wind", "waves")), ("", ("weir",))), 3, 3, False),

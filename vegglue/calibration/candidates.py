@@ -86,10 +86,14 @@ class Candidate:
 
 
 def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
-    """Effects of the library that do not act in the case yet, once for each experiment, section or device."""
+    """Effects of the library that do not act in the case yet and are not excluded, once for each experiment, section or
+    device.
+    """
     found = []
     possible = where_it_may_act(case, station)
     for effect in library(case.effect_file).values():
+        if effect.name in (case.exclude or ()):
+            continue
         if NOT_SEARCHED & set(effect.tags) or (effect.stage == "plants" and not case.plants.patches):
             continue
         if effect.each == "case":

@@ -19,6 +19,7 @@ from vegglue.calibration.model_error import (
     TERM_OF,
     GaussianBasis,
     cell_responses,
+    excluded_terms,
     gaussian_basis,
     gaussian_basis_at,
     responses_to_basis,
@@ -131,11 +132,13 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
 
 
 def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ...]:
-    """Spots of every term all over the water; half_width: of the floor of the channel [m]."""
+    """Spots of every term that is not excluded, all over the water; half_width: of the floor of the channel [m]."""
     width, grid = SPOT_WIDTH * half_width, model.site.grid
+    excluded = excluded_terms(model.case)
     rasters = {
         term: [gaussian_basis(grid, length * width, width, SPOT_CELLS) for length in lengths]
         for term, lengths in SPOT_LENGTHS.items()
+        if term not in excluded
     }
     return _places_over(model, point, rasters)
 

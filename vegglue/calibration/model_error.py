@@ -71,6 +71,11 @@ class CellResponses:
     of: dict[Term, NDArray[np.float32]]
 
 
+def excluded_terms(case: Case) -> set[Term]:
+    """Terms that no place and no field may change, as the case excludes their effect."""
+    return {TERM_OF[name] for name in case.exclude or () if name in TERM_OF}
+
+
 def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellResponses:
     """Those of all experiments, in parallel."""
     shape = (len(model.station), model.site.grid.x.size, model.site.grid.y.size)

@@ -299,11 +299,15 @@ def _names_and_files(case: Case) -> Iterator[Refusal]:
 
 def _effects(case: Case) -> Iterator[Refusal]:
     """Effects and their parameters by name; none without its amplitude, and no number outside what it may be."""
-    if not case.effects and case.effect_file is None:
+    if not case.effects and not case.exclude and case.effect_file is None:
         return
     from vegglue.effects.library import library  # which needs numpy
 
     known = library(case.effect_file)
+    for name in case.exclude or {}:
+        yield from _unknown(("exclude", name), name, known, "effect")
+        if any((entry.effect or key) == name for key, entry in case.effects.items()):
+            yield Refusal(("exclude", name), "excludes an effect that `effects` has: take it out of one of the two")
     for key, entry in case.effects.items():
         place: KeyPath = ("effects", key)
         name = entry.effect or key

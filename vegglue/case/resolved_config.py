@@ -22,6 +22,7 @@ from vegglue.errors import InputError, shown_path
 NOT_SIMULATED = dict.fromkeys(
     ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction", "frame", "imported"), True
 ) | {
+    "exclude": True,
     "simulate": {"field_budget"},
     "observations": {"__all__": {"synthetic"}},
     "engine": {"keep", "step"},

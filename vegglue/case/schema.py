@@ -309,6 +309,9 @@ class Case(Part):
     experiments: dict[str, Experiment] = Field(min_length=1, description="flows that share parameters")
     eddy_viscosity: Value = Field(default=0.01, description="[m2/s]")
     effects: dict[str, EffectEntry] = Field(default_factory=dict, description="physical effects at work, see `effects`")
+    exclude: dict[str, Annotated[str, Field(min_length=1)]] | None = Field(
+        default=None, description="effects that cannot act at this site, each with the reason"
+    )
     effect_file: Path | None = Field(default=None, description="Python file with effects of your own, needs --trust")
     engine: CommandEngine | None = Field(default=None, description="a command instead of the solver, needs --trust")
     parameters: dict[str, Parameter] = Field(default_factory=dict, description="unknowns and their priors")

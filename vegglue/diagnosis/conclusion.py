@@ -237,6 +237,7 @@ def _verdict(
             significant_effects=beside,
             remainder=bool(beside) and not significant_effects(last, found, found.slack),
             surroundings=tuple(surroundings),
+            excluded=model.case.exclude or {},
         )
     )
 

@@ -16,7 +16,14 @@ import scipy.linalg
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel
-from vegglue.calibration.model_error import CellResponses, GaussianBasis, cell_responses, field_columns, gaussian_basis
+from vegglue.calibration.model_error import (
+    CellResponses,
+    GaussianBasis,
+    cell_responses,
+    excluded_terms,
+    field_columns,
+    gaussian_basis,
+)
 from vegglue.calibration.noise import covariance_of
 from vegglue.calibration.residual_screening import GROUPS
 from vegglue.flow.local_changes import Term
@@ -57,7 +64,9 @@ class FieldMap:
 
 def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHypothesis], CellResponses]:
     """Every field that is tried, the one with the most evidence first, and the responses that they were made of."""
-    responses = cell_responses(search.model, search.point, tuple(FIELD_SIZES))
+    excluded = excluded_terms(search.model.case)
+    terms = tuple(term for term in FIELD_SIZES if term not in excluded)
+    responses = cell_responses(search.model, search.point, terms)
     whole, residual = free_of_prior(search)
     nothing = log_density_of_residual(whole, residual)
 
@@ -71,7 +80,7 @@ def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHy
             for size, one in zip(FIELD_SIZES[term], gained, strict=True)
         ]
 
-    found = in_threads(fields_of, [(term, *shape) for term in FIELD_SIZES for shape in FIELD_SHAPES])
+    found = in_threads(fields_of, [(term, *shape) for term in terms for shape in FIELD_SHAPES])
     return sorted((one for some in found for one in some), key=lambda one: -one.log_factor), responses
 
 
@@ -83,6 +92,8 @@ def best_field(search: SearchModel, half_width: float) -> tuple[FieldHypothesis,
     found = []
     for term, sizes in FIELD_SIZES.items():
         of_term = [one for one in fields if one.term == term]
+        if not of_term:
+            continue
         prior = -np.log(GROUPS * len(FIELD_SIZES) * len(FIELD_SHAPES) * len(sizes))
         total = float(np.logaddexp.reduce([one.log_factor for one in of_term])) + prior
         found.append(replace(of_term[0], log_factor=total))

@@ -151,6 +151,8 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         tree["friction"] = tree["friction"] | {"walls": {"law": "manning", "n": "n_w"}}
         tree["parameters"] = tree["parameters"] | {"n_b": BED_OF_FLUME, "n_w": wall_prior(site.walls.n)}
         tree |= MODEL_ERROR_OF_FLUME
+    if site.exclude:
+        tree["exclude"] = dict(site.exclude)
     if held_out.observations:
         tree |= validated({name: _experiment(flow) for name, flow in site.holdout.items()}, held_out.observations)
         measured.imported.extend(held_out.imported)

@@ -207,6 +207,7 @@ class FieldSite(_SitePart):
     canopy_height_guess_m: Annotated[Number, Field(ge=0.01, le=100)] = 0.8
     eddy_viscosity_m2_s: Annotated[Number, Field(gt=0, le=1e3)] = 0.01
     eddy_viscosity_factor: Annotated[Number, Field(ge=1, le=100)] | None = None
+    exclude: dict[PrintableName, str] = {}
 
     @property
     def viscosity_factor(self) -> float:

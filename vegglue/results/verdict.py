@@ -303,6 +303,13 @@ class EffectsNotExcluded:
 
 
 @dataclass(frozen=True)
+class EffectsExcluded:
+    """Effects that cannot act at the site, by name with the reason of each; they were not tested."""
+
+    effects: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
 class LawStandsOut:
     """Laws that are significant; instead_of: the accepted effects."""
 
@@ -402,6 +409,7 @@ Note = (
     | MisfitTooSmall
     | ImplausibleAmplitude
     | EffectsNotExcluded
+    | EffectsExcluded
     | ModelErrorUsed
     | LawStandsOut
     | NeighboursCorrelated
@@ -514,7 +522,7 @@ class VerdictInputs:
     parameter furthest off its prior, and how far [standard deviations]; between: errors between the sections over those
     of the data [-]; carried: sections that clearly carry another discharge than stated; remainder: whether all
     significant effects may be a remainder of what was accepted; surroundings: notes on the map, the measured stretch
-    and the depth.
+    and the depth; excluded: effects that cannot act at the site, with the reason of each.
     """
 
     candidates: tuple[CandidateEffect, ...]
@@ -538,6 +546,7 @@ class VerdictInputs:
     significant_effects: Mapping[str, float] = by_default(default_factory=dict)
     remainder: bool = False
     surroundings: tuple[Note, ...] = ()
+    excluded: Mapping[str, str] = by_default(default_factory=dict)
 
 
 def make_verdict(inputs: VerdictInputs) -> Verdict:
@@ -727,6 +736,8 @@ def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
     hidden = tuple(name for group in inputs.not_excluded for name in group)
     if hidden and misfit.p >= constants().poor_fit_chance:
         yield EffectsNotExcluded(hidden, bool(inputs.steps or inputs.places))
+    if inputs.excluded:
+        yield EffectsExcluded(tuple(inputs.excluded.items()))
     if inputs.model_error is not None:
         yield inputs.model_error
     if inputs.laws is not None and found.laws is None:

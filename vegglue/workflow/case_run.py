@@ -48,8 +48,8 @@ from vegglue.workflow.command_model import unseen_with_command, with_command
 SAME_FIT = 1.0
 # Parts of a case that its measurements and its site do not depend on: a child differs from its parent in these alone.
 OF_THE_MODEL_ALONE = {
-    "source", "name", "title", "eddy_viscosity", "effects", "effect_file", "engine", "parameters", "imported",
-    "numerics", "simulate", "infer", "model_error", "validation", "reference", "canopy_correction",
+    "source", "name", "title", "eddy_viscosity", "effects", "exclude", "effect_file", "engine", "parameters",
+    "imported", "numerics", "simulate", "infer", "model_error", "validation", "reference", "canopy_correction",
 }  # fmt: skip
 
 
