@@ -25,6 +25,7 @@ from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival, Step
 from vegglue.results.verdict import (
     AT_BOUND,
     AmplitudeAtBound,
+    AmplitudeBeyondPlausible,
     ChiSquare,
     CorrelatedErrors,
     EffectsNotExcluded,
@@ -228,7 +229,8 @@ DOUBTED: list[tuple[dict[str, Any], dict[str, Any], dict[str, Any], dict[str, An
     ({"misfit": ABSURD}, {"misfit": MISSES}, {}, {}, MisfitBeyondErrors(6.0**0.5)),
     ({"strained": ("k_s", 4.5)}, {"strained": ("k_s", 3.5)}, {}, {}, ParameterFarFromPrior("k_s", 4.5)),
     ({}, {}, AT_ITS_END, AT_ITS_END | {"value": 0.97}, AmplitudeAtBound(("a",))),
-    ({}, {}, {"value": 3.0, "scale": 0.5}, {"value": 2.9, "scale": 0.5}, AmplitudeAtBound(("a",))),
+    ({}, {}, {"value": 3.0, "scale": 0.5}, {"value": 1.9, "scale": 0.5}, AmplitudeAtBound(("a",))),
+    ({}, {}, {"value": 2.9, "scale": 0.5}, {"value": 1.9, "scale": 0.5}, AmplitudeBeyondPlausible("a", 5.8)),
     ({}, {}, AT_ITS_END | {"value": -0.996}, AT_ITS_END | {"value": -0.97}, AmplitudeAtBound(("a",))),
 ]
 

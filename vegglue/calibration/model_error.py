@@ -1,10 +1,12 @@
 """The model's own error: friction and bed are a little wrong everywhere, and the same in all experiments.
 
-    M = (s_f^2 / v) sum_k T_k T_k' + (s_b^2 / v) sum_k B_k B_k' + S,   v = mean over cells of sum_k b_k^2 [-]
+    M = (s_f^2 / v) sum_k T_k T_k' + (s_b^2 / v) sum_k B_k B_k' + R C R' + S,   v = mean over cells of sum_k b_k^2 [-]
 
 T_k and B_k are how predictions answer to friction made larger by its own part, and to a bed 1 m higher, in a Gaussian
 basis function b_k = exp(-d^2 / l^2) around place k; these stand a radius apart, so that their sum is a smooth random
-field of standard deviation s_f [-] or s_b [m]. S are errors of the site that are no missing effect:
+field of standard deviation s_f [-] or s_b [m]. R is how predictions answer to the bed of each cell, and C the
+covariance of what a survey leaves open between its points (case/survey_error.py). S are errors of the site that are no
+missing effect:
 
     S = s_y^2 diag((du/dy)^2) + s_q^2 sum_e Q_e Q_e' + s_n^2 sum_p P_p P_p' + s_e^2/2 sum_s (O_s O_s' + I_s I_s')
 
@@ -30,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
+from vegglue.case.bed_error import bed_error_columns, beds_of
 from vegglue.case.case_effects import effect_of, value_of
 from vegglue.case.channel_geometry import half_width, patches_present
 from vegglue.case.grid import Grid
@@ -139,9 +142,9 @@ def field_columns(responses: CellResponses, term: Term, basis: GaussianBasis) ->
     return responses_to_basis(responses, term, basis).reshape(len(responses.of[term]), -1) / np.sqrt(variance)
 
 
-def any_error(allowed: ModelError) -> bool:
-    """Whether any error of the model or of its site is allowed."""
-    return any(allowed.model_dump().values())
+def any_error(case: Case) -> bool:
+    """Whether any error of the model or of its site is allowed, or a survey states one."""
+    return any(case.model_error.model_dump().values()) or any(layer.survey is not None for layer in beds_of(case))
 
 
 def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Array:
@@ -161,7 +164,7 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Arra
     array (station, k)
         [m/s or m]; no columns if no error is allowed.
     """
-    if not any_error(allowed):
+    if not any_error(model.case):
         return np.zeros((len(model.station), 0))
     objects = [key for key in model.case.effects if effect_of(model.case, key).name in TERM_OF]
     of_objects = [TERM_OF[effect_of(model.case, key).name] for key in objects]
@@ -174,10 +177,24 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Arra
         [
             allowed.friction * field_columns(cells, "friction", friction),
             allowed.bed * field_columns(cells, "bed", bed),
+            survey_error_columns(model, cells),
             *(_columns_of_shape(model, point, cells, key, term) for key, term in zip(objects, of_objects, strict=True)),
             site_error_columns(model, point, allowed, cells),
         ]
     )
+
+
+def survey_error_columns(model: Model, cells: CellResponses) -> Array:
+    """Columns (station, k) with R C R' = columns columns'; of each bed its own. None if no survey states its error."""
+    parts, case, grid = [np.zeros((len(model.station), 0))], model.case, model.site.grid
+    with_own = {name: rows for name, rows in model.rows.items() if name in model.site.own}
+    shared = [rows for name, rows in model.rows.items() if name not in with_own]
+    for name, rows in [("", np.concatenate([*shared, np.zeros(0, int)])), *with_own.items()]:
+        error = bed_error_columns(case, grid, name)
+        found = np.zeros((len(model.station), error.shape[1]))
+        found[rows] = cells.of["bed"][rows].reshape(len(rows), -1) @ error.astype(cells.of["bed"].dtype)
+        parts.append(found)
+    return np.hstack(parts)
 
 
 def _columns_of_shape(model: Model, point: Point, cells: CellResponses, key: str, term: Term) -> Array:

@@ -2,6 +2,7 @@
 
 import csv
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.case.grid import Grid, centres, places_on_map
 from vegglue.case.schema import Case
+from vegglue.case.site_schema import BedLayer
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
@@ -132,24 +134,25 @@ def survey_levels(path: Path, x: Array, y: Array) -> Array:
     return np.asarray(surface(*np.broadcast_arrays(x, y)), dtype=np.float64)
 
 
-def read_points(path: Path) -> Array:
-    """The columns x, y, z of a CSV file, (points, 3) [m]. Errors: InputError for a missing column or number."""
+def read_points(path: Path, columns: Sequence[str] = ("x", "y", "z")) -> Array:
+    """Columns of a CSV file, (points, columns) [m]. Errors: InputError for a missing column or number."""
     lines = (line for line in read_text(path, LARGEST_DATA).splitlines() if line.strip() and not line.startswith("#"))
     points = []
     try:
         rows = csv.DictReader(lines)
-        if any(name not in (rows.fieldnames or ()) for name in "xyz"):
-            raise InputError(f"{path}: expected a header with the columns x, y and z, got {rows.fieldnames}.")
+        if any(name not in (rows.fieldnames or ()) for name in columns):
+            wanted = f"{', '.join(columns[:-1])} and {columns[-1]}"
+            raise InputError(f"{path}: expected a header with the columns {wanted}, got {rows.fieldnames}.")
         for number, row in enumerate(rows, 1):
             if any(text.strip() for text in row.get(None, ())):  # where `csv` keeps what goes beyond the heading
                 raise InputError(
                     f"{path}, data row {number}: expected as many fields as in the heading, got more; write numbers "
                     "with a decimal point."
                 )
-            points.append([_number(path, number, row[name], name) for name in "xyz"])
+            points.append([_number(path, number, row[name], name) for name in columns])
     except csv.Error as error:
         raise InputError(f"{path}: expected a CSV table, which cannot be read ({error}); check it.") from None
-    return np.array(points).reshape(-1, 3)
+    return np.array(points).reshape(-1, len(columns))
 
 
 def _number(path: Path, row: int, text: str | None, name: str) -> float:
@@ -177,27 +180,34 @@ def _covered(raster: Raster, x: Array, y: Array) -> NDArray[np.bool_]:
     return along & across
 
 
+def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
+    """Level z_b (nx, ny) [m] of one layer, NaN for no data; upstream: x of the upstream edge of the case [m].
+
+    A trapezoid has z_b = level - S (x - x_0) + s min(max(|y - axis| - b/2, 0), (B - b)/2), with floor b and top B [m].
+    """
+    if layer.trapezoid is not None:
+        channel = layer.trapezoid
+        out = np.abs(grid.y - channel.axis) - 0.5 * channel.bottom_width
+        reach = np.inf if channel.top_width is None else 0.5 * (channel.top_width - channel.bottom_width)
+        bank = channel.bank_slope * np.clip(out, 0.0, reach)
+        return np.asarray((channel.level - channel.bed_slope * (grid.x - upstream))[:, None] + bank[None, :])
+    if layer.raster is not None:
+        return levels_at(read_raster(layer.raster), *places_on_map(grid))
+    if layer.points is not None:
+        return survey_levels(layer.points, *places_on_map(grid))
+    return np.full((grid.x.size, grid.y.size), np.nan)
+
+
 def bed_levels(case: Case, grid: Grid, experiment: str = "") -> Array:
     """Bed level z_b (nx, ny) [m] at the centres of any grid, of each cell the last layer that has data: those of the
     case, then those of an experiment that is named and has its own.
 
-    A trapezoid has z_b = level - S (x - x_0) + s min(max(|y - axis| - b/2, 0), (B - b)/2), with floor b and top B [m].
     Errors: InputError if no layer has data, or a file cannot be read.
     """
     bed = np.full((grid.x.size, grid.y.size), np.nan)
     own = case.experiments[experiment].bed if experiment in case.experiments else None
     for layer in (*case.bed, *(own or ())):
-        level = np.array(np.nan)
-        if layer.trapezoid is not None:
-            channel = layer.trapezoid
-            out = np.abs(grid.y - channel.axis) - 0.5 * channel.bottom_width
-            reach = np.inf if channel.top_width is None else 0.5 * (channel.top_width - channel.bottom_width)
-            bank = channel.bank_slope * np.clip(out, 0.0, reach)
-            level = (channel.level - channel.bed_slope * (grid.x - case.grid.x[0]))[:, None] + bank[None, :]
-        elif layer.raster is not None:
-            level = levels_at(read_raster(layer.raster), *places_on_map(grid))
-        elif layer.points is not None:
-            level = survey_levels(layer.points, *places_on_map(grid))
+        level = layer_levels(layer, grid, case.grid.x[0])
         bed = np.where(np.isnan(level), bed, level)
     if np.isnan(bed).any():
         i, j = np.argwhere(np.isnan(bed))[0]

@@ -284,6 +284,7 @@ def _names_and_files(case: Case) -> Iterator[Refusal]:
     for at, layers in beds:
         for i, layer in enumerate(layers):
             named += [((*at, "bed", i, "raster"), layer.raster), ((*at, "bed", i, "points"), layer.points)]
+            named += [((*at, "bed", i, "survey", "file"), layer.survey.file)] if layer.survey is not None else []
     named += [(("friction", "zones", i, "raster"), zone.raster) for i, zone in enumerate(case.friction.zones)]
     named += [((*at, "file"), observation.file) for at, observation, _ in _observations(case)]
     named += [(("survey", "file"), case.survey.file)] if case.survey else []

@@ -23,6 +23,7 @@ NOT_SIMULATED = dict.fromkeys(
     ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction", "frame", "imported"), True
 ) | {
     "exclude": True,
+    "bed": {"__all__": {"survey"}},
     "simulate": {"field_budget"},
     "observations": {"__all__": {"synthetic"}},
     "engine": {"keep", "step"},

@@ -192,15 +192,46 @@ class Trapezoid(Part):
         return self
 
 
+class CovarianceOfBed(Part):
+    chance: Annotated[Number, Field(gt=0, le=1)] = Field(description="chance of it among all [-]")
+    rough: bool = Field(default=False, description="whether the bed is rough along, not smooth")
+    along: Positive = Field(description="length along [m]")
+    across: Positive = Field(description="length across [m]")
+    sd: Positive = Field(description="standard deviation from the mean cross-section [m]")
+    point_error: Positive = Field(description="standard error of a point [m]")
+
+
+class LinesLeftOut(Part):
+    count: Annotated[int, Field(strict=True, gt=0)] = Field(description="how many lines, or points in no line")
+    error: Positive = Field(description="root mean square error of their prediction from all others [m]")
+    stated: Positive = Field(description="the same as the covariance states it [m]")
+    straight: Positive = Field(description="the same of straight lines between the neighbours [m]")
+    most: Positive = Field(description="largest error of a line over its stated one [-]")
+    most_at: Number = Field(description="x of that line [m]")
+
+
+class SurveyOfBed(Part):
+    file: Path = Field(description="CSV of surveyed points x,y,z,line in the frame of the grid [m]; line -1 for none")
+    covariances: Annotated[tuple[CovarianceOfBed, ...], Field(min_length=1)] = Field(
+        description="of the bed around its mean cross-section, see case/survey_error.py"
+    )
+    left_out: LinesLeftOut | None = Field(default=None, description="how well lines are predicted that are left out")
+
+
 class BedLayer(Part):
     trapezoid: Trapezoid | None = Field(default=None, description="channel from design numbers")
     raster: Path | None = Field(default=None, description="ESRI ASCII grid of bed levels [m]")
     points: Path | None = Field(default=None, description="CSV of surveyed points x,y,z [m]")
+    survey: SurveyOfBed | None = Field(
+        default=None, description="survey the levels come from, which states their error"
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
-        if len(self.model_fields_set) != 1:
+        if len(self.model_fields_set - {"survey"}) != 1:
             raise ValueError("exactly one of `trapezoid`, `raster`, `points`")
+        if self.survey is not None and self.trapezoid is not None:
+            raise ValueError("no key `survey` together with `trapezoid`")
         return self
 
 

@@ -71,6 +71,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[objec
         *channel_check.remarks_on_ensemble(case, observations),
         *channel_check.remarks_on_kept_fields(case, site),
         *channel_check.remarks_on_bed(case, site),
+        *channel_check.remarks_on_survey(case),
         *channel_check.remarks_on_patches(case, site),
         *channel_check.remarks_on_friction_classes(site),
         *channel_check.remarks_on_unnamed_banks(case, site),

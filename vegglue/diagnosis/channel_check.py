@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from vegglue.case.bed_error import beds_of
 from vegglue.case.case_effects import effect_of
 from vegglue.case.channel_geometry import expected_depth, patches_present
 from vegglue.case.config import values
@@ -24,6 +25,8 @@ from vegglue.results.fields import excess
 # Share of the wet cells from which it matters that they are steep [-]: with banks twice as rough as the floor, a tenth
 # of the width changes its friction by a tenth, which is twice what imported cases allow the model for.
 MANY_STEEP = 0.1
+# Error of a surveyed line that is predicted from all others, over its stated one [-], from which it is doubted. Chosen.
+SUSPECT_LINE = 2.0
 # Share of the area of a patch [-] by which its cells may miss it, chosen, not measured: the drag of a patch goes with
 # its area, and a tenth of it is less than the stems counted in a few frames show.
 LARGEST_MISS = 0.1
@@ -111,6 +114,21 @@ class FrictionClassUnused:
     """A friction class that holds in no cell."""
 
     friction_class: str
+
+
+@dataclass(frozen=True)
+class SurveyLeftOut:
+    """How well each of `count` surveyed lines (or points) is predicted from all others: r.m.s. of errors, of stated
+    ones, and of straight lines between the neighbours [m]; the worst at x [m], its error over the stated one [-].
+    """
+
+    count: int
+    error: float
+    stated: float
+    straight: float
+    worst_x: float
+    worst: float
+    suspect: bool
 
 
 @dataclass(frozen=True)
@@ -302,6 +320,16 @@ def remarks_on_friction_classes(site: Site) -> Iterator[object]:
     for index, name in enumerate(site.class_names):
         if not (site.friction_class == index).any():
             yield FrictionClassUnused(name)
+
+
+def remarks_on_survey(case: Case) -> Iterator[SurveyLeftOut]:
+    """What the surveys of the bed say about their own error."""
+    for layer in beds_of(case):
+        if layer.survey is not None and (found := layer.survey.left_out) is not None:
+            suspect = found.most > SUSPECT_LINE
+            yield SurveyLeftOut(
+                found.count, found.error, found.stated, found.straight, found.most_at, found.most, suspect
+            )
 
 
 def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[SteepCellsLikeFloor]:

@@ -92,8 +92,14 @@ def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
     inside = [float(np.mean(known < ndtri(0.5 + 0.5 * level))) if known.size else float("nan") for level in (0.5, 0.95)]
     validated = float("nan")
     if validation is not None and (there := linearise(validation, point.z)) is not None:
-        rows = leading_velocities(validation.station)
-        validated = root_mean_square(validation.station["value"].to_numpy(float)[rows] - there.prediction[rows])
+        rows, predicted, learned = leading_velocities(validation.station), there.prediction, learned_bed(base)
+        if learned is not None:  # the bed is calibrated, too
+            same = learned.correction.shape == validation.site.bed.shape
+            cells = validation if same else coarser(validation)
+            on_cells = there if same or cells is None else linearise(cells, point.z)
+            if cells is not None and on_cells is not None:
+                predicted = predicted + changed_by(learned, cells, on_cells)[0]
+        validated = root_mean_square(validation.station["value"].to_numpy(float)[rows] - predicted[rows])
     return ModelScore(
         name=model.case.name,
         title=model.case.title,

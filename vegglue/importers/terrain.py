@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RegularGridInterpolator
 from scipy.spatial import QhullError
 
@@ -14,8 +15,9 @@ from vegglue.arrays import Array, Mask
 from vegglue.case.bed import Raster, read_raster
 from vegglue.case.grid import Grid, centres
 from vegglue.case.resolved_config import Tree
-from vegglue.case.site_schema import Frame
+from vegglue.case.site_schema import CovarianceOfBed, Frame, LinesLeftOut
 from vegglue.case.size_limits import MOST_CELLS
+from vegglue.case.survey_error import BedSurvey, bed_survey_text, fitted_covariances, lines_left_out, mean_level
 from vegglue.case.text_files import case_name
 from vegglue.case.zones import beyond_slope_break, slope
 from vegglue.errors import InputError, shown_path
@@ -60,6 +62,8 @@ SPREAD_OF_SECTION = 1.0
 SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0
 NO_LEVEL = -9999
 MOST_LEVELS = 10 * MOST_CELLS  # of some eight bytes each; a case reads no larger file
+# Most points in no line of which each is left out in turn.
+MOST_LEFT_OUT = 100
 BANK = "bank"
 TAKEN_NAMES = ("n_b", "n_w")  # parameters of the bed and of walls
 BANK_CLASS = {"law": "keulegan", "k_s": "k_s"}
@@ -78,14 +82,25 @@ class Ground:
 
 
 @dataclass(frozen=True)
+class FittedSurvey:
+    """Points of a survey and what they say about the bed between them."""
+
+    survey: BedSurvey
+    covariances: tuple[CovarianceOfBed, ...]
+    left_out: LinesLeftOut
+
+
+@dataclass(frozen=True)
 class Terrain:
     """Levels of a survey in the channel. level: from x and y (n,) to z (n,) [m], NaN beyond the survey; extent: least
-    and largest x, then y, of the survey [m]; taken: what was taken from which columns.
+    and largest x, then y, of the survey [m]; taken: what was taken from which columns; survey: what states how
+    wrong the levels are between its points, None of a raster and of few or very many points.
     """
 
     level: Callable[[Array, Array], Array]
     extent: tuple[float, float, float, float]
     taken: str
+    survey: FittedSurvey | None = None
 
 
 def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placement) -> Ground:
@@ -103,6 +118,15 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
     grid = _grid_of(path, terrain, site.grid or SiteGrid(), place)
     kind, file = ("raster", "bed.asc") if place.line is None else ("points", "bed.csv")
     text, beyond = _bed_text(terrain, grid, place)
+    texts = {data_folder(target) / file: text}
+    layer: Tree = {kind: f"{data_folder(target).name}/{file}"}
+    if terrain.survey is not None:
+        texts[data_folder(target) / "survey.csv"] = bed_survey_text(terrain.survey.survey)
+        layer["survey"] = {
+            "file": f"{data_folder(target).name}/survey.csv",
+            "covariances": [one.model_dump() for one in terrain.survey.covariances],
+            "left_out": terrain.survey.left_out.model_dump(),
+        }
     taken = f"bed: {terrain.taken}"
     if beyond > 0.0:
         taken += f"; {100.0 * beyond:.0f} % of the grid lies beyond it, with the nearest level"
@@ -124,8 +148,8 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
             )
         else:
             taken += f"; no bank, as it is nowhere steeper than {steeper:g}, half the stated slope of the banks"
-    tree = {"grid": grid, "bed": [{kind: f"{data_folder(target).name}/{file}"}], "friction": friction}
-    return Ground(tree, [record(path, None, taken), *imported], {data_folder(target) / file: text}, terrain.level)
+    tree = {"grid": grid, "bed": [layer], "friction": friction}
+    return Ground(tree, [record(path, None, taken), *imported], texts, terrain.level)
 
 
 def mapped_classes(folder: Path, site: FieldSite, place: Placement) -> tuple[Tree, list[Tree]]:
@@ -262,14 +286,60 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         )
     points, names, taken = _points(path, place, options)
     if sections:
-        return _of_sections(_cross_sections(path, points, names), taken)
-    try:
+        parts = _cross_sections(path, points, names)
+        line = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+        survey = BedSurvey(np.concatenate(parts), line)
+        return _between_points(_of_sections(parts, taken), survey, lambda left: _of_sections(_without(parts, left), ""))
+
+    def triangulated(points: Array) -> Terrain:
         surface = LinearNDInterpolator(points[:, :2], points[:, 2])
+        return Terrain(lambda x, y: np.asarray(surface(x, y)), _extent(points[:, 0], points[:, 1]), taken)
+
+    try:
+        terrain = triangulated(points)
     except (QhullError, ValueError):
         raise InputError(
             f"{shown_path(path)}: expected at least three points that are not on one line, got {len(points)}."
         ) from None
-    return Terrain(lambda x, y: np.asarray(surface(x, y)), _extent(points[:, 0], points[:, 1]), taken)
+    named = np.unique(names, return_inverse=True)[1] if names and all(names) else np.full(len(points), -1)
+    survey = BedSurvey(points, named.astype(np.int64))
+    return _between_points(terrain, survey, lambda left: triangulated(np.delete(points, left, axis=0)))
+
+
+def _without(parts: list[Array], left: NDArray[np.int64]) -> list[Array]:
+    """Cross-sections without the one whose points stand in these rows of all."""
+    ends = np.cumsum([len(part) for part in parts])
+    return [part for part, end in zip(parts, ends, strict=True) if end <= left[0] or end - len(part) > left[0]]
+
+
+def _between_points(terrain: Terrain, survey: BedSurvey, without: Callable[[NDArray[np.int64]], Terrain]) -> Terrain:
+    """The terrain with what its survey says about the bed between its points; its mean is the bed within the survey,
+    unless straight lines predict better what is left out. without: the terrain without some rows of the survey.
+    """
+    if not survey.tells_its_error:
+        return terrain
+    points, straight = survey.points, np.full(len(survey.points), np.nan)
+    single = np.flatnonzero(survey.line < 0)[:, None]
+    for rows in [*survey.lines[1:-1], *single[:: len(single) // MOST_LEFT_OUT + 1]]:
+        straight[rows] = points[rows, 2] - without(rows).level(points[rows, 0], points[rows, 1])
+    if not np.isfinite(straight).any():
+        return terrain
+    try:
+        covariances = tuple(fitted_covariances(survey))
+        left_out = lines_left_out(survey, covariances, straight)
+    except np.linalg.LinAlgError:  # points too much alike for a covariance
+        return terrain
+    fitted = FittedSurvey(survey, covariances, left_out)
+    if left_out.error > left_out.straight:
+        return replace(terrain, survey=fitted)
+
+    def level(x: Array, y: Array) -> Array:
+        inside = ~np.isnan(terrain.level(x, y))
+        found = np.full(x.size, np.nan)
+        found[inside] = mean_level(survey, covariances, np.column_stack([x, y])[inside])
+        return found
+
+    return replace(terrain, level=level, survey=fitted, taken=f"{terrain.taken}; kriged between them")
 
 
 def _extent(x: Array, y: Array) -> tuple[float, float, float, float]:

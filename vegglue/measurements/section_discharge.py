@@ -13,8 +13,10 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
+from vegglue.case.bed_error import bed_error_columns
 from vegglue.case.case_effects import effect_of
 from vegglue.case.channel_geometry import discharges_upstream_of, expected_depth
+from vegglue.case.grid import Grid
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds, middle_value, prior_range
 from vegglue.case.schema import Case
@@ -36,6 +38,8 @@ OF_BANKS = 0.5
 # Standard error that all verticals of a section share [-]: of the probe, its direction, the bed and the levels. Chosen:
 # hydrometry takes 2 to 3 %.
 SHARED_ERROR = 0.03
+# By how much the bed is raised for the slope of a discharge [m].
+BED_STEP = 0.005
 # Effects of the library with which another discharge passes a section than stated.
 CHANGE_DISCHARGE = ("discharge_error", "lateral_inflow", "unlisted_inflow")
 # Standard errors beyond which a section carries another discharge than stated: sections are many, and a stated error
@@ -291,11 +295,18 @@ def _carried(
         level = float(np.interp(along[column], at, z)) + rise
         error = rise + NORMAL95 * float(gauges["standard_error"].fillna(0.0).max())
         around = level - error, level + error
-    whole = _velocity_area(site, column, rows, level)
+    grid, bed = site.grid, site.bed[column]
+    whole = _velocity_area(grid, bed, rows, level)
     if whole is None or whole[0] <= 0.0:
         return None
     value, error, share, verticals = whole
-    others = (_velocity_area(site, column, rows, one) for one in around)
+    # s_bed = |sum_j dQ/dz_j B_j|, B the columns of the error of the surveyed bed of each cell j across.
+    of_bed = bed_error_columns(case, grid, experiment).reshape(*site.bed.shape, -1)[column]
+    if of_bed.any():
+        lower = (_velocity_area(grid, bed + BED_STEP * unit, rows, level) for unit in np.eye(bed.size))
+        slope = np.array([0.0 if one is None else (one[0] - value) / BED_STEP for one in lower])
+        error = float(np.hypot(error, np.linalg.norm(slope @ of_bed)))
+    others = (_velocity_area(grid, bed, rows, one) for one in around)
     low, high = (float(np.hypot(NORMAL95 * error, 0.0 if one is None else abs(one[0] - value))) for one in others)
     given = discharges_upstream_of(case, setting, x)
     parts = [prior_range(case, one) for one in given or ()]
@@ -312,15 +323,15 @@ def _carried(
     )
 
 
-def _velocity_area(site: Site, column: int, rows: pd.DataFrame, level: float) -> tuple[float, float, float, int] | None:
+def _velocity_area(grid: Grid, bed: Array, rows: pd.DataFrame, level: float) -> tuple[float, float, float, int] | None:
     """Q = sum_i w_i u_i, see `conveyance_weights`, and s^2 = max(sampling, spacing)^2 + few^2 + banks^2 + shared^2.
 
-    Q and s but for the error of the level [m3/s]; share of the wet width between the outermost verticals [-]; how many.
+    Q and s but for the errors of level and bed [m3/s]; share of the wet width between the outermost
+    verticals [-]; how many. bed: that of a column of cells (ny,) [m].
     """
-    grid = site.grid
     step = grid.dy / STRIPS
     y = grid.y[0] - 0.5 * grid.dy + step * (np.arange(STRIPS * grid.y.size) + 0.5)
-    cross = CrossSection(y, np.interp(y, grid.y, site.bed[column]), level)
+    cross = CrossSection(y, np.interp(y, grid.y, bed), level)
     measured = rows.groupby("y", as_index=False)[["value", "standard_error"]].mean()
     depth = np.interp(measured["y"], cross.y, cross.depth)
     wet, depth = measured[depth > SHALLOWEST], depth[depth > SHALLOWEST]

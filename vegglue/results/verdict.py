@@ -107,6 +107,14 @@ class AmplitudeAtBound:
 
 
 @dataclass(frozen=True)
+class AmplitudeBeyondPlausible:
+    """An effect whose amplitude is so many times a plausible one [-], as of something else in its place."""
+
+    effect: str
+    times: float
+
+
+@dataclass(frozen=True)
 class NeighboursExcluded:
     """Readings side by side are excluded, which one bad probe does not explain."""
 
@@ -194,6 +202,7 @@ Reason = (
     | MisfitBeyondErrors
     | ParameterFarFromPrior
     | AmplitudeAtBound
+    | AmplitudeBeyondPlausible
     | NeighboursExcluded
     | TooManyGroups
     | NoneLeads
@@ -638,7 +647,11 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
         near = any(abs(amplitude.value - end) < AT_BOUND * amplitude.scale for end in ends)
         if near or amplitude.relative_size > FURTHEST - AT_BOUND:
             at_bound.append(one.name)
-    return AmplitudeAtBound(tuple(at_bound)) if at_bound else None
+    if at_bound:
+        return AmplitudeAtBound(tuple(at_bound))
+    sizes = [(one.amplitude.relative_size, one.name) for one in inputs.candidates if one.name in names]
+    size, name = max(sizes, default=(0.0, ""))
+    return AmplitudeBeyondPlausible(name, float(size)) if size > constants().far_off_prior else None
 
 
 def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt: Reason | None) -> Verdict:
@@ -695,7 +708,7 @@ def _unearned(inputs: VerdictInputs) -> Reason | None:
 def is_clear(instrument: FaultyInstrument) -> bool:
     """Whether an instrument is off by instrument_errors of its standard errors."""
     low, high = instrument.interval95
-    return abs(instrument.offset) > constants().instrument_errors * (high - low) / (2.0 * NORMAL95)
+    return bool(abs(instrument.offset) > constants().instrument_errors * (high - low) / (2.0 * NORMAL95))
 
 
 def effect_found(step: Step, candidates: Iterable[CandidateEffect]) -> EffectFound:

@@ -1,0 +1,64 @@
+"""What measured flow says about the bed between the points of a survey.
+
+    dz = B F' C^-1 (y - f(z)),   F = R B,   cov = B (I - F' C^-1 F) B'
+
+B B' is the covariance of the error of the bed that its survey leaves (case/survey_error.py), R how predictions answer
+to the bed of each cell, C the covariance of all errors of the measurements, M included, at the calibrated parameters z:
+one linear step of the best bed and parameters together. Source: Tarantola (2005), Inverse Problem Theory, section 3.2;
+not checked against it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import Baseline, model_that_errs
+from vegglue.calibration.model_error import cell_responses
+from vegglue.case.bed_error import bed_error_columns
+from vegglue.case.grid import Grid
+from vegglue.engine.interface import Model, Point
+
+
+@dataclass(frozen=True)
+class LearnedBed:
+    """Most likely correction dz (nx, ny) [m] of the bed on a grid, and columns (nx ny, k) [m] of its covariance."""
+
+    grid: Grid
+    correction: Array
+    columns: Array
+
+    @property
+    def error(self) -> Array:
+        """Standard error of the corrected bed (nx, ny) [m]."""
+        return np.asarray(np.linalg.norm(self.columns, axis=1).reshape(self.correction.shape))
+
+
+def learned_bed(base: Baseline) -> LearnedBed | None:
+    """That of a calibrated model, on the cells on which its own error was computed; None if no survey states an error.
+
+    Experiments with a bed of their own say nothing about that of the others, and are left out.
+    """
+    where = model_that_errs(base)
+    model, grid = where.model, where.model.site.grid
+    columns = bed_error_columns(model.case, grid)
+    if not columns.any():
+        return None
+    answers = cell_responses(model, where.point, ("bed",)).of["bed"].reshape(len(model.station), -1) @ columns
+    answers[model.station["experiment"].isin(model.site.own)] = 0.0
+    white = scipy.linalg.solve_triangular(where.noise.lower, answers[where.noise.rows], lower=True)
+    residual = where.noise.residual(where.point.prediction)
+    amounts = white.T @ scipy.linalg.solve_triangular(where.noise.lower, residual, lower=True)
+    values, vectors = np.linalg.eigh(np.eye(columns.shape[1]) - white.T @ white)
+    left = columns @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    return LearnedBed(grid, (columns @ amounts).reshape(grid.x.size, grid.y.size), left)
+
+
+def changed_by(learned: LearnedBed, model: Model, point: Point) -> tuple[Array, Array]:
+    """How predictions (station,) change with the correction, and columns (station, k) of what its error leaves, by one
+    linear step; model: on the cells of the correction, at any stations.
+    """
+    answers = cell_responses(model, point, ("bed",)).of["bed"].reshape(len(model.station), -1).astype(float)
+    answers[model.station["experiment"].isin(model.site.own)] = 0.0
+    return answers @ learned.correction.ravel(), answers @ learned.columns
