@@ -21,8 +21,10 @@ from scipy.special import ndtri
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
+from vegglue.calibration.learned_bed import changed_by, learned_bed
 from vegglue.calibration.noise import covariance_of
 from vegglue.engine.interface import Model, linearise
+from vegglue.engine.model import coarser
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
