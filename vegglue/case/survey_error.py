@@ -101,10 +101,13 @@ def correlation_of_bed(places: Array, others: Array, along: float, across: float
 
 def fitted_covariances(survey: BedSurvey) -> list[CovarianceOfBed]:
     """Those of a survey with their chances, which sum to one; the least likely ones are left out. Of more than
-    MOST_FITTED points every second, third, ... counts.
+    MOST_FITTED points those in the middle of the reach count.
     """
-    every = -(-len(survey.points) // MOST_FITTED)
-    survey = BedSurvey(survey.points[::every], survey.line[::every])
+    if len(survey.points) > MOST_FITTED:
+        own = {number: survey.points[survey.line == number, 0].mean() for number in np.unique(survey.line)}
+        along = np.where(survey.line < 0, survey.points[:, 0], [own[number] for number in survey.line])
+        some = np.argsort(np.abs(along - np.median(along)), kind="stable")[:MOST_FITTED]
+        survey = BedSurvey(survey.points[some], survey.line[some])
     points, basis = survey.points, survey.basis(survey.points)
     length, width = np.ptp(points[:, 0]), np.ptp(points[:, 1])
 
