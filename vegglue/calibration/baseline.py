@@ -166,7 +166,7 @@ def with_coarse_point(base: Baseline) -> Baseline:
 def with_own_error(base: Baseline) -> Baseline:
     """The baseline with the model's own error as the case allows it, computed at its point, and calibrated under it."""
     allowed = base.model.case.model_error
-    if not any_error(base.model.case):
+    if not any_error(base.model.case, allowed):
         return base
     where = model_that_errs(base)
     noise = with_model_error(base.noise, model_error_columns(where.model, where.point, allowed))

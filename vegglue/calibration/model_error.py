@@ -142,9 +142,9 @@ def field_columns(responses: CellResponses, term: Term, basis: GaussianBasis) ->
     return responses_to_basis(responses, term, basis).reshape(len(responses.of[term]), -1) / np.sqrt(variance)
 
 
-def any_error(case: Case) -> bool:
+def any_error(case: Case, allowed: ModelError) -> bool:
     """Whether any error of the model or of its site is allowed, or a survey states one."""
-    return any(case.model_error.model_dump().values()) or any(layer.survey is not None for layer in beds_of(case))
+    return any(allowed.model_dump().values()) or any(layer.survey is not None for layer in beds_of(case))
 
 
 def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Array:
@@ -164,7 +164,7 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Arra
     array (station, k)
         [m/s or m]; no columns if no error is allowed.
     """
-    if not any_error(model.case):
+    if not any_error(model.case, allowed):
         return np.zeros((len(model.station), 0))
     objects = [key for key in model.case.effects if effect_of(model.case, key).name in TERM_OF]
     of_objects = [TERM_OF[effect_of(model.case, key).name] for key in objects]
