@@ -124,9 +124,8 @@ def fitted_covariances(survey: BedSurvey) -> list[CovarianceOfBed]:
 
     def best(rough: bool, start: Array, *along: float) -> Array:
         """ln of what is not given of (l_x, l_y, nugget) at the largest likelihood."""
-        bounds = np.log([np.array(LENGTHS_OVER_EXTENT) * length, np.array(LENGTHS_OVER_EXTENT) * width, NUGGET])[
-            len(along) :
-        ]
+        over = np.array(LENGTHS_OVER_EXTENT)
+        bounds = np.log(np.array([over * length, over * width, np.array(NUGGET)]))[len(along) :]
         found = minimize(
             lambda at: -restricted(rough, *along, *np.exp(at))[0], start, method="L-BFGS-B", bounds=bounds,
             options={"ftol": 1e-8},
