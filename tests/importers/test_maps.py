@@ -10,6 +10,7 @@ from field_folders import CHANNEL, JUNE, folder_of, import_of, imported, refusal
 
 import vegglue
 from vegglue.arrays import Array
+from vegglue.case.bed_error import bed_error_columns, without_surveys
 from vegglue.case.grid import Grid
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
@@ -220,6 +221,36 @@ def test_cross_sections_carry_the_thalweg_along_the_channel(tmp_path: Path) -> N
     assert left == pytest.approx(right, abs=1e-9)
     assert middle < 0.5
     assert np.isnan(terrain.level(np.array([10.0]), np.array([6.0]))).all()
+
+
+def test_a_survey_of_sections_states_the_error_of_its_bed(tmp_path: Path) -> None:
+    """It grows between the lines, each line is left out in turn, and usual errors of sides and places are assumed."""
+    random = np.random.default_rng(1)
+    across = np.arange(-5.0, 5.1, 1.0)
+    rows = [
+        f"P{x},{x},{y},{0.3 + 0.02 * y**2 + 0.1 * np.sin(x / 4.0 + y / 2.0) + 0.01 * random.standard_normal():.3f}"
+        for x in range(0, 49, 8)
+        for y in across
+    ]
+    site = "bed: {file: s.csv, sections: true}\npatches: {file: p.csv}\n" + JUNE
+    corners = [f"reeds,{x},{y},20" for x, y in ((10, 1), (20, 1), (20, 4), (10, 4))]
+    case = import_of(
+        tmp_path, site, s__csv="\n".join(["section,x,y,z", *rows]), p__csv="\n".join(["name,x,y,stems", *corners]),
+        u__csv="x,y,u\n12,0,0.5\n",
+    ).case  # fmt: skip
+    (layer,) = case.bed
+    assert layer.survey is not None
+    assert layer.survey.left_out is not None
+    assert layer.survey.left_out.count == 5
+    assert sum(one.chance for one in layer.survey.covariances) == pytest.approx(1.0)
+    site_of_case = build_site(case)
+    error = np.linalg.norm(bed_error_columns(case, site_of_case.grid), axis=1).reshape(site_of_case.bed.shape)
+    x, middle = site_of_case.grid.x, error.shape[1] // 2
+    on, between = (error[np.abs(x - at).argmin(), middle] for at in (24.0, 28.0))
+    assert on < 0.6 * between
+    assert (case.model_error.edges, case.model_error.probes) == (0.1, 0.03)
+    (plain,) = without_surveys(case).bed
+    assert plain.survey is None
 
 
 @pytest.mark.parametrize(("names", "spread"), [(True, 0.2), (True, 0.0), (False, 0.0)])

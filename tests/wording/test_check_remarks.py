@@ -11,10 +11,12 @@ from vegglue.diagnosis.channel_check import (
     BeyondGrid,
     CanopyEmergent,
     CanopyUnlikeMeasured,
+    ErrorsAssumed,
     ErrorsRefused,
     PatchAreaMissed,
     PatchWithoutCells,
     SteepCellsLikeFloor,
+    SurveyLeftOut,
     UnitOfPrior,
 )
 from vegglue.diagnosis.effect_contract import Breach, ContractRule
@@ -77,6 +79,10 @@ EXAMPLES = [
     PatchWithoutCells("p1", True, None),
     PatchWithoutCells("p1", False, BEYOND),
     PatchAreaMissed("p1", 20.0, 4.0, BEYOND),
+    SurveyLeftOut(6, 0.077, 0.085, 0.091, 12.0, 1.3, False),
+    SurveyLeftOut(6, 0.121, 0.085, 0.091, 36.0, 2.4, True),
+    ErrorsAssumed(0.1, 0.03),
+    ErrorsAssumed(0.0, 0.03),
     SteepCellsLikeFloor(0.36, 0.2),
     CanopyEmergent("reed", (0.7, 1.4), ("low", "mid"), (0.85, 1.1), False, "constant"),
     CanopyUnlikeMeasured("D3", "D3b", 1.06, "willow", (0.8, 0.8)),

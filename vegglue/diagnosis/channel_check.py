@@ -132,6 +132,16 @@ class SurveyLeftOut:
 
 
 @dataclass(frozen=True)
+class ErrorsAssumed:
+    """Errors that nothing states and a config of a natural reach has: of the sides of polygons of plants and of how far
+    across verticals stood [m].
+    """
+
+    edges: float
+    probes: float
+
+
+@dataclass(frozen=True)
 class SteepCellsLikeFloor:
     """Wet cells steeper than `slope` [-] with the friction of the floor: their share, in the worst experiment [-]."""
 
@@ -330,6 +340,12 @@ def remarks_on_survey(case: Case) -> Iterator[SurveyLeftOut]:
             yield SurveyLeftOut(
                 found.count, found.error, found.stated, found.straight, found.most_at, found.most, suspect
             )
+
+
+def remarks_on_assumed_errors(case: Case) -> Iterator[ErrorsAssumed]:
+    """What an import of a natural reach assumes of the errors of its site."""
+    if case.model_error.edges or case.model_error.probes:
+        yield ErrorsAssumed(case.model_error.edges, case.model_error.probes)
 
 
 def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[SteepCellsLikeFloor]:

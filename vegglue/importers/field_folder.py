@@ -23,6 +23,8 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
     MODEL_ERROR_OF_FLUME,
+    POLYGON_SIDES,
+    VERTICALS,
     VISCOSITY,
     bed_prior,
     even,
@@ -151,6 +153,10 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         tree["friction"] = tree["friction"] | {"walls": {"law": "manning", "n": "n_w"}}
         tree["parameters"] = tree["parameters"] | {"n_b": BED_OF_FLUME, "n_w": wall_prior(site.walls.n)}
         tree |= MODEL_ERROR_OF_FLUME
+    elif site.bed is not None:  # of a natural reach, surveyed outdoors
+        walked = any(patch.polygon is not None for patch in patches)
+        usual = {"probes": VERTICALS} | ({"edges": POLYGON_SIDES} if walked else {})
+        tree["model_error"] = tree["model_error"] | usual
     if site.exclude:
         tree["exclude"] = dict(site.exclude)
     if held_out.observations:

@@ -14,7 +14,12 @@ from vegglue.case.gridded_site import build_site
 from vegglue.case.resolved_config import Tree, as_yaml, refuse_not_made, write_made
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
-from vegglue.diagnosis.channel_check import refused_for_errors, remarks_on_survey, remarks_on_unnamed_banks
+from vegglue.diagnosis.channel_check import (
+    refused_for_errors,
+    remarks_on_assumed_errors,
+    remarks_on_survey,
+    remarks_on_unnamed_banks,
+)
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.confluence import (
     NOT_STATED,
@@ -75,9 +80,10 @@ def without_errors(case: Case) -> list[str]:
 
 
 def unnamed_banks(case: Case) -> list[str]:
-    """That a bed is steep in many cells, and no class of friction is for them; nothing where it is not so."""
+    """What a survey of the bed leaves open, errors that are assumed, and steep cells without a class of friction."""
     try:
-        return list(map(sentence, [*remarks_on_survey(case), *remarks_on_unnamed_banks(case, build_site(case))]))
+        of_survey = [*remarks_on_survey(case), *remarks_on_assumed_errors(case)]
+        return list(map(sentence, [*of_survey, *remarks_on_unnamed_banks(case, build_site(case))]))
     except InputError:  # of a bed or a grid that `check` refuses with the same words; the config is written
         return []
 
