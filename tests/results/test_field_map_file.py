@@ -43,6 +43,17 @@ def test_without_a_field_there_is_no_map(tmp_path: Path) -> None:
         assert "field" not in file
 
 
+def test_the_learned_bed_comes_back_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "diagnosis.h5"
+    write_diagnosis(path, replace(with_field("friction"), bed_map=replace(MAP, value=-MAP.value)), "", "d" * 64)
+    found = read_diagnosis(path)
+    assert found.field_map is not None
+    assert found.bed_map is not None
+    np.testing.assert_array_equal(found.bed_map.value, -found.field_map.value)
+    with h5py.File(path) as file:
+        assert file["bed"]["value"].attrs["units"] == "m"
+
+
 def test_bounds_of_an_amplitude_come_back(tmp_path: Path) -> None:
     path, found = tmp_path / "diagnosis.h5", a_diagnosis()
     first = found.candidate_effects[0]

@@ -80,6 +80,8 @@ from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.open_questions import HiddenEffect, OneOfRivals, ProposedMeasurement, Question, RivalEffects
 from vegglue.results.verdict import (
+    AmplitudeBeyondPlausible,
+    BedCorrected,
     ChiSquare,
     CommandCompared,
     CorrelatedErrors,
@@ -167,6 +169,7 @@ VERDICTS: dict[str, Diagnosis] = {
     )),
     "too many": doubt(TooManyGroups(tuple(Rival(name, "effect", 0.2) for name in ("wind", "waves", "steep_bank")))),
     "a far parameter": doubt(ParameterFarFromPrior("n_b", 4.5), effects=(bank(),)),
+    "an absurd size": doubt(AmplitudeBeyondPlausible("wind", 5.2), effects=(bank(),)),
     "misfit beyond errors": doubt(MisfitBeyondErrors(2.3), effects=(bank(),)),
     "misfit unexplained": doubt(MisfitUnexplained()),
     "larger errors": doubt(ErrorsLargerThanStated(1.8)),
@@ -183,6 +186,8 @@ N_B, PHI = NamedParameter("n_b", "n_b", "s m^(-1/3)"), NamedParameter("phi", "φ
 VELOCITY = kind_of("velocity")
 NOTES = (
     MisfitTooSmall(61.5, 150), ImplausibleAmplitude("wind", 3.4), EffectsNotExcluded(("wind", "waves"), beside=True),
+    BedCorrected(49.0, -1.2, -0.3, (-0.45, -0.15), (45.0, 54.0)),
+    BedCorrected(2.0, 0.4, 0.11, (0.02, 0.2), (float("nan"), float("nan"))),
     EffectsExcluded((("wind", "a laboratory"), ("unlisted_inflow", "glass walls"))),
     ModelErrorUsed(0.05, 0.01, 0.6, 0.0), LawStandsOut(candidate_laws_of("law_bank_speed_step"), ("steep_bank",)),
     NeighboursCorrelated(0.3), StatedErrorsTooSmall(1.2), InstrumentExcluded(an_instrument(), True, 4.5),

@@ -13,12 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.calibration.baseline import Baseline, model_that_errs
 from vegglue.calibration.model_error import cell_responses
 from vegglue.case.bed_error import bed_error_columns
 from vegglue.case.grid import Grid
-from vegglue.engine.interface import Model, Point
+from vegglue.engine.interface import Model, Point, flow_at_centres
+
+# Depth above which a cell counts as under water [m].
+LEAST_WATER = 0.05
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,13 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
     values, vectors = np.linalg.eigh(np.eye(columns.shape[1]) - white.T @ white)
     left = columns @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     return LearnedBed(grid, (columns @ amounts).reshape(grid.x.size, grid.y.size), left)
+
+
+def wet_cells(base: Baseline) -> Mask:
+    """Cells of the grid of `learned_bed` under more than LEAST_WATER of water in any experiment (nx, ny)."""
+    where = model_that_errs(base)
+    flows = [flow_at_centres(where.model, where.point, experiment) for experiment in where.point.flows]
+    return np.asarray(np.any([flow.depth > LEAST_WATER for flow in flows], axis=0))
 
 
 def changed_by(learned: LearnedBed, model: Model, point: Point) -> tuple[Array, Array]:

@@ -21,6 +21,19 @@ def beds_of(case: Case) -> list[BedLayer]:
     return [*case.bed, *(layer for one in case.experiments.values() for layer in one.bed or ())]
 
 
+def without_surveys(case: Case) -> Case:
+    """The case as if no survey of its bed stated an error."""
+    experiments = {
+        name: one.model_copy(update={"bed": _plain(one.bed)}) if one.bed else one
+        for name, one in case.experiments.items()
+    }
+    return case.model_copy(update={"bed": _plain(case.bed), "experiments": experiments})
+
+
+def _plain(layers: tuple[BedLayer, ...]) -> tuple[BedLayer, ...]:
+    return tuple(layer.model_copy(update={"survey": None}) for layer in layers)
+
+
 def bed_error_columns(case: Case, grid: Grid, experiment: str = "") -> Array:
     """Columns B (nx ny, k) [m] with B B' the covariance of the error of `bed_levels` by the surveys of its layers; none
     if no layer has a survey. Computed once for a bed. Errors: InputError if a survey cannot be read.

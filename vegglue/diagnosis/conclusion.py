@@ -11,6 +11,7 @@ from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fingerprints import LEAST_DEPTH
 from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
 from vegglue.calibration.law_screening import LawScreening
+from vegglue.calibration.learned_bed import learned_bed, wet_cells
 from vegglue.calibration.noise import Noise, covariance_of_data, with_correlation
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named
@@ -19,6 +20,7 @@ from vegglue.case.channel_geometry import channel_geometry, half_width
 from vegglue.case.grid import centreline_in, on_map
 from vegglue.case.gridded_site import cells_at
 from vegglue.case.schema import Case
+from vegglue.case.survey_error import read_bed_survey
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, clearly_a_law, not_excluded
 from vegglue.diagnosis.child_config import candidate_at
@@ -31,6 +33,7 @@ from vegglue.engine.interface import Model, Point
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import STREAMWISE, kind_of, velocity_rows
 from vegglue.measurements.section_discharge import mismatched_discharges
+from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import (
     TERMS_AT_PLACES,
     CandidateEffect,
@@ -44,6 +47,7 @@ from vegglue.results.causes import (
 )
 from vegglue.results.diagnosis import Diagnosis, FirstScreening, Misfit, ParameterEstimates, Predictions
 from vegglue.results.verdict import (
+    BedCorrected,
     EstimatedErrors,
     MeasuredStretch,
     Note,
@@ -143,7 +147,8 @@ def assemble_diagnosis(
     field, field_map = (None, None) if likely else _field(first, last, found, misfit)
     base, before = last.base, first.base
     model_error = _model_error(last)
-    verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, held_out)
+    bed_map, of_bed = (None, []) if found.implausible else bed_of_measurements(base)
+    verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, held_out, of_bed)
     strongest = first.ranking[:COMPARED]
     columns = [first.best_column(j) for j in strongest]
     # Scores of the term of the first place that was found, else of drag, before anything was accepted.
@@ -179,8 +184,28 @@ def assemble_diagnosis(
         field=field,
         model_error=model_error,
         field_map=field_map,
+        bed_map=bed_map,
         laws=laws,
     )
+
+
+def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]]:
+    """What measurements change a surveyed bed by, as a map, and its largest clear correction under water."""
+    learned = learned_bed(base)
+    if learned is None:
+        return None, []
+    grid, change, error = learned.grid, learned.correction, learned.error
+    kept = FieldMapKept(grid.x, grid.y, change, error)
+    clear = wet_cells(base) & (np.abs(change) > NORMAL95 * error)
+    if not clear.any():
+        return kept, []
+    i, j = np.unravel_index(int(np.argmax(np.where(clear, np.abs(change), 0.0))), change.shape)
+    x, value, half = float(grid.x[i]), float(change[i, j]), NORMAL95 * float(error[i, j])
+    surveys = [read_bed_survey(one.survey.file) for one in base.model.case.bed if one.survey is not None]
+    lines = np.array([one.points[rows, 0].mean() for one in surveys for rows in one.lines])
+    around = (float(np.max(lines[lines <= x], initial=-np.inf)), float(np.min(lines[lines > x], initial=np.inf)))
+    between = around if np.isfinite(around).all() else (float("nan"), float("nan"))
+    return kept, [BedCorrected(x, float(grid.y[j]), value, (value - half, value + half), between)]
 
 
 def _verdict(
@@ -193,6 +218,7 @@ def _verdict(
     laws: CandidateLaws | None,
     model_error: ModelErrorUsed | None,
     held_out: Model | None,
+    of_bed: Sequence[Note],
 ) -> Verdict:
     """The verdict on what was found, once all that it rests on is computed."""
     base, model, z = last.base, last.base.model, last.base.fitted.point.z
@@ -210,7 +236,7 @@ def _verdict(
     rows = [int(np.flatnonzero(base.noise.rows == station)[0]) for station in single]
     neighbours = any(0.0 < base.noise.separation[a, b] < NEIGHBOURS_WITHIN for a in rows for b in rows)
     beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
-    surroundings: list[Note] = [*mapped_places(model.case, named_places(found.places, undecided))]
+    surroundings: list[Note] = [*of_bed, *mapped_places(model.case, named_places(found.places, undecided))]
     surroundings += measured_stretch(model.case, model.station)
     if not any(one.x.size for one in last.fingerprints.places):
         surroundings.append(TooShallow(LEAST_DEPTH))

@@ -17,7 +17,8 @@ Halfway between the sections, and beyond the last:
 
 Before the data parameters are standard normal, and the model and its site err as `model_error` allows: M are the
 columns of that error at the stations, M_e there. What the data say of both is so taken into account. cov is that of the
-errors at the stations, M M' among them, J and J_e are slopes, z the calibrated place.
+errors at the stations, M M' among them, J and J_e are slopes, z the calibrated place. What a survey leaves open of the
+bed is in cov and not in M_e: it is an error of the bed that is stated, and no missing effect.
 Source: conditional normal distribution.
 """
 
@@ -31,6 +32,7 @@ from scipy.special import chdtri
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, model_that_errs
 from vegglue.calibration.model_error import model_error_columns
+from vegglue.case.bed_error import without_surveys
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.field_scan import free_of_prior
 from vegglue.engine.interface import Model, linearise, predict
@@ -99,7 +101,8 @@ def largest_error_between(base: Baseline) -> float:
         return float("nan")
     # A probe beside its place reads another place, and is no error of the model there.
     allowed = model.case.model_error.model_copy(update={"probes": 0.0})
-    columns = np.hstack([point.slope, model_error_columns(wide, point, allowed)])
+    plain = replace(wide, case=without_surveys(model.case))
+    columns = np.hstack([point.slope, model_error_columns(plain, point, allowed)])
     at_stations, there = columns[:count][noise.rows], columns[count:]
     whole, residual = free_of_prior(where)
     factor = scipy.linalg.cho_factor(whole, lower=True)

@@ -21,7 +21,7 @@ from vegglue.measurements.kinds import KINDS, WATER_LEVEL, Kind
 from vegglue.pages.diagnosis_tables import candidate_rows
 from vegglue.pages.flow_maps import Outline
 from vegglue.pages.headline import Headline, rms_residual
-from vegglue.pages.place_maps import field_picture, outlines, paint_places, place_picture, plan_marks
+from vegglue.pages.place_maps import bed_picture, field_picture, outlines, paint_places, place_picture, plan_marks
 from vegglue.pages.run import Run, accepted_causes, published_picture
 from vegglue.pages.style import COLOUR, HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, save, styled
 from vegglue.results.diagnosis import Diagnosis
@@ -276,7 +276,7 @@ def diagnosis_pictures(run: Run, diagnosis: Diagnosis) -> dict[str, list[Picture
         said = len(diagnosis.candidate_effects), above, threshold, names, still
         figure = draw_candidates(table, threshold)
         wide.append(published_picture(run, figure, "missing-suspects", "caption_suspects", *said))
-    wide += [*place_picture(run, diagnosis), *field_picture(run, diagnosis)]
+    wide += [*place_picture(run, diagnosis), *field_picture(run, diagnosis), *bed_picture(run, diagnosis)]
     if diagnosis.misfit.worst is not None:
         worst, size = diagnosis.misfit.worst
         missed = worst["experiment"], worst["section"], worst["zone"], size, diagnosis.errors.scale

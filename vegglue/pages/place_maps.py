@@ -1,7 +1,7 @@
 """Maps of places and of a smooth field: where something that is no listed effect would reduce the misfit."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -201,6 +201,15 @@ def place_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     if mapped.x.size:
         figure = draw_places(mapped.x, mapped.y, mapped.score, mapped.term, plan_marks(diagnosis, outlines(run.case)))
         yield published_picture(run, figure, "missing-places", "caption_places", diagnosis)
+
+
+def bed_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
+    """The map of what measurements change a surveyed bed by, if its survey states an error."""
+    mapped = diagnosis.bed_map
+    if mapped is not None:
+        drawn = DrawnField(mapped.x, mapped.y, mapped.value, mapped.error, "change of the bed level", "m")
+        figure = draw_field_map(drawn, replace(plan_marks(diagnosis, outlines(run.case)), spots=[]))
+        yield published_picture(run, figure, "learned-bed", "caption_bed")
 
 
 def field_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:

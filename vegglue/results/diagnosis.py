@@ -98,8 +98,8 @@ class Predictions:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything a diagnosis found in the case `name`, by which version; field_map: where there is a field; laws:
-    where they stand out.
+    """Everything a diagnosis found in the case `name`, by which version; field_map: of the field, if there is one;
+    bed_map: what measurements change a surveyed bed by [m]; laws: if they are significant.
     """
 
     name: str
@@ -118,6 +118,7 @@ class Diagnosis:
     field: FieldFound | None = None
     model_error: ModelErrorUsed | None = None
     field_map: FieldMapKept | None = None
+    bed_map: FieldMapKept | None = None
     laws: CandidateLaws | None = None
 
     @property

@@ -127,6 +127,9 @@ def diagnosis_groups(diagnosis: Diagnosis) -> dict[str, Group]:
         unit = UNIT_OF_FIELD[field.term]
         cells = {name: Variable(("x", "y"), getattr(mapped, name), unit) for name in ("value", "error")}
         groups["field"] = Group({"x": mapped.x, "y": mapped.y}, cells, {"x": "m", "y": "m"})
+    if (learned := diagnosis.bed_map) is not None:
+        cells = {name: Variable(("x", "y"), getattr(learned, name), "m") for name in ("value", "error")}
+        groups["bed"] = Group({"x": learned.x, "y": learned.y}, cells, {"x": "m", "y": "m"})
     return groups
 
 
@@ -242,6 +245,7 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
         field=_parsed(FieldFound | None, attributes["field"]),
         model_error=_parsed(ModelErrorUsed | None, attributes["model_error"]),
         field_map=FieldMapKept(**fitting(groups["field"], FIELD_MAP)) if "field" in groups else None,
+        bed_map=FieldMapKept(**fitting(groups["bed"], FIELD_MAP)) if "bed" in groups else None,
         laws=_parsed(CandidateLaws | None, attributes["laws"]),
     )
     names = {one.name for one in found.candidate_effects}

@@ -371,6 +371,19 @@ class PlacesOnMap:
 
 
 @dataclass(frozen=True)
+class BedCorrected:
+    """The largest clear correction of a surveyed bed under water that the measurements ask for: change with its 95 %
+    interval [m] at x, y [m]; between: x of the surveyed lines on both sides [m], NaN beyond the last.
+    """
+
+    x: float
+    y: float
+    change: float
+    interval95: tuple[float, float]
+    between: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class MeasuredStretch:
     """Velocities lie between x = low and high in a model of some length [m]; effects: that act along the channel."""
 
@@ -425,6 +438,7 @@ Note = (
     | StatedErrorsTooSmall
     | InstrumentExcluded
     | EffectsUntestable
+    | BedCorrected
     | PlacesOnMap
     | MeasuredStretch
     | TooShallow
