@@ -10,10 +10,11 @@ from coarse_twin import coarse_twin
 from vegglue.calibration.baseline import baseline
 from vegglue.calibration.learned_bed import changed_by, learned_bed
 from vegglue.calibration.model_error import cell_responses, model_error_columns
-from vegglue.case.bed_error import bed_error_columns
+from vegglue.case.bed_error import bed_error_columns, without_surveys
 from vegglue.case.schema import ModelError
 from vegglue.case.site_schema import BedLayer, CovarianceOfBed, SurveyOfBed
 from vegglue.case.survey_error import BedSurvey, bed_survey_text
+from vegglue.diagnosis.next_measurement import surveys
 from vegglue.engine.interface import Model, Point
 
 OF_BED = CovarianceOfBed(chance=1.0, along=4.0, across=1.5, sd=0.05, point_error=0.005)
@@ -72,3 +73,19 @@ def test_the_flow_finds_a_bed_that_was_drawn(surveyed: tuple[Model, Point]) -> N
     assert np.mean(np.abs(left) <= 2.5 * found.error.ravel() + 1e-3) > 0.9
     better = value - before.fitted.point.prediction - changed_by(found, model, before.fitted.point)[0]
     assert np.sum(better**2) < 0.7 * np.sum(answers**2)
+
+
+def test_a_line_midway_takes_its_share_of_the_error(surveyed: tuple[Model, Point]) -> None:
+    """L L' of a further line lies between nothing and M, and is most of M for velocities on that line."""
+    model, point = surveyed
+    columns = bed_error_columns(model.case, model.site.grid)
+    answers = cell_responses(model, point, ("bed",)).of["bed"].reshape(len(model.station), -1) @ columns
+    whole = answers @ answers.T
+    found = [one for one in surveys(model, point) if "line of the bed" in one.name]
+    assert len(found) == 4
+    for one in found:
+        assert one.less is not None
+        left = whole - one.less @ one.less.T
+        assert np.linalg.eigvalsh(left).min() > -1e-6 * np.trace(whole)
+        assert 0.0 < np.trace(left) < np.trace(whole)
+    assert not surveys(replace(model, case=without_surveys(model.case)), point)

@@ -7,6 +7,10 @@ all of them. What is left between both,
 
 in squared standard errors, is the gain of the log-likelihood ratio (times two) that i would win over j by measuring.
 j may be the model without any effect: then D^2 says whether i would be seen at all.
+
+A survey measures no flow, and makes the model err less: a further line at cells with the columns B_l of the bed's error
+takes F (B_l' (B_l B_l' + s^2 I)^-1 B_l) F' from the covariance, F the responses to these columns and s the error of a
+surveyed point; polygons walked again take what their sides leave.
 """
 
 import itertools
@@ -20,18 +24,22 @@ import scipy.linalg
 
 from vegglue.arrays import Array
 from vegglue.calibration.candidates import Candidate, cause_of
-from vegglue.calibration.model_error import model_error_columns
+from vegglue.calibration.model_error import cell_responses, model_error_columns, site_error_columns
 from vegglue.calibration.noise import Noise
+from vegglue.case.bed_error import bed_error_columns
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import in_experiment
-from vegglue.case.schema import Case
+from vegglue.case.schema import Case, ModelError
+from vegglue.case.survey_error import read_bed_survey
 from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.observations import section_places, station_table
 from vegglue.wording.numbers import in_digits
 
 # Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
-HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}
+HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0, "line": 1.0, "polygons": 2.0}
+# Standard error of a point of a new line [m], and how near to a line a new one is the same [m].
+POINT_ERROR, SAME_LINE = 0.01, 1.0
 # Places along the reach where a section is thought of, and how near to one that was measured it is that one, over the
 # distance between these places. Chosen, not measured.
 SECTIONS, AS_MEASURED = 12, 0.3
@@ -44,7 +52,8 @@ LEVEL_POWER = 0.6
 @dataclass(frozen=True)
 class MeasurementPlan:
     """One measurement that could be made: its stations and their rows of the extended table, its cost [h], where [m],
-    and in which experiment.
+    and in which experiment; less (station, k): columns L of a survey that takes L L' from the covariance, None of a
+    measurement of the flow.
     """
 
     name: str
@@ -53,6 +62,7 @@ class MeasurementPlan:
     hours: float
     x: float
     experiment: str
+    less: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -90,6 +100,7 @@ def worth_of_measurements(
         usual = np.median(there) if there.size else kind_of(str(kind)).usual_error
         errors[(kinds == kind) & ~np.isfinite(errors)] = usual
     covariance = np.diag(errors**2) + own_error @ own_error.T
+    plans += surveys(wide, point)
     traces = responses(wide, point, changed) * np.array([gain for _, _, gain in every])
     known = np.zeros(len(wide.station), dtype=bool)
     known[: len(model.station)] = model.station["used"].to_numpy()
@@ -98,8 +109,9 @@ def worth_of_measurements(
     for end, question in zip(ends, questions, strict=True):
         columns, slopes = np.hstack([point.slope, traces[:, end - len(question) : end]]), point.slope.shape[1]
 
-        def least(rows: np.ndarray, columns: Array = columns, slopes: int = slopes) -> Array:
-            lower = np.linalg.cholesky(covariance[np.ix_(rows, rows)])
+        def least(rows: np.ndarray, less: Array | None = None, columns: Array = columns, slopes: int = slopes) -> Array:
+            whole = covariance[np.ix_(rows, rows)]
+            lower = np.linalg.cholesky(whole if less is None else whole - less[rows] @ less[rows].T)
             white = scipy.linalg.solve_triangular(lower, columns[rows], lower=True)
             return least_distances(white[:, :slopes], white[:, slopes:])
 
@@ -107,7 +119,7 @@ def worth_of_measurements(
         for plan in plans:
             rows = known.copy()
             rows[plan.rows] = True
-            worths.append(MeasurementWorth(plan, now, least(rows)))
+            worths.append(MeasurementWorth(plan, now, least(rows, plan.less)))
         found.append(worths)
     return found
 
@@ -132,6 +144,39 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
         tables.append(table)
         count += len(table)
     return replace(wide, station=station_table(*tables)), plans
+
+
+def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
+    """Lines of the bed midway between those of its surveys, and the outlines of plants; none of a site that states no
+    such error.
+    """
+    case, grid, nothing = model.case, model.site.grid, np.zeros(0, dtype=int)
+    found, no_station = [], model.station.iloc[:0]
+    columns = bed_error_columns(case, grid)
+    if columns.any():
+        own = model.station["experiment"].isin(model.site.own).to_numpy()
+        answers = cell_responses(model, point, ("bed",)).of["bed"].reshape(len(model.station), -1) @ columns
+        answers[own] = 0.0
+        read = [read_bed_survey(layer.survey.file) for layer in case.bed if layer.survey is not None]
+        lines = np.unique([one.points[rows, 0].mean() for one in read for rows in one.lines])
+        for before, after in itertools.pairwise(lines):
+            if after - before <= 2.0 * SAME_LINE:
+                continue
+            x = 0.5 * (before + after)
+            at = columns.reshape(*model.site.bed.shape, -1)[int(np.abs(grid.x - x).argmin())]
+            # A_l' (B_l B_l' + s^2 I)^(-1/2) of the answers A = F.
+            lower = np.linalg.cholesky(at @ at.T + POINT_ERROR**2 * np.eye(len(at)))
+            less = answers @ scipy.linalg.solve_triangular(lower, at, lower=True).T
+            name = f"a surveyed line of the bed at x = {x:.0f} m"
+            found.append(MeasurementPlan(name, nothing, no_station, HOURS["line"], float(x), "", less))
+    if case.model_error.edges and case.plants.patches:
+        drag = cell_responses(model, point, ("friction", "drag"))
+        sides = site_error_columns(model, point, ModelError(edges=case.model_error.edges), drag)
+        # Corners that are levelled in leave a fifth of the error, and a 25th of its square.
+        less = np.sqrt(1.0 - 0.2**2) * sides
+        name = "the outlines of the plants, by total station"
+        found.append(MeasurementPlan(name, nothing, no_station, HOURS["polygons"], float(grid.x.mean()), "", less))
+    return found
 
 
 def _ideas(
