@@ -1,5 +1,6 @@
 """What a diagnosis concludes from its first and its last screening: the verdict, the misfit by zone, all numbers."""
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -116,6 +117,8 @@ SIGNIFICANT = 0.01
 COMPARED = 12
 # Spacings of a section [-] within which two readings stand side by side: neighbours are about one apart, others two.
 NEIGHBOURS_WITHIN = 1.5
+# Corrections of a surveyed bed that are reported.
+BED_CORRECTIONS = 3
 # Hypotheses that a verdict names if none leads.
 UNDECIDED_NAMED = 3
 # Share of the channel below which velocities come from a small part of it. Chosen, not measured.
@@ -190,22 +193,27 @@ def assemble_diagnosis(
 
 
 def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]]:
-    """What measurements change a surveyed bed by, as a map, and its largest clear correction under water."""
+    """What measurements change a surveyed bed by, as a map, and its largest clear corrections under water: one at most
+    of each stretch between lines, three in all.
+    """
     learned = learned_bed(base)
     if learned is None:
         return None, []
     grid, change, error = learned.grid, learned.correction, learned.error
     kept = FieldMapKept(grid.x, grid.y, change, error)
-    clear = wet_cells(base) & (np.abs(change) > NORMAL95 * error)
-    if not clear.any():
-        return kept, []
-    i, j = np.unravel_index(int(np.argmax(np.where(clear, np.abs(change), 0.0))), change.shape)
-    x, value, half = float(grid.x[i]), float(change[i, j]), NORMAL95 * float(error[i, j])
+    clear = np.where(wet_cells(base) & (np.abs(change) > NORMAL95 * error), np.abs(change), 0.0)
     surveys = [read_bed_survey(one.survey.file) for one in base.model.case.bed if one.survey is not None]
-    lines = np.array([one.points[rows, 0].mean() for one in surveys for rows in one.lines])
-    around = (float(np.max(lines[lines <= x], initial=-np.inf)), float(np.min(lines[lines > x], initial=np.inf)))
-    between = around if np.isfinite(around).all() else (float("nan"), float("nan"))
-    return kept, [BedCorrected(x, float(grid.y[j]), value, (value - half, value + half), between)]
+    lines = [float(one.points[rows, 0].mean()) for one in surveys for rows in one.lines]
+    found = []
+    for low, high in itertools.pairwise([-np.inf, *sorted(lines), np.inf]):
+        own = np.where(((grid.x >= low) & (grid.x < high))[:, None], clear, 0.0)
+        if own.any():
+            i, j = np.unravel_index(int(own.argmax()), own.shape)
+            value, half = float(change[i, j]), NORMAL95 * float(error[i, j])
+            between = (low, high) if np.isfinite([low, high]).all() else (float("nan"), float("nan"))
+            place = float(grid.x[i]), float(grid.y[j])
+            found.append(BedCorrected(*place, value, (value - half, value + half), between))
+    return kept, sorted(found, key=lambda one: -abs(one.change))[:BED_CORRECTIONS]
 
 
 def _verdict(

@@ -18,7 +18,8 @@ Halfway between the sections, and beyond the last:
 Before the data parameters are standard normal, and the model and its site err as `model_error` allows: M are the
 columns of that error at the stations, M_e there. What the data say of both is so taken into account. cov is that of the
 errors at the stations, M M' among them, J and J_e are slopes, z the calibrated place. What a survey leaves open of the
-bed is in cov and not in M_e: it is an error of the bed that is stated, and no missing effect.
+bed, and where patches end, is in cov and not in M_e: errors of the site that are stated are no room for a missing
+effect. A reading there would be judged by them, so that e counts in the errors of the data and of the site.
 Source: conditional normal distribution.
 """
 
@@ -31,8 +32,9 @@ from scipy.special import chdtri
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, model_that_errs
-from vegglue.calibration.model_error import model_error_columns
+from vegglue.calibration.model_error import any_error, model_error_columns
 from vegglue.case.bed_error import without_surveys
+from vegglue.case.schema import ModelError
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.field_scan import free_of_prior
 from vegglue.engine.interface import Model, linearise, predict
@@ -88,8 +90,8 @@ SHARE_BELOW, DRAWN_ERRORS = 0.95, 2000
 
 
 def largest_error_between(base: Baseline) -> float:
-    """The root mean square of e and the errors of the data, over that of those alone [-]: so much in SHARE_BELOW of the
-    cases. NaN where there are no velocities, or the flow is not found.
+    """The root mean square of e and the errors of data and site, over that of those alone [-]: so much in SHARE_BELOW
+    of the cases. NaN if there are no velocities, or the flow is not found.
     """
     where = model_that_errs(base)
     model, noise = where.model, where.noise
@@ -100,9 +102,11 @@ def largest_error_between(base: Baseline) -> float:
     if point is None or len(both) == count or not seen.any():
         return float("nan")
     # A probe beside its place reads another place, and is no error of the model there.
-    allowed = model.case.model_error.model_copy(update={"probes": 0.0})
+    allowed = model.case.model_error.model_copy(update={"probes": 0.0, "edges": 0.0})
     plain = replace(wide, case=without_surveys(model.case))
     columns = np.hstack([point.slope, model_error_columns(plain, point, allowed)])
+    site = ModelError(edges=model.case.model_error.edges)
+    of_site = model_error_columns(wide, point, site)[count:] if any_error(model.case, site) else np.zeros((1, 0))
     at_stations, there = columns[:count][noise.rows], columns[count:]
     whole, residual = free_of_prior(where)
     factor = scipy.linalg.cho_factor(whole, lower=True)
@@ -111,7 +115,8 @@ def largest_error_between(base: Baseline) -> float:
     covariance = there @ there.T - shared.T @ scipy.linalg.cho_solve(factor, shared)
     random = np.random.default_rng(1)
     drawn = random.multivariate_normal(mean, covariance, DRAWN_ERRORS, check_valid="ignore", method="eigh")
-    squares = (drawn**2).mean(axis=1) / float(np.mean(base.noise.data_error[seen] ** 2))
+    expected = float(np.mean(base.noise.data_error[seen] ** 2)) + float((of_site**2).sum(axis=1).mean())
+    squares = (drawn**2).mean(axis=1) / expected
     return float(np.sqrt(1.0 + np.quantile(squares, SHARE_BELOW)))
 
 
