@@ -22,6 +22,7 @@ STUDIES = Path(__file__).parent
         "fuzz",
         "laws",
         "law_alarms",
+        "natural",
         "scale",
         "sensitivity",
         "loop",
