@@ -23,8 +23,8 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
     MODEL_ERROR_OF_FLUME,
+    PLACE_OF_VERTICAL,
     POLYGON_SIDES,
-    VERTICALS,
     VISCOSITY,
     bed_prior,
     even,
@@ -155,7 +155,7 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         tree |= MODEL_ERROR_OF_FLUME
     elif site.bed is not None:  # of a natural reach, surveyed outdoors
         walked = any(patch.polygon is not None for patch in patches)
-        usual = {"probes": VERTICALS} | ({"edges": POLYGON_SIDES} if walked else {})
+        usual = {"probes": PLACE_OF_VERTICAL} | ({"edges": POLYGON_SIDES} if walked else {})
         tree["model_error"] = tree["model_error"] | usual
     if site.exclude:
         tree["exclude"] = dict(site.exclude)
