@@ -45,13 +45,33 @@ class Comparison:
 def compare(
     cases: Sequence[Case | CaseRun], *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent
 ) -> Comparison:
-    """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one, and kept in
-    comparison.json in the folder of each, unless one model is there twice, or a ladder is kept there that begins with
-    another model.
+    """Compare models by their errors at what they were calibrated to, at held-out and at validation data.
 
-    Stations that the diagnosis of any of them has set aside are left out of all. What a model misses is kept in
-    model_score.json, and not computed again for exactly the same. Errors: InputError when models have
-    other measurements, or one name and differ, when one finds no flow, or a station has no standard error.
+    Readings that the diagnosis of any of them excludes are excluded for all. The comparison is drawn in ladder.png of
+    the last run, and kept in comparison.json of each, unless one model is there twice, or a comparison is kept there
+    that begins with another model. Errors of a model are kept in model_score.json, and read there for exactly the same
+    case.
+
+    Parameters
+    ----------
+    cases : sequence of Case or CaseRun
+        The baseline first.
+    runs : Path or str
+        Folder that holds the folders of runs.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        If models have other measurements, or one name and differ, if one finds no flow, or if a station has no standard
+        error.
     """
     several = [case_run(case, runs, jobs, watch) for case in cases]
     hashes = [run.config_hash for run in several]  # before anything is read, see CaseRun.config_hash

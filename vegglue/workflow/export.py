@@ -35,7 +35,14 @@ LIBRARIES_OF_FORM: dict[Form, tuple[str, ...]] = {"csv": (), "geotiff": ("tifffi
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written, and of which parameters the flow is, in words."""
+    """What was written.
+
+    Attributes
+    ----------
+    files : tuple of Path
+    parameters : str
+        Of which parameters the flow is.
+    """
 
     files: tuple[Path, ...]
     parameters: str
@@ -47,11 +54,30 @@ def export(
 ) -> Exported:
     """Write the flow of a case at cell centres, and its stations, into runs/<name>/export/.
 
-    The flow is that of the posterior's medians, else of the best fit that a diagnosis found, else of the middle of
-    the priors. csv: stations.csv and flow-<experiment>.csv; geotiff: one file for each quantity and experiment, none on
-    a grid along a centreline; netcdf: flow.nc, a UGRID mesh. With a `frame` in the case all have their place on the
-    map, and velocities are turned to it.
-    Errors: InputError when no flow is found, nothing is left to write, or a library is missing; StorageError.
+    The flow is that of the medians of the posterior, else of the best fit of the diagnosis, else of the middle of the
+    priors. With a `frame` in the case, places and velocities are those of the map.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    runs : Path or str
+        Folder that holds the folders of runs.
+    forms : sequence of str
+        `csv` writes stations.csv and flow-<experiment>.csv; `geotiff` one file for each quantity and experiment, none
+        on a grid along a centreline; `netcdf` flow.nc, a UGRID mesh.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    Exported
+
+    Raises
+    ------
+    InputError
+        If no flow is found, nothing is left to write, or a library is missing.
+    StorageError
+        If a file cannot be written.
     """
     run = case_run(case, runs, watch=watch)
     case = run.case

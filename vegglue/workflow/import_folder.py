@@ -34,12 +34,26 @@ NO_ROOM = "free some room in the folder for temporary files"
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
-    """Make a case of a folder of measurements: site.json or site.yaml and tables, or a published set.
+    """Make a case of a folder of measurements: site.yaml or site.json and tables, or a published set.
 
-    to: the config to write; configs/<folder>.yaml or <folder>.yaml if not given. The confluence set of R.B. Canelas
-    makes a second config, <to>-flat.yaml, with a plane instead of the surveyed bed. force: replace files that were
-    edited or not made here, too. Errors: InputError for what is missing or cannot be read, or would be replaced; then
-    nothing was written.
+    The confluence set of R.B. Canelas makes a second config, <to>-flat.yaml, with a plane instead of the surveyed bed.
+
+    Parameters
+    ----------
+    folder : Path or str
+    to : Path or str, optional
+        The config to write; configs/<folder>.yaml or <folder>.yaml if not given.
+    force : bool
+        Whether to replace files that were edited by hand or not written by vegglue.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        For what is missing or cannot be read, or if a file would be replaced; then nothing was written.
     """
     folder = Path(folder)
     name = f"{folder.resolve().name}.yaml"

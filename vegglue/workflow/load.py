@@ -23,14 +23,24 @@ Read = TypeVar("Read")
 
 @dataclass(frozen=True)
 class LoadedRun:
-    """What lies in the folder of a run; None where a step was not done.
+    """All results in the folder of a run; None for a step that was not done.
 
-    ensemble: all members: their parameters, prediction (member, station), status, reason, mass_error and so on.
-    fields: level, u and v (member, experiment, x, y), where the case keeps them. members: of the posterior, with
-    theta (parameter, member), weights and what follows from them. posterior: draws of equal weight for ArviZ, with the
-    groups prior, log_likelihood, posterior_predictive and others; a DataTree with ArviZ 1.0 and later. stations: one
-    row for each measurement. Attributes of a dataset say from which config, seed and version it is; its variables
-    have `units`.
+    Each dataset has the config, seed and version as attributes, and `units` of its variables.
+
+    Attributes
+    ----------
+    folder : Path
+    ensemble : xarray.Dataset or None
+        All members: parameters, prediction (member, station), status, reason, mass_error.
+    fields : xarray.Dataset or None
+        level [m], u and v [m/s], each (member, experiment, x, y), if the case keeps fields.
+    members : xarray.Dataset or None
+        Of the posterior: theta (parameter, member), weights and what follows from them.
+    posterior : arviz.InferenceData or xarray.DataTree or None
+        Draws of equal weight, with the groups prior, log_likelihood, posterior_predictive and others.
+    diagnosis : Diagnosis or None
+    stations : DataFrame or None
+        One row for each measurement.
     """
 
     folder: Path
@@ -61,7 +71,20 @@ class LoadedRun:
 def load(folder: Path | str) -> LoadedRun:
     """Read all results in the folder of a run, such as runs/brook.
 
-    Errors: InputError when there are none, or xarray or ArviZ is not installed; StorageError for a broken file.
+    Parameters
+    ----------
+    folder : Path or str
+
+    Returns
+    -------
+    LoadedRun
+
+    Raises
+    ------
+    InputError
+        If there are none, or if xarray or ArviZ is not installed.
+    StorageError
+        If a file is damaged.
     """
     folder = Path(folder)
     there = {name for name in FILES if (folder / name).exists()}

@@ -51,12 +51,33 @@ def next_measurement(
     jobs: int = -1,
     watch: Watch = silent,
 ) -> list[Question]:
-    """What to measure next, ranked by gain per hour of field work; empty when nothing is left to be told apart.
+    """Rank what could be measured next by what it gains for an hour of field work.
 
-    between: names of effects or laws, else those that the diagnosis could not tell apart, step by step, and a place
-    that is likelier than they are; where a law stands out, the laws that could be it; where it found nothing, the
-    strongest of those it could not test, each by itself at a plausible size. Only questions nobody chose are kept, in
-    questions.json, and read there for exactly this case. Errors: InputError for a name that is not in the diagnosis.
+    Questions that follow from the diagnosis are kept in questions.json, and read there for exactly this case.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    between : sequence of str
+        Effects or laws to separate. If empty: what the diagnosis could not separate, step by step, and a place that is
+        more probable; the laws that it could be, if a law stands out; or the strongest effects that it could not test,
+        each at a plausible size, if it found nothing.
+    runs : Path or str
+        Folder that holds the folders of runs.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    list of Question
+        Empty if nothing is left to separate.
+
+    Raises
+    ------
+    InputError
+        For a name that is not in the diagnosis.
     """
     run = case_run(case, runs, jobs, watch)
     case, wanted = run.case, run.config_hash

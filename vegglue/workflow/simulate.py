@@ -29,17 +29,37 @@ def simulate(
     watch: Watch = silent,
     force: bool = False,
 ) -> Ensemble:
-    """Solve every member of the ensemble, kept in runs/<name>/ensemble.h5 (and fields.h5 if the case keeps fields); or
-    run the command of the case's `engine` for each.
+    """Solve all members of the ensemble of a case, or run the command of its `engine` for each.
 
-    An ensemble of exactly this case is read instead, also that of a run beside it whose case differs only in what an
-    ensemble does not depend on; one that was stopped goes on where it was. members: size of the ensemble instead of the
-    case's; jobs: processes, -1 for one on every core, and results do not depend on it; watch is told how far it is;
-    force: replace a larger ensemble of the case, too, and run members again for which the command of an engine failed.
-    Predictions are (member, station), in m/s for velocities and m for levels.
+    They are kept in runs/<name>/ensemble.h5, and in fields.h5 if the case keeps fields. An ensemble of exactly this
+    case is read instead, also that of a run beside it whose case differs only in what an ensemble does not depend on; a
+    stopped one is continued.
 
-    Errors: InputError for a case without parameters, fields beyond their budget, or a larger ensemble there;
-    StorageError when another run holds the folder or the disk is full.
+    Parameters
+    ----------
+    case : Case or CaseRun
+    runs : Path or str
+        Folder that holds the folders of runs.
+    members : int, optional
+        Size of the ensemble, instead of the case's.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+    force : bool
+        Whether to replace a larger ensemble of the case, and to run members again for which the command failed.
+
+    Returns
+    -------
+    Ensemble
+        With predictions (member, station) [m/s for velocities, m for levels, m3/s for discharges].
+
+    Raises
+    ------
+    InputError
+        For a case without parameters, for fields beyond their budget, or if there is a larger ensemble.
+    StorageError
+        If another run holds the folder, or if the disk is full.
     """
     run = case_run(case, runs, jobs, watch, force).sized(members)
     path = run.folder / "ensemble.h5"

@@ -125,12 +125,33 @@ def make_twin(
     seed: int = 1,
     force: bool = False,
 ) -> Case:
-    """Make measurements at the stations of a case from a truth that hides something; config, tables and the sealed
-    answer are written into a folder.
+    """Make synthetic measurements at the stations of a case, from a truth that hides something.
 
-    hide: `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `nothing`, or `?` for any; snr: how visible an effect
-    without a size is made [standard errors]; noise: `white`, `ar1:0.5` or `understated:1.5`; force: replace
-    files there that vegglue did not write, too. Errors: InputError.
+    Config, tables and the encoded truth are written into a folder.
+
+    Parameters
+    ----------
+    case : Case
+    to : Path or str
+        The folder.
+    hide : sequence of str
+        `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `nothing`, or `?` for any.
+    snr : float
+        How visible an effect without a size is made [standard errors].
+    noise : str
+        `white`, `ar1:0.5` or `understated:1.5`.
+    seed : int
+    force : bool
+        Whether to replace files that vegglue did not write.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        For an unknown effect or noise, an effect that cannot be seen, or if a file would be replaced.
     """
     refuse_command(case, "twin")
     model = case_run(case, "runs").model
@@ -142,8 +163,25 @@ def make_twin(
 
 
 def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False) -> list[str]:
-    """Open the seal of a twin: what is true and, where there is a diagnosis of it, how well that guessed; one sentence
-    each. trust: as for `load_case`. Errors: InputError when there is no seal, or it is broken.
+    """Report the truth of a twin and, if it was diagnosed, how well the diagnosis found it.
+
+    Parameters
+    ----------
+    folder : Path or str
+    runs : Path or str
+        Folder that holds the folders of runs.
+    trust : bool
+        As for `load_case`.
+
+    Returns
+    -------
+    list of str
+        One sentence each.
+
+    Raises
+    ------
+    InputError
+        If the encoded truth is missing or damaged.
     """
     folder = Path(folder)
     answer = opened_answer(folder / SEAL)
