@@ -304,9 +304,9 @@ def _agree_on_effects(case: Case) -> None:
 
     known = library(case.effect_file)
     for name in case.exclude or {}:
-        yield from _unknown(("exclude", name), name, known, "effect")
+        _declared(("exclude", name), name, known, "effect")
         if any((entry.effect or key) == name for key, entry in case.effects.items()):
-            yield Refusal(("exclude", name), "excludes an effect that `effects` has: take it out of one of the two")
+            raise CaseError(("exclude", name), "excludes an effect that `effects` has: take it out of one of the two")
     for key, entry in case.effects.items():
         place: KeyPath = ("effects", key)
         name = entry.effect or key
