@@ -30,8 +30,18 @@ from vegglue.wording.sentences import phrase, tagged
 
 @dataclass(frozen=True)
 class Misfit:
-    """chi2 = |W (y - f)|^2 of the first and of the last model [-]; freedom: degrees of the last; p: chance of a chi2 as
-    large under errors alone; zones: mean misfit of the first by experiment, section and zone, in errors of the last.
+    """chi2 = |W (y - f)|^2 of the first and of the last model.
+
+    Attributes
+    ----------
+    chi2_first, chi2
+        [-]
+    freedom
+        Degrees of freedom of the last.
+    p
+        Chance of a chi2 as large under errors alone [-].
+    zones
+        Mean misfit of the first model by experiment, section and zone [errors of the last].
     """
 
     chi2_first: float
@@ -61,8 +71,16 @@ class Misfit:
 
 @dataclass(frozen=True)
 class FirstScreening:
-    """Score tests of the first model. threshold: score that errors alone reach at the false-alarm rate of effects;
-    scores: by name [standard errors]; cosine (c, c): between the fingerprints of the strongest effects `compared` (c,).
+    """Score tests of the first model.
+
+    Attributes
+    ----------
+    threshold
+        Score that errors alone reach at the false-alarm rate of effects [standard errors].
+    scores
+        By name [standard errors].
+    compared, cosine
+        The strongest effects (c,), and the cosines between their fingerprints (c, c) [-].
     """
 
     threshold: float
@@ -73,7 +91,15 @@ class FirstScreening:
 
 @dataclass(frozen=True)
 class ParameterEstimates:
-    """Calibrated parameters by name: of the first model, and of the last one with their 95 % intervals."""
+    """Calibrated parameters by name.
+
+    Attributes
+    ----------
+    first
+        Of the first model.
+    last
+        Of the last model: value and 95 % interval.
+    """
 
     first: dict[str, float]
     last: dict[str, tuple[float, float, float]]
@@ -81,8 +107,16 @@ class ParameterEstimates:
 
 @dataclass(frozen=True)
 class Predictions:
-    """The table of stations, what the first and the last model predict there, and the standard errors of what was
-    measured, NaN where it was not used; (station,) each [m/s or m].
+    """Predictions at the stations.
+
+    Attributes
+    ----------
+    station : DataFrame
+        The table of stations.
+    first, last
+        Of the first and of the last model (station,) [unit of the kind].
+    error
+        Standard errors of the readings (station,), NaN if not used.
     """
 
     station: pd.DataFrame
@@ -98,8 +132,29 @@ class Predictions:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything a diagnosis found in the case `name`, by which version; field_map: where there is a field; laws:
-    where they stand out.
+    """All results of a diagnosis of the case `name`.
+
+    Attributes
+    ----------
+    name, version
+        Of the case and of vegglue.
+    verdict : Verdict
+    candidate_effects : tuple of CandidateEffect
+    steps : tuple of Step
+        Rounds of the search.
+    misfit : Misfit
+    errors : EstimatedErrors
+    first_screening : FirstScreening
+    parameters : ParameterEstimates
+    predictions : Predictions
+    place_map : PlaceMap
+    places : tuple of LocalAnomaly
+    instruments : tuple of FaultyInstrument
+    field, field_map
+        A field, if one is significant.
+    model_error : ModelErrorUsed or None
+    laws : CandidateLaws or None
+        Laws, if they are significant.
     """
 
     name: str
