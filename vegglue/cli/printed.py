@@ -15,8 +15,8 @@ from vegglue.cli.output import command_line, console, print_table
 from vegglue.diagnosis.comparison import exclusion_in_words, held_out_rmse, improvement
 from vegglue.errors import shown_path
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
+from vegglue.inference.homogeneity import differing
 from vegglue.inference.statements import (
-    REJECTED_BELOW,
     CalibrationDiffers,
     correlations,
     fit_statements,
@@ -312,7 +312,7 @@ def show_ladder(found: Comparison) -> None:
     headings = ("model", "parameters", "RMSE", "levels", *(f"{kind.words} [{kind.unit}]" for kind in others),
                 "chi2 / n", "section left out", "reduction", "exp. left out", "log score", "in 50 %", "in 95 %",
                 *validated)  # fmt: skip
-    rows, differing = [], []
+    rows, heterogeneous = [], []
     for before, one in zip([None, *scores[:-1]], scores, strict=True):
         seen, held = one.in_sample, one.predictive
         # By how much held-out squares fell [(mm/s)^2]; the error of that is unknown if one section alone was held out.
@@ -325,17 +325,16 @@ def show_ladder(found: Comparison) -> None:
             error(held_out_rmse(one, "experiments")), error(held.log_score, ".2f"), error(held.inside50, ".0%"),
             error(held.inside95, ".0%"), *([error(one.validation)] if validated else []),
         ))  # fmt: skip
-        moving = {name: p for name, p in one.homogeneity.items() if p * len(one.homogeneity) < REJECTED_BELOW}
-        if moving:
-            differing.append((one.name, moving))
+        if moves := differing(one.homogeneity):
+            heterogeneous.append((one.name, {name: p for name, p in one.homogeneity.items() if name in moves}))
     print_table(headings, rows, [one for one in FIRST_OF_LADDER if one in headings])
     if scores:
         console().print(phrase("units_of_ladder", scores[-1].in_sample.noise_floor))
     if note := exclusion_in_words(found.left_out):
         console().print(sentence(note))
-    for name, moving in differing:
+    for name, moving in heterogeneous:
         console().print(f"- {phrase('differs_between_experiments', name, moving)}")
-    if differing:
+    if heterogeneous:
         console().print(phrase("differences_under_stated_errors"))
 
 

@@ -11,7 +11,7 @@ Fisher's F_m,d (Fisher 1925, Statistical Methods for Research Workers); chi2 alo
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -33,8 +33,27 @@ from vegglue.results.posterior import Transfer
 # Posterior over prior variance of z [-] above which an experiment does not determine a parameter. Chosen, not measured:
 # a higher one compares more parameters, whose estimates without the prior rest on less and less data.
 UNINFORMED = 0.5
+# p-value [-], over all parameters compared (Bonferroni), below which a parameter differs between experiments. Stricter
+# than the customary 0.05, as one value for all is given up then.
+DIFFERS_BELOW = 0.01
 # Of one experiment: rows among the used stations (n,), slopes (n, p) and covariance of z (p, p).
 Estimate = tuple[NDArray[np.int64], Array, Array]
+
+
+def differing(p: Mapping[str, float]) -> frozenset[str]:
+    """Parameters that differ between experiments: p times the number compared < DIFFERS_BELOW.
+
+    Parameters
+    ----------
+    p
+        Chance that one value fits all experiments, by parameter [-]; NaN for one that is not compared.
+
+    Returns
+    -------
+    frozenset of str
+    """
+    compared = {name: chance for name, chance in p.items() if not math.isnan(chance)}
+    return frozenset(name for name, chance in compared.items() if chance * len(compared) < DIFFERS_BELOW)
 
 
 def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer | None:

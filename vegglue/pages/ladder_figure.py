@@ -12,6 +12,7 @@ from matplotlib.ticker import LogFormatter
 
 from vegglue.arrays import Array
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
+from vegglue.inference.homogeneity import differing
 from vegglue.pages.style import COLOUR, SMALL, WIDTH, canvas, label, save, styled
 from vegglue.results.model_comparison import ModelComparison, ModelScore
 from vegglue.wording.numbers import fixed, short
@@ -25,8 +26,6 @@ LINES = {
     "in_sample": ("o:", "in sample", "muted", 1.2),
     "noise_floor": ("_--", "floor", "ink", 0.9),
 }
-# p-value [-] of one value in all experiments, below which a parameter is drawn as one that differs: 1 in 20.
-MOVES_BELOW = 0.05
 # Panels of parameters side by side; ratio [-] of largest to smallest value, 1.5 decades, from which an axis is
 # logarithmic: on a linear one the smallest could not be read.
 LADDER_COLUMNS, LOGARITHMIC_FROM = 5, 30.0
@@ -132,9 +131,8 @@ def _paint_parameter(axes: Axes, scores: Sequence[ModelScore], name: str) -> Non
     known = [(k + 1, score) for k, score in enumerate(scores) if name in score.values]
     for place, score in known:
         middle, low, high = score.values[name]
-        moves = score.homogeneity.get(name, 1.0) < MOVES_BELOW
         axes.vlines(place, low, high, color=COLOUR["model"], linewidth=1.1)
-        face = COLOUR["paper" if moves else "model"]
+        face = COLOUR["paper" if name in differing(score.homogeneity) else "model"]
         axes.plot(place, middle, "o", markersize=5, color=COLOUR["model"], markerfacecolor=face, zorder=4)
     values = np.array([score.values[name] for _, score in known])
     if (values > 0).all() and values.max() > LOGARITHMIC_FROM * values.min():
