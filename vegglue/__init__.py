@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from vegglue.errors import InputError, StorageError
     from vegglue.workflow.check import check
     from vegglue.workflow.compare import compare
+    from vegglue.workflow.demo import demo
     from vegglue.workflow.diagnose import diagnose
     from vegglue.workflow.discover import discover
     from vegglue.workflow.export import export
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from vegglue.workflow.twin import make_twin, reveal
 
 __all__ = [
-    "InputError", "StorageError", "__version__", "check", "compare", "diagnose", "discover", "export", "extend",
+    "InputError", "StorageError", "__version__", "check", "compare", "demo", "diagnose", "discover", "export", "extend",
     "extend_stepwise", "import_folder", "infer", "load", "load_case", "make_twin", "new", "next_measurement",
     "on_cluster", "overview", "report", "reveal", "run", "simulate",
 ]  # fmt: skip

@@ -10,7 +10,14 @@ from typing import Annotated
 
 import typer
 
-from vegglue.cli.ensemble_commands import check_command, infer_command, report_command, run_command, simulate_command
+from vegglue.cli.ensemble_commands import (
+    check_command,
+    demo_command,
+    infer_command,
+    report_command,
+    run_command,
+    simulate_command,
+)
 from vegglue.cli.library_commands import effects_command, export_command, new_command, reveal_command, twin_command
 from vegglue.cli.loop_commands import (
     compare_command,
@@ -117,7 +124,13 @@ def about(
 
 # By group, in the order in which they are used.
 COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
-    "Begin": {"new": new_command, "import": import_command, "check": check_command, "run": run_command},
+    "Begin": {
+        "demo": demo_command,
+        "new": new_command,
+        "import": import_command,
+        "check": check_command,
+        "run": run_command,
+    },
     "The loop": {
         "diagnose": diagnose_command,
         "discover": discover_command,

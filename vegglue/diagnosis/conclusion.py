@@ -296,7 +296,8 @@ def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Mi
     """chi2 before and after, and where the first model misses."""
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
-    readings = after.noise.rows.size - int(np.linalg.matrix_rank(after.noise.unknown))
+    unknown = after.noise.unknown
+    readings = after.noise.rows.size - (int(np.linalg.matrix_rank(unknown)) if unknown.size else 0)  # numpy before 2.4
     freedom = freedom_of_misfit(readings, after.fitted.covariance)
     # The errors that are told: those of the last model, whose residual holds the least that is no error.
     errors_as_last = with_correlation(before.noise, after.noise.correlation, after.noise.scale)

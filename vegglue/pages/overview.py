@@ -102,6 +102,12 @@ class LoopOfOverview:
     page: str
     top: CaseAnswer
 
+    @property
+    def tour(self) -> bool:
+        """Whether there is a before and an after to be shown in three clicks."""
+        fall = self.top.error_fall
+        return self.top.falls and bool(self.top.sections.added) and fall is not None and math.isfinite(fall.before)
+
 
 @dataclass(frozen=True)
 class OverviewRow:
