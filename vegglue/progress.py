@@ -30,8 +30,8 @@ class Progress:
 Watch = Callable[[Progress], None]
 
 
-def silent(_: object) -> None:
-    """Says nothing: what is heard of a long command unless it is given someone who watches."""
+def silent(*_: object) -> None:
+    """Shows nothing: the default of `watch` and `show`."""
 
 
 def counted(watch: Watch, phase: str, total: int, unit: str = "") -> Callable[[int], None]:

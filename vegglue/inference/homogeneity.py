@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import MapEstimate, covariance, determined, fit, squared_misfit
+from vegglue.calibration.fit import covariance, determined, fit_from, squared_misfit
 from vegglue.calibration.noise import Noise, covariance_of, with_correlation
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case
-from vegglue.engine.interface import Model, Point, linearise
+from vegglue.engine.interface import Model, Point
 from vegglue.engine.newton import DIFFERENCE_STEP
 from vegglue.inference.posterior_summary import on_flat_scale
 from vegglue.parallel import parallel_map
@@ -81,7 +81,7 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
         return None
     noise = with_correlation(noise, noise.correlation, 1.0)
     parts = [one_experiment(model, noise, name) for name in here]
-    fits = parallel_map(partial(_alone, joint), parts)
+    fits = parallel_map(partial(fit_from, z=joint.z, near=joint), parts)
     # s^2 = sum_e chi2_e / sum_e (n_e - p_e), p_e: effective number of parameters of experiment e; and the degrees of
     # freedom that s is estimated from, infinite if it is the least, which is known.
     least, known = 1.0 if stated else 0.0, [(one, part) for one, (_, part) in zip(fits, parts, strict=True) if one]
@@ -123,11 +123,6 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
         misfit_alone=alone / scale**2,
         stations=np.array([part.rows.size for _, part in parts]),
     )
-
-
-def _alone(joint: Point, own: Model, errors: Noise) -> MapEstimate | None:
-    start = linearise(own, joint.z, joint)
-    return None if start is None else fit(own, errors, start)
 
 
 def chance_of_as_much(chi2: float, freedom: int, free: float = math.inf) -> float:

@@ -112,14 +112,13 @@ def _paint_errors(
         axes.plot([right + 0.05, right + 0.3], [value, lowest], color=COLOUR["rule"], linewidth=0.7)
     axes.set(ylim=(0, 1.12 * top), xlim=(0.6, len(models) + 0.9), ylabel=phrase("label", "rmse"))
     letters = max(int(LETTERS_PER_INCH * width / (len(models) + 1)), 12)
-    axes.set_xticks(place, [_of_model(k, *model, letters) for k, model in enumerate(models, 1)])
+    ticks = []
+    for k, (name, added, parameters) in enumerate(models, 1):
+        lines = [f"{k}  {name}" if k == 1 or not added else f"{k}", *(f"+ {one}" for one in added)]
+        broken = [part for line in lines for part in _broken(line, letters)]
+        ticks.append("\n".join([*broken, f"{parameters} parameters"]))
+    axes.set_xticks(place, ticks)
     axes.tick_params(axis="x", length=0, labelsize=SMALL + 0.5)
-
-
-def _of_model(k: int, name: str, added: Sequence[str], parameters: int, letters: int) -> str:
-    lines = [f"{k}  {name}" if k == 1 or not added else f"{k}", *(f"+ {one}" for one in added)]
-    broken = [part for line in lines for part in _broken(line, letters)]
-    return "\n".join([*broken, f"{parameters} parameters"])
 
 
 def _broken(name: str, letters: int) -> list[str]:

@@ -253,7 +253,11 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "chi2": {"first": misfit.chi2_first, "last": misfit.chi2, "freedom": misfit.freedom, "p": misfit.p},
         "threshold": diagnosis.first_screening.threshold,
         "noise": {"correlation": errors.correlation, "scale": errors.scale, "grid_error": errors.grid_error},
-        "flagged": [_reading(diagnosis, row) for row in errors.flagged],
+        "flagged": [
+            {name: str(row[name]) for name in ("experiment", "kind", "section")}
+            | {name: float(row[name]) for name in ("x", "y", "value")}
+            for _, row in diagnosis.predictions.station.iloc[list(errors.flagged)].iterrows()
+        ],
         "parameters": diagnosis.parameters.last,
         "first_parameters": diagnosis.parameters.first,
         "places": [asdict(one) for one in diagnosis.places],
@@ -289,9 +293,3 @@ def candidate_effect_json(one: CandidateEffect) -> dict[str, Any]:
         "scale": amplitude.scale,
         "support": amplitude.support,
     }
-
-
-def _reading(diagnosis: Diagnosis, row: int) -> dict[str, Any]:
-    station = diagnosis.predictions.station.iloc[row]
-    place = {name: str(station[name]) for name in ("experiment", "kind", "section")}
-    return place | {name: float(station[name]) for name in ("x", "y", "value")}

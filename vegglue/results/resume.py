@@ -14,7 +14,7 @@ import os
 import socket
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -57,7 +57,11 @@ def hold_lock(folder: Path) -> Iterator[None]:
         try:
             lock(handle)
         except BlockingIOError as error:
-            raise StorageError(f"{folder} is in use by {_holder(path)}; wait for it to end, or stop it.") from error
+            holder = "another process"
+            with suppress(OSError, ValueError, KeyError):
+                mark = json.loads(path.read_text(encoding="utf-8"))
+                holder = f"process {mark['pid']} on {mark['host']} since {mark['since']}"
+            raise StorageError(f"{folder} is in use by {holder}; wait for it to end, or stop it.") from error
         except OSError as error:
             raise StorageError(f"{path}: cannot be locked ({error.strerror}); use a local folder.") from error
         since = datetime.now(UTC).isoformat(timespec="seconds")
@@ -67,14 +71,6 @@ def hold_lock(folder: Path) -> Iterator[None]:
         os.ftruncate(handle, 0)
     finally:
         os.close(handle)
-
-
-def _holder(path: Path) -> str:
-    try:
-        mark = json.loads(path.read_text(encoding="utf-8"))
-        return f"process {mark['pid']} on {mark['host']} since {mark['since']}"
-    except (OSError, ValueError, KeyError):
-        return "another process"
 
 
 FIELDS_PART = "fields.part"

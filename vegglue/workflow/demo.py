@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from vegglue.case.config import load_case
-from vegglue.case.schema import Case
 from vegglue.progress import Watch, silent
 from vegglue.whole_files import MAKE_ROOM, failed_writes_told
 from vegglue.workflow.case_run import CaseRun
@@ -20,17 +19,13 @@ FILES = Path(__file__).with_name("demo_files")
 CONFIGS = ("d3a", "d3a_refined")
 
 
-def _unseen(case: Case, result: object) -> None:
-    """Shows nothing."""
-
-
 def demo(
     folder: Path | str = "runs/demo",
     *,
     short: bool = False,
     jobs: int = -1,
     watch: Watch = silent,
-    show: Show = _unseen,
+    show: Show = silent,
     part: Callable[[int], None] = silent,
 ) -> Path:
     """Import measurements that come with the package, run the loop, and make one page; then a published study.

@@ -19,7 +19,7 @@ from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.causes import CandidateEffect, CandidateLaw, CandidateLaws, Step
+from vegglue.results.causes import CandidateEffect, CandidateLaw, CandidateLaws
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import questions_that_fit, write_questions
 from vegglue.results.open_questions import (
@@ -90,7 +90,7 @@ def next_measurement(
     unknown = [name for name in between if name not in possible]
     if unknown:
         raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(possible)}.")
-    asked = _asked(case, found, list(dict.fromkeys(between))) if between else _questions(case, found)
+    asked = _asked(case, found, list(dict.fromkeys(between))) if between else what_is_open(case, found)
     questions: list[Question] = []
     if asked:
         with at_most(run.jobs):
@@ -98,18 +98,14 @@ def next_measurement(
             base = with_places(calibrated(run, excluded_by(found)), found)
             run.watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
-        answered = zip(asked, worths, strict=True)
-        questions = [one for (about, rivals), worth in answered for one in _answers(about, rivals, worth)]
-        seen = _seen_from(found)
-        questions = [replace(one, seen_from=seen) if isinstance(one.about, HiddenEffect) else one for one in questions]
+        # D^2 of an effect that passes the alarm over all effects 19 times of 20.
+        seen = (found.first_screening.threshold + POWER_QUANTILE) ** 2
+        for (about, rivals), worth in zip(asked, worths, strict=True):
+            answers = questions_about(about, rivals, worth)
+            questions += [replace(one, seen_from=seen) if isinstance(about, HiddenEffect) else one for one in answers]
     if not between:
         write_questions(run.folder, questions, wanted)
     return questions
-
-
-def _seen_from(found: Diagnosis) -> float:
-    """D^2 of an effect that passes the alarm over all effects 19 times of 20 [-]."""
-    return (found.first_screening.threshold + POWER_QUANTILE) ** 2
 
 
 def with_places(base: Baseline, found: Diagnosis) -> Baseline:
@@ -125,9 +121,11 @@ def with_places(base: Baseline, found: Diagnosis) -> Baseline:
     return for_prediction(baseline(replace(base.model, case=child), known))
 
 
-def _answers(about: Subject, rivals: Sequence[Explanation], worths: Sequence[MeasurementWorth]) -> list[Question]:
-    """A question with what could be measured for it. Where nothing answers it and there are more than two rivals, those
-    that something tells from all others follow.
+def questions_about(
+    about: Subject, rivals: Sequence[Explanation], worths: Sequence[MeasurementWorth]
+) -> list[Question]:
+    """A question with what could be measured for it. If nothing answers it and there are more than two rivals, those
+    that something separates from all others follow.
     """
     whole = Question(about, _ranked(_proposed(one, one.now.min(), one.then.min()) for one in worths))
     if whole.useful or len(rivals) < FEWEST_PARTED:
@@ -152,33 +150,37 @@ def _proposed(one: MeasurementWorth, now: float, then: float) -> ProposedMeasure
     return ProposedMeasurement(plan.name, plan.experiment, plan.x, plan.rows.size, plan.hours, float(now), float(then))
 
 
-def _questions(case: Case, found: Diagnosis) -> list[tuple[Subject, list[Explanation]]]:
+def what_is_open(case: Case, found: Diagnosis) -> list[tuple[Subject, list[Explanation]]]:
     """What the diagnosis leaves open, and the rivals of each question; nothing of data that it doubts."""
     if found.verdict.doubts_the_data:
         return []
+    questions: list[tuple[Subject, list[Explanation]]] = []
+    for step in (one for one in found.steps if len(one.rivals) > 1 or one.likelier_place):
+        names, rivals = [*step.rivals], rivals_of(case, found, step.rivals)
+        if step.likelier_place:
+            place = step.places[step.likelier_place]
+            unlisted = candidate_at(case, place)
+            names.append(unlisted.name)
+            rivals.append((unlisted, place.shapes, unlisted.effect.amplitude.gain(place.amplitude)))
+        questions.append((RivalEffects(tuple(names)), rivals))
     if found.steps:
-        return [
-            _between_rivals(case, found, step) for step in found.steps if len(step.rivals) > 1 or step.likelier_place
-        ]
+        return questions
     laws = laws_to_tell_apart(found.laws)
     if len(laws) > 1:
         return _asked(case, found, laws)
+
+    def raw_trace(one: CandidateEffect) -> float:
+        """Length of the trace of a plausible amplitude before projection [standard errors]."""
+        amplitude = candidate_named(case, found.predictions.station, one.name).effect.amplitude
+        gain = amplitude.gain(amplitude.off + one.detectability.smallest)
+        length = found.first_screening.threshold + POWER_QUANTILE
+        return length * amplitude.plausible_gain / gain / max(one.detectability.visibility, 1e-6)
+
     # What calibration hides best, of all that would leave a trace without it.
     seen = found.verdict.significant_effects
     hidden = [one for one in found.candidate_effects if not one.detectability.testable and one.name not in seen]
-    strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
+    strongest = sorted(hidden, key=lambda one: -raw_trace(one))[:HIDDEN]
     return [question for one in strongest for question in _asked(case, found, [one.name])]
-
-
-def _between_rivals(case: Case, found: Diagnosis, step: Step) -> tuple[Subject, list[Explanation]]:
-    """The question of a step: to tell its effects from each other, and from a place that is likelier than they are."""
-    names, rivals = [*step.rivals], rivals_of(case, found, step.rivals)
-    if step.likelier_place:
-        place = step.places[step.likelier_place]
-        unlisted = candidate_at(case, place)
-        names.append(unlisted.name)
-        rivals.append((unlisted, place.shapes, unlisted.effect.amplitude.gain(place.amplitude)))
-    return RivalEffects(tuple(names)), rivals
 
 
 def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[Subject, list[Explanation]]]:
@@ -203,15 +205,6 @@ def laws_to_tell_apart(laws: CandidateLaws | None) -> list[str]:
 
 def _laws_by_name(found: Diagnosis) -> dict[str, CandidateLaw]:
     return {} if found.laws is None else {one.name: one for one in found.laws.laws}
-
-
-def _raw_trace(case: Case, found: Diagnosis, candidate_effect: CandidateEffect) -> float:
-    """Length of the trace of a plausible amplitude before projection, in standard errors."""
-    amplitude = candidate_named(case, found.predictions.station, candidate_effect.name).effect.amplitude
-    detectability = candidate_effect.detectability
-    gain = amplitude.gain(amplitude.off + detectability.smallest)
-    length = found.first_screening.threshold + POWER_QUANTILE
-    return length * amplitude.plausible_gain / gain / max(detectability.visibility, 1e-6)
 
 
 def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Explanation]:

@@ -22,10 +22,6 @@ from vegglue.workflow.simulate import is_up_to_date, refuse_to_shrink, simulate
 Show = Callable[[Case, Any], None]
 
 
-def _unseen(case: Case, result: Any) -> None:
-    """Shows nothing."""
-
-
 def run(
     case: Case | CaseRun,
     *,
@@ -33,7 +29,7 @@ def run(
     members: int | None = None,
     jobs: int = -1,
     watch: Watch = silent,
-    show: Show = _unseen,
+    show: Show = silent,
     force: bool = False,
 ) -> StepwiseExtension:
     """Diagnose a case, add what is missing while errors fall, diagnose again; then infer, report and plan.

@@ -21,7 +21,7 @@ from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, case_name, read_text
 from vegglue.effects.grammar import LAWS
 from vegglue.errors import InputError, shown_command, shown_path
-from vegglue.measurements.kinds import KINDS, Kind, kind_of
+from vegglue.measurements.kinds import KINDS, kind_of
 from vegglue.parallel import one_thread
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import diagnosis_that_fits
@@ -58,7 +58,11 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
     Errors: InputError when such files are there; StorageError when the folder cannot be written.
     """
     name = case_name(folder.resolve().name, "twin")
-    used = _on_the_map(case, station[station["used"]])
+    used, line = station[station["used"]], centreline_in(case)
+    if line is not None:  # files of stations have points on the map
+        at_point = np.array([kind_of(kind).at_point for kind in used["kind"]])
+        x, y = on_map(line, used["x"].to_numpy(float), used["y"].to_numpy(float))
+        used = used.assign(x=used["x"].where(~at_point, x), y=used["y"].where(~at_point, y))
     kinds = [kind for kind in KINDS.values() if (used["kind"] == kind.name).any()]
     tree = {
         "extends": Path(os.path.relpath(case.source, folder.resolve())).as_posix(),
@@ -68,7 +72,12 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
         **{key: None for key in ("validation", "reference") if getattr(case, key) is not None},
     }
     note = f"# Made by `vegglue twin` from {case.name}; the answer is sealed in {SEAL}.\n"
-    texts = {kind.file: _stations(used, kind) for kind in kinds}
+    texts = {}
+    for kind in kinds:
+        names = {"value": kind.column, "standard_error": kind.error_column}
+        columns = ["experiment", *(["section"] if kind.velocity else []), "x", "y", *names.values()]
+        table = used[used["kind"] == kind.name].rename(columns=names)[columns]
+        texts[kind.file] = str(table.to_csv(index=False, float_format="%.5f"))
     target = folder / f"{name}.yaml"
     if target.resolve() == case.source:
         raise InputError(f"--to {shown_path(folder)}: holds the config that the twin is made of; give another folder.")
@@ -86,23 +95,6 @@ def in_rows_of_twin(answer: Answer, station: pd.DataFrame) -> Answer:
     order = [int(row) for kind in KINDS.values() for row in np.flatnonzero(used & (kinds == kind.name))]
     hidden = [replace(one, station=order.index(one.station)) if one.station >= 0 else one for one in answer.hidden]
     return replace(answer, hidden=tuple(hidden))
-
-
-def _on_the_map(case: Case, station: pd.DataFrame) -> pd.DataFrame:
-    """Points of the grid on the map, as files of stations have them; as they are without a centreline."""
-    line, at_point = centreline_in(case), [kind_of(name).at_point for name in station["kind"]]
-    if line is None:
-        return station
-    x, y = on_map(line, station["x"].to_numpy(float), station["y"].to_numpy(float))
-    return station.assign(x=station["x"].where(~np.array(at_point), x), y=station["y"].where(~np.array(at_point), y))
-
-
-def _stations(used: pd.DataFrame, kind: Kind) -> str:
-    """The stations of a kind as a table."""
-    names = {"value": kind.column, "standard_error": kind.error_column}
-    named = used[used["kind"] == kind.name].rename(columns=names)
-    columns = ["experiment", *(["section"] if kind.velocity else []), "x", "y", *names.values()]
-    return str(named[columns].to_csv(index=False, float_format="%.5f"))
 
 
 def config_in(folder: Path) -> Path:
