@@ -14,7 +14,7 @@ from vegglue.workflow.report import overview, report
 from vegglue.workflow.run import Show, run
 from vegglue.workflow.simulate import simulate
 
-FILES = Path(__file__).with_name("demo_files")
+DEMO_FILES = Path(__file__).with_name("demo_files")
 # Configs of the second part, in the order in which they are computed: the second one draws around members of the first.
 CONFIGS = ("d3a", "d3a_refined")
 
@@ -57,12 +57,12 @@ def demo(
     """
     folder = Path(folder)
     with failed_writes_told(folder, MAKE_ROOM):
-        for path in (path for path in FILES.rglob("*") if path.is_file() and "__pycache__" not in path.parts):
-            there = folder / path.relative_to(FILES)
+        for path in (path for path in DEMO_FILES.rglob("*") if path.is_file() and "__pycache__" not in path.parts):
+            there = folder / path.relative_to(DEMO_FILES)
             there.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, there)
     part(1)
-    measured = sorted(path.name for path in (FILES / "measured").iterdir())
+    measured = sorted(path.name for path in (DEMO_FILES / "measured").iterdir())
     found = [import_folder(folder / "measured" / name, folder / f"{name}.yaml") for name in measured]
     for case in found:
         run(case, runs=folder, jobs=jobs, watch=watch, show=show)
