@@ -14,7 +14,7 @@ def _in_one_line(sentence: str) -> str:
 
 
 class InputError(ValueError):
-    """Something handed in is wrong: says where, what was expected, what came, and what to do."""
+    """Something handed in is wrong: where, what was expected, what came, and what to do."""
 
     def __str__(self) -> str:
         return _in_one_line(super().__str__())
@@ -35,6 +35,6 @@ def shown_path(path: Path) -> str:
 
 
 def shown_command(verb: str, config: Path | None, *options: str) -> str:
-    """`vegglue VERB CONFIG` as sentences name it, to be copied; CONFIG where nobody knows which."""
+    """`vegglue VERB CONFIG` as sentences name it, to be copied; CONFIG if it is not known."""
     named = "CONFIG" if config is None else shown_path(config)
     return f"`{shlex.join(['vegglue', verb, named, *options])}`"

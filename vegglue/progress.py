@@ -1,4 +1,4 @@
-"""How a long command tells how far it is: what it does, and how much of that is done where it is counted."""
+"""How a long command reports its progress: what it does, and how much of that is done if it is counted."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -35,6 +35,6 @@ def silent(*_: object) -> None:
 
 
 def counted(watch: Watch, phase: str, total: int, unit: str = "") -> Callable[[int], None]:
-    """What tells of a phase each time one more of `total` is done; none is at first, which is told at once."""
+    """Reports a phase each time one more of `total` is done, and at once that none is."""
     watch(Progress(phase, 0, total, unit))
     return lambda done: watch(Progress(phase, done, total, unit))

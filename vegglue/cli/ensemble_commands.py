@@ -33,7 +33,7 @@ from vegglue.wording.commands import DEMO, HELP
 def check_command(
     config: Config, runs: Runs = RUNS, as_object: Json = False, quiet: Quiet = False, trust: Trust = False
 ) -> None:
-    """Read everything a case names, say what is odd, and draw the channel, before hours are spent."""
+    """Read everything a case names, report what is odd, and draw the channel, before hours are spent."""
     case = vegglue.load_case(config, trust)
     with progress_reporter(quiet, as_object):
         found = vegglue.check(case, runs=runs)
@@ -90,7 +90,7 @@ def infer_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Infer the parameters from the measurements and say what was found."""
+    """Infer the parameters from the measurements and report what was found."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         run = opened.with_settings(runs, jobs, watch)

@@ -176,7 +176,7 @@ def reveal_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Open the seal of a twin, and say how well its diagnosis guessed."""
+    """Open the seal of a twin, and report how well its diagnosis guessed."""
     lines = vegglue.reveal(folder, runs=runs, trust=trust)
     if as_object:
         print_object({"folder": folder, "sentences": lines})

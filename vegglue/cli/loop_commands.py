@@ -38,7 +38,7 @@ def import_command(
 ) -> None:
     """Make a case of a folder of measurements, with wide priors; `vegglue run` then needs no edit by hand.
 
-    Tables may have any separator, units and names of columns: one line says what was taken from each.
+    Tables may have any separator, units and names of columns: one line reports what was taken from each.
 
     The confluence set of R.B. Canelas makes two, one with the bed surveyed and one with a plane instead.
     """
@@ -190,7 +190,7 @@ def next_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Say which measurement would tell the remaining rivals apart, by gain per hour of field work."""
+    """Rank the measurements that would separate the remaining rivals, by gain per hour of field work."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.next_measurement(opened.with_settings(runs, jobs, watch), between=between or [])

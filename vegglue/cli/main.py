@@ -86,7 +86,7 @@ def _make_printable() -> None:
 
 
 def _flush() -> None:
-    """Print what waits, now, while a full disk can still be told."""
+    """Print what waits, now, while a full disk can still be reported."""
     try:
         sys.stdout.flush()
     except OSError as error:

@@ -32,7 +32,7 @@ from vegglue.results.causes import (
 )
 
 # Lengths of a fingerprint, in standard errors, that may be there undetected: thresholds are near a score of 3.2, so
-# that longer ones stand out and shorter ones change little. Which it is nobody knows.
+# that longer ones stand out and shorter ones change little. Which it is, is not known.
 UNDETECTED_LENGTHS = (2.0, 3.0, 4.0)
 # Share of the chances that the effects listed as not excluded hold together.
 NOT_EXCLUDED_CHANCE = 0.9
@@ -114,12 +114,12 @@ def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(names[j] for j in group) for group in groups)
 
 
-# Share of the chance of all laws that those told hold together.
+# Share of the chance of all laws that the reported ones hold together.
 LAWS_HELD = 0.95
 
 
 def laws_beside(screening: Screening) -> LawScreening | None:
-    """Laws screened beside all that is listed; None where none can be told: `discover` refuses a command."""
+    """Laws screened beside all that is listed; None if there can be none: `discover` refuses a command."""
     if screening.base.model.case.engine is not None:
         return None
     traces = law_fingerprints(screening.base, (), screening.fingerprints)
@@ -132,7 +132,7 @@ def candidate_laws(
     """Laws that stand out against the last model, or against the first one where something was accepted; None where
     errors alone leave as much, or beside listed effects that were accepted unless it is clearly a law.
 
-    beside_first: `laws_beside` the first screening, begun before it is known whether it is asked for.
+    beside_first: `laws_beside` the first screening, begun before it is known whether it is needed.
     """
     if found.implausible:
         return None

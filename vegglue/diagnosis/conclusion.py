@@ -299,7 +299,7 @@ def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Mi
     unknown = after.noise.unknown
     readings = after.noise.rows.size - (int(np.linalg.matrix_rank(unknown)) if unknown.size else 0)  # numpy before 2.4
     freedom = freedom_of_misfit(readings, after.fitted.covariance)
-    # The errors that are told: those of the last model, whose residual holds the least that is no error.
+    # The errors that are reported: those of the last model, whose residual holds the least that is no error.
     errors_as_last = with_correlation(before.noise, after.noise.correlation, after.noise.scale)
     return Misfit(
         chi2_first=chi2(before.noise, before.fitted.point),
@@ -311,7 +311,7 @@ def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Mi
 
 
 def estimated_errors(screening: Screening, found: SearchState) -> EstimatedErrors:
-    """What the errors are taken to be after the last screening; that of the grid is told of velocities alone [m/s]."""
+    """The errors after the last screening; that of the grid is reported for velocities alone [m/s]."""
     noise = screening.base.noise
     flagged = tuple(int(noise.rows[row]) for row in found.flagged)
     velocity = velocity_rows(screening.base.model.station.iloc[noise.rows])
@@ -338,7 +338,7 @@ def _field(
 ) -> tuple[FieldFound, FieldMapKept] | tuple[None, None]:
     """A smooth field of one term and its map, where it explains the misfit of the first model better than all that was
     accepted, or closes a misfit in which nothing was; None where there is nothing to explain, or where a place of the
-    same term says it in fewer words.
+    same term explains it with fewer numbers.
     """
     if found.implausible or (not (found.accepted or found.undecided) and misfit.p >= constants().poor_fit_chance):
         return None, None

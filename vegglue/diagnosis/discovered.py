@@ -77,8 +77,8 @@ class LawFound:
 
 @dataclass(frozen=True)
 class ProductFound:
-    """found: a product of the best law with another quantity, told as any law; refit: of it, beside that law, whose a
-    is then strength_of_law [-]. found.chance: that it is what is left, among all else that could be.
+    """found: a product of the best law with another quantity, reported as any law; refit: of it, beside that law, whose
+    a is then strength_of_law [-]. found.chance: that it is what is left, among all else that could be.
     """
 
     found: LawFound
@@ -119,7 +119,7 @@ class Discovery:
 
     @property
     def enough_for_errors(self) -> bool:
-        """Whether errors alone leave as much as rarely as an alarm asks."""
+        """Whether errors alone leave as much no more often than the rate of an alarm."""
         return self.p <= constants().false_alarm_rate
 
     @property

@@ -1,4 +1,4 @@
-"""The next measurement: which one would tell rival explanations apart, and how much it would say per hour of work.
+"""The next measurement: which one would separate rival explanations, and how much it would gain per hour of work.
 
 Rival i, fitted to the data at hand, predicts new measurements; rival j predicts others, after it has been calibrated to
 all of them. What is left between both,
@@ -177,7 +177,7 @@ def _measured_sections(velocity: pd.DataFrame, experiments: Sequence[str], near:
     """
     verticals = velocity.groupby(["experiment", "x"], sort=False)["y"].unique()
     found: list[tuple[list[str], float, Array]] = []
-    # Where as many, in the order of the case: that of the rows of a table tells nothing.
+    # Where as many, in the order of the case: that of the rows of a table means nothing.
     for (experiment, x), y in sorted(
         verticals.items(), key=lambda one: (-one[1].size, experiments.index(one[0][0]), one[0][1])
     ):

@@ -128,7 +128,7 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
     start = _on_own_cells(base, model, place)
     if start is None:
         return None
-    # Errors of the grid and of the model are told where the refit ended first: its flow on coarse cells is known.
+    # Errors of the grid and of the model are those where the refit ended first: its flow on coarse cells is known.
     noise = with_own_error_at(base.noise, coarse, place)
     trial = Baseline(model, noise, at_point(noise, start), coarse, place)
     return with_own_error_again(under_error_of_grid(trial), place.z)

@@ -14,7 +14,7 @@ from vegglue.effects.surroundings import Cells
 LEAST_RELATIVE_DEPTH = 0.2
 # Secondary currents fade out from here, in half widths from the axis: on the banks they have no room to turn.
 CURRENTS_END = 1.5
-# m2/s2, the square of 0.05 m/s, added to |U|^2: the direction of slower water says nothing of a bend.
+# m2/s2, the square of 0.05 m/s, added to |U|^2: the direction of slower water shows no bend.
 STILL_SQUARED = 0.0025
 # a [-] at which b of `helical_flow` is held: the formula is for smoother beds.
 LARGEST_ROUGHNESS = 0.5

@@ -168,7 +168,7 @@ def refuse_useless(case: Case, ensemble: Ensemble) -> None:
         again = "" if case.engine is None else " with --force"
         raise InputError(
             f"{shown_path(case.source)}: expected members with a solution, got none of {failed.size:,}; {many:,} of "
-            f"them say: {reason or 'no steady flow'}. Mend that, or the priors, and simulate again{again}."
+            f"them: {reason or 'no steady flow'}. Mend that, or the priors, and simulate again{again}."
         )
     for doubt in doubts_of_predictions(ensemble):
         if isinstance(doubt, PredictionsUnchanged):

@@ -175,8 +175,8 @@ def make_header(
 
 def left_to_do(writer: EnsembleWriter, case: Case, chunks: list[np.ndarray], watch: Watch) -> list[int]:
     """Chunks that an earlier run has not finished, or that are damaged since; a run that was moved is reported."""
-    if writer.set_aside is not None:
-        watch(Progress(sentence(UnfinishedRunMoved(case.name, writer.set_aside.name))))
+    if writer.moved_to is not None:
+        watch(Progress(sentence(UnfinishedRunMoved(case.name, writer.moved_to.name))))
     writer.reopen_damaged(chunks)
     return [index for index in range(len(chunks)) if index not in writer.done]
 

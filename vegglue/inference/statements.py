@@ -12,7 +12,7 @@ from vegglue.inference.homogeneity import DIFFERS_BELOW, differing
 from vegglue.inference.refine import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT, root_mean_square
 from vegglue.measurements.kinds import Kind, kind_of
-from vegglue.measurements.observations import SET_ASIDE
+from vegglue.measurements.observations import EXCLUDED
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Posterior, Transfer
 from vegglue.results.verdict import MisfitTooSmall, is_too_small
 
@@ -460,7 +460,7 @@ def fit_statements(posterior: Posterior) -> Iterator[object]:
     value, band = station["value"].to_numpy(float), posterior.predicted.total_band
     outside = ((value < band[0]) | (value > band[-1])) & station["used"].to_numpy()
     yield MedianFit(sizes_of(fit.rmse), int(outside.sum()), fit.used)
-    if excluded := int((station["reason"] == SET_ASIDE).sum()):
+    if excluded := int((station["reason"] == EXCLUDED).sum()):
         yield ReadingsExcluded(excluded, len(station))
     if math.isfinite(fit.chi2) and posterior.refinement is None:
         yield BestMemberFit(fit.chi2, fit.used)

@@ -39,7 +39,7 @@ ALONE = 0.1
 
 @dataclass(frozen=True)
 class DrawnInterval:
-    """A value and the range it is given; both ends are the value where nobody said. others: not a posterior of ours."""
+    """A value and the range it is given; both ends are the value if it has none. others: not a posterior of ours."""
 
     low: float
     centre: float

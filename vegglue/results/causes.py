@@ -263,11 +263,11 @@ class ModelErrorUsed:
 
     @property
     def asks_for_more(self) -> bool:
-        """Whether more than is allowed is asked for, beyond doubt: two readings may ask for nine times as much."""
+        """Whether more than is allowed is needed, beyond doubt: two readings may need nine times as much."""
         return self.needed > 1.0 and self.log_ratio > NEEDS_MORE
 
 
-# |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
+# |cosine| [-] above which an effect is reported to resemble one of a parameter: that change then mimics two thirds of
 # its trace (cos^2 = 0.64).
 LOOKS_LIKE_FROM = 0.8
 # A smallest size from which on no data show an effect, see `Detectability`.
@@ -448,7 +448,7 @@ class Step:
 
     @property
     def likelier_place(self) -> str:
-        """The place that is likelier than every group of effects that the data cannot tell apart; '' without."""
+        """The place that is likelier than every group of effects that the data cannot separate; '' without."""
         best = max(self.places, key=self.others.__getitem__, default="")
         groups = [sum(self.chance[name] for name in group) for group in self.groups]
         return best if best and self.others[best] > max(groups) else ""

@@ -190,17 +190,17 @@ class Diagnosis:
 
     @property
     def groups(self) -> list[list[str]]:
-        """Of effects that the data cannot tell apart, over all steps."""
+        """Of effects that the data cannot separate, over all steps."""
         return [list(group) for step in self.steps for group in step.groups]
 
     @property
     def law_stands_out(self) -> bool:
-        """Whether a law is worth a search: of a verdict that cannot tell, only if it names one."""
+        """Whether a law is worth a search: of a verdict "cannot-tell", only if it names one."""
         return self.laws is not None and (self.verdict.kind != "cannot-tell" or self.verdict.tells_laws)
 
     @property
     def changed(self) -> bool:
-        """Whether anything was taken into the model or set aside."""
+        """Whether anything was taken into the model or excluded."""
         return bool(self.steps or self.places or self.instruments)
 
     def first_score(self, one: CandidateEffect) -> float:

@@ -69,7 +69,7 @@ QUANTITIES = tuple(stored_fields(Fields))  # in the order in which sensor.read_s
 
 
 def window_of(case: Case, grid: Grid) -> FieldWindow | None:
-    """The cells whose centres surround the range the case asks for, None when it asks for none."""
+    """The cells whose centres surround the range that the case keeps, None if it keeps none."""
     if case.simulate.fields is None:
         return None
     low, high = case.simulate.fields.x

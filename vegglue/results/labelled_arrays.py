@@ -19,7 +19,7 @@ ENGINE = "h5netcdf"
 
 
 def read_labelled(path: Path, *groups: str) -> "xarray.Dataset":
-    """Groups of a result file as one dataset, whose attributes say what they were made from: config, config_hash,
+    """Groups of a result file as one dataset, whose attributes name what they were made from: config, config_hash,
     seed, version. Errors: InputError without xarray, StorageError for a broken file.
     """
     xarray = extra_library("xarray")

@@ -1,4 +1,4 @@
-"""What is still to be told apart, and the measurements that could, as `vegglue next` reports and stores it.
+"""What is still to be separated, and the measurements that could, as `vegglue next` reports and stores it.
 
 The words stand in wording/templates/questions.j2.
 """
@@ -104,7 +104,7 @@ class Question:
 
     @property
     def tells_apart(self) -> str:
-        """What is to be told apart, in words."""
+        """What is to be separated, in words."""
         return sentence(self.about)
 
     @property
@@ -114,7 +114,7 @@ class Question:
 
     @property
     def useful(self) -> tuple[ProposedMeasurement, ...]:
-        """Those that would tell it apart by themselves, the few that are worth a thought; none if it is answered."""
+        """Those that would separate it by themselves, the few best ones; none if it is answered."""
         if self.answered:
             return ()
         enough = (one for one in self.measurements if one.then >= SEPARATES and one.then > ADDS * one.now)

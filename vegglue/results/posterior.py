@@ -212,9 +212,9 @@ class CorrectedCanopy:
 
 @dataclass(frozen=True)
 class Transfer:
-    """Each experiment calibrated alone: what its data say of each parameter, and whether that is one value for all.
+    """Each experiment calibrated alone: its estimate of each parameter, and whether that is one value for all.
 
-    Values and errors on the scale on which the prior is flat (log10 of a log-uniform one); NaN where the data say
+    Values and errors on the scale on which the prior is flat (log10 of a log-uniform one); NaN where the data constrain
     little. chi2 of homogeneity with its freedom and chance; misfits chi2 in the joint fit and alone.
     """
 

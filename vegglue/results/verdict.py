@@ -242,7 +242,7 @@ class EffectsTested:
     testable: int
 
 
-# What the model still asks for with all that was accepted.
+# What the model still lacks with all that was accepted.
 
 
 @dataclass(frozen=True)
@@ -452,7 +452,7 @@ class Verdict:
     may_explain
         Sections that carry another discharge than stated, for which what was found may be the reason.
     remaining
-        What the model with all that was accepted still asks for.
+        What the model with all that was accepted still lacks.
     notes
         What else should be known, the most important first.
     not_excluded
@@ -508,7 +508,7 @@ class Verdict:
 
     @property
     def left_over(self) -> str:
-        """What the model still asks for, in words; '' for nothing."""
+        """What the model still lacks, in words; '' for nothing."""
         return " ".join(sentences(self.remaining))
 
 

@@ -92,7 +92,7 @@ def interval_in_short(name: str, value: float, low: float, high: float, unit: st
 
 
 def telling_digits(low: float, high: float) -> int:
-    """Significant digits of both ends of a range: three, more if these would not tell one end from the other."""
+    """Significant digits of both ends of a range: three, more if these would be the same for both ends."""
     apart, largest = high - low, max(abs(low), abs(high))
     if not (math.isfinite(apart) and apart > 0.0):
         return 3

@@ -69,7 +69,7 @@ def check(case: Case | CaseRun, *, runs: Path | str = "runs") -> CheckedCase:
     InputError
         If a file cannot be read, or the command fails.
     """
-    from vegglue.pages.channel import save_channel_figure  # late: every command says what is odd, one draws
+    from vegglue.pages.channel import save_channel_figure  # late: every command reports what is odd, one draws
 
     run = case_run(case, runs)
     case, observations, site = run.case, run.observations, run.site

@@ -30,7 +30,7 @@ ALIKE_IN_ALL = [*MEASUREMENT, "standard_error", "used"]
 @dataclass(frozen=True)
 class Comparison:
     """One score for each model, in the order they were given, and the measurements that none of them uses, since a
-    diagnosis has set them aside.
+    diagnosis excludes them.
     """
 
     model_scores: tuple[ModelScore, ...]
@@ -92,8 +92,8 @@ def compare(
 
 
 def tells_more(kept: ModelComparison | None, ladder: ModelComparison) -> bool:
-    """Whether a ladder that is kept begins with a model that is not in this one, or says of the same models why it
-    ends there: the page would lose where it began, which readings were set aside there, or that reason.
+    """Whether a ladder that is kept begins with a model that is not in this one, or states for the same models why it
+    ends there: the page would lose where it began, which readings are excluded there, or that reason.
     """
     if kept is None:
         return False
@@ -139,17 +139,17 @@ def model_score_of(run: CaseRun, aside: pd.DataFrame) -> ModelScore:
     kept = kept_model_score(run, aside)
     if kept is None:
         kept = model_score(calibrated(run, aside), run.validation_model)
-        write_model_score(run.folder, kept, rows_set_aside(aside), run.config_hash)
+        write_model_score(run.folder, kept, excluded_rows(aside), run.config_hash)
     return kept
 
 
 def kept_model_score(run: CaseRun, aside: pd.DataFrame) -> ModelScore | None:
     """What an earlier command found for exactly this case and these exclusions, under its present title."""
-    kept = model_score_that_fits(run.folder, rows_set_aside(aside), run.config_hash)
+    kept = model_score_that_fits(run.folder, excluded_rows(aside), run.config_hash)
     return None if kept is None else replace(kept, title=run.case.title)
 
 
-def rows_set_aside(aside: pd.DataFrame) -> list[tuple[str | float, ...]]:
+def excluded_rows(aside: pd.DataFrame) -> list[tuple[str | float, ...]]:
     """Excluded measurements, in one order whichever diagnosis named them first."""
     return sorted(aside.itertuples(index=False, name=None))
 

@@ -64,7 +64,7 @@ def diagnose(case: Case | CaseRun, *, runs: Path | str = "runs", jobs: int = -1,
 @one_thread()
 def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs", watch: Watch = silent) -> Path:
     """Draw what an effect of plausible size would change at the stations of the calibrated case, before calibration
-    takes its part; in runs/<name>/fingerprint_<effect>.png, which is returned. What its diagnosis has set aside does
+    takes its part; in runs/<name>/fingerprint_<effect>.png, which is returned. What its diagnosis excludes does
     not count.
     """
     run = case_run(case, runs, watch=watch)

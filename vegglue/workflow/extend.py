@@ -45,7 +45,7 @@ from vegglue.workflow.case_run import (
     case_run,
     keep_best_fit,
 )
-from vegglue.workflow.compare import Comparison, comparison_of, keep_comparison, kept_model_score, rows_set_aside
+from vegglue.workflow.compare import Comparison, comparison_of, excluded_rows, keep_comparison, kept_model_score
 from vegglue.workflow.diagnose import diagnose
 
 
@@ -175,7 +175,7 @@ def extend_stepwise(
         source = shown_path(run.case.source)
         raise InputError(f"{source}: a file that it names changed while it was extended; run `vegglue extend` again.")
     for one, errors in zip(several, extension.comparison.model_scores, strict=True):
-        write_model_score(one.folder, errors, rows_set_aside(extension.comparison.left_out), one.config_hash)
+        write_model_score(one.folder, errors, excluded_rows(extension.comparison.left_out), one.config_hash)
     ladder = comparison_of(extension.comparison, several, extension.reason, verdict_digest(found))
     keep_comparison(replace(ladder, unclear=extension.unclear), several)
     return extension

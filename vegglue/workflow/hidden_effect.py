@@ -1,4 +1,4 @@
-"""Synthetic measurements with a hidden effect: the truth on finer cells, and an effect as visible as asked.
+"""Synthetic measurements with a hidden effect: the truth on finer cells, and an effect of the wanted visibility.
 
     y = f_fine(z, a) + e,    |(I - P_J) W (f(z, a) - f(z, off))| = snr
 
@@ -31,7 +31,7 @@ from vegglue.measurements.kinds import velocity_rows
 from vegglue.workflow import unlisted_objects
 
 UNLISTED, BAD_PROBE, NOTHING_HIDDEN, ANY = "unlisted:", "bad_probe", "nothing", "?"
-# An effect that must be larger than this many plausible sizes to be as visible as asked is not hidden.
+# An effect that must be larger than this many plausible sizes to be as visible as wanted is not hidden.
 LARGEST_SIZE = 4.0
 # Steps and exactness [-] of finding the size.
 SIZING_STEPS, SIZE_TOLERANCE = 6, 0.02
@@ -79,7 +79,7 @@ class Answer:
 
 
 class VisibilityError(InputError):
-    """At no plausible size would an effect be as visible as asked."""
+    """At no plausible size is an effect as visible as wanted."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class TwinBase:
 def chosen_effect(
     base: TwinBase, errors: Noise, name: str, size: float | None, snr: float, random: np.random.Generator
 ) -> tuple[Candidate, Hidden]:
-    """The candidate that `name` asks for, at its size; what `?` or chance decides is drawn until it can be seen."""
+    """The candidate of this `name`, at its size; what `?` or chance decides is drawn until it can be seen."""
     everything = candidates_of(base.model.case, base.model.station)
     for _ in range(DRAWN if name == ANY or name.startswith(UNLISTED) else 1):
         candidate = everything[int(random.integers(len(everything)))] if name == ANY else candidate_of(base.model, name)
@@ -177,7 +177,7 @@ def with_unlisted_objects(case: Case, hidden: Hidden) -> Case:
 
 
 def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.Generator) -> dict[str, float]:
-    """Between the values that a search tries, not on them, but for those that say where a candidate acts; something
+    """Between the values that a search tries, not on them, but for those of the place of a candidate; something
     in no list stands anywhere on the floor.
     """
     if listed:
@@ -199,7 +199,7 @@ def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.
 def _sized(
     base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hidden, snr: float, random: np.random.Generator
 ) -> Hidden | None:
-    """The effect at the size that is as visible as asked, on the true flow and not to first order."""
+    """The effect at the size that is as visible as wanted, on the true flow and not to first order."""
     amplitude = candidate.effect.amplitude
     sides = [sign for sign, end in ((1.0, amplitude.high), (-1.0, amplitude.low)) if sign * (end - amplitude.off) > 0]
     sign, most = float(random.choice(sides)), LARGEST_SIZE * amplitude.scale
@@ -293,7 +293,7 @@ def measured_twin(
     """Stations with the values measured in a truth that hides `wanted`, and the answer.
 
     wanted: `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `?` for any effect, `nothing`. Errors: InputError for
-    what is unknown, or cannot be made as visible as asked.
+    what is unknown, or cannot be made as visible as wanted.
     """
     random = np.random.default_rng((seed, 2))
     correlation, scale = errors_named(noise)

@@ -76,7 +76,7 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
 
 
 def assumptions_of(folder: Path | str) -> list[str]:
-    """What `import` assumes of a folder because nobody said it, and what it does not read."""
+    """What `import` assumes of a folder because it is not stated, and what it does not read."""
     folder = Path(folder)
     if site_file(folder).is_file():
         return assumptions_of_site(folder)
@@ -84,7 +84,7 @@ def assumptions_of(folder: Path | str) -> list[str]:
 
 
 def without_errors(case: Case) -> list[str]:
-    """Which measurements state no standard error, and who refuses them; nothing where all do."""
+    """Which measurements state no standard error, and which commands refuse them; nothing if all do."""
     return list(map(sentence, refused_for_errors(case, read_observations(case).table)))
 
 

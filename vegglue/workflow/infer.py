@@ -78,7 +78,7 @@ def infer(
     if not observations.table["used"].any():
         raise InputError(
             f"{sized.name}: expected a station in use, got none: nothing can be inferred; "
-            f"{shown_command('check', sized.source)} says why."
+            f"{shown_command('check', sized.source)} reports why."
         )
     chosen = chosen_method(sized, method)
     ensemble = own_ensemble(run, ensemble, members is not None or needs_ensemble(sized, chosen))
@@ -131,7 +131,7 @@ def needs_ensemble(case: Case, method: Method) -> bool:
 
 
 def chosen_method(case: Case, asked: Method | None) -> Method:
-    """What is asked for, else what the case says; an informal likelihood is always weighed. Errors: InputError."""
+    """The wanted method, else that of the case; an informal likelihood is always weighed. Errors: InputError."""
     if asked not in (None, *get_args(Method)):
         raise InputError(f"--method: expected {' or '.join(get_args(Method))}, got {asked!r}.")
     if refinable(case):

@@ -1,4 +1,4 @@
-"""case -> what to measure next: which section, gauge or discharge would tell apart what the data at hand cannot."""
+"""case -> what to measure next: which section, gauge or discharge would separate what the data at hand cannot."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -36,7 +36,7 @@ from vegglue.workflow.diagnose import diagnose
 
 # Effects hidden behind calibration that measurements are proposed for.
 HIDDEN = 4
-# Rivals from which on each is also asked for by itself: of two, one is told from the other as the other from it.
+# Rivals from which on each is also a question by itself: of two, one is separated from the other as the other from it.
 FEWEST_PARTED = 3
 # Laws that one question is about at most: of more, two that are alike decide what no measurement answers.
 MOST_LAWS = 3
@@ -184,7 +184,7 @@ def what_is_open(case: Case, found: Diagnosis) -> list[tuple[Subject, list[Expla
 
 
 def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[Subject, list[Explanation]]]:
-    """One question: to tell effects from each other, or one of a plausible size from what calibration makes of it."""
+    """One question: to separate effects, or one of a plausible size from what calibration absorbs."""
     if len(names) > 1:
         return [(RivalEffects(tuple(names)), rivals_of(case, found, names))]
     if names[0] in _laws_by_name(found):

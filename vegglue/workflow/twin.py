@@ -32,7 +32,7 @@ from vegglue.workflow.hidden_effect import BAD_PROBE, Answer, Hidden, measured_t
 
 
 def sealed_answer(answer: Answer) -> str:
-    """The answer as text that nobody reads at a glance."""
+    """The answer as text that is not read at a glance."""
     packed = base64.b64encode(zlib.compress(json.dumps(asdict(answer)).encode())).decode()
     return "\n".join(["# Sealed by `vegglue twin`; `vegglue reveal` opens it.", *re.findall(r".{1,76}", packed), ""])
 
@@ -98,7 +98,7 @@ def in_rows_of_twin(answer: Answer, station: pd.DataFrame) -> Answer:
 
 
 def config_in(folder: Path) -> Path:
-    """The config that `write_twin` left there, beside its children maybe. Errors: InputError when it cannot be told."""
+    """The config that `write_twin` left there, beside its children maybe. Errors: InputError if it is not clear."""
     own = folder / f"{case_name(folder.resolve().name, 'twin')}.yaml"
     found = [own] if own.is_file() else sorted(folder.glob("*.yaml"))
     if len(found) != 1:
@@ -194,7 +194,7 @@ class Mark:
     named: whether the verdict is this effect alone; inside: whether it is in the set; open: whether it is listed among
     what is not excluded; holds: whether the 95 % interval holds the true amplitude, None if it is not in the set; away:
     distance [m] of the nearest place found from the true one, NaN without either; groups: of effects that the data
-    cannot tell apart, for each step; said: the set; shapes: (name, found, true) of shapes that differ by 5 % or more.
+    cannot separate, for each step; said: the set; shapes: (name, found, true) of shapes that differ by 5 % or more.
     """
 
     hidden: Hidden
