@@ -26,7 +26,7 @@ from vegglue.cli.options import (
 )  # fmt: skip
 from vegglue.cli.output import command_line, print_object
 from vegglue.cli.reporting import print_result, progress_reporter
-from vegglue.errors import shown_path
+from vegglue.errors import InputError, shown_path
 from vegglue.wording.commands import DEMO, HELP
 
 
@@ -43,6 +43,7 @@ def check_command(
 def simulate_command(
     config: Config,
     members: Members = None,
+    parameters: Annotated[Path | None, typer.Option(help=HELP["simulate.parameters"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,
@@ -55,10 +56,19 @@ def simulate_command(
 
     With --force, members for which the command of an `engine` failed are run again.
     """
+    if members is not None and parameters is not None:
+        raise InputError("simulate: expected --members or --parameters, got both; leave one out.")
     opened = opened_run(config, trust)
     from vegglue.inference.command_ensemble import refuse_useless
-    from vegglue.workflow.simulate import is_up_to_date
+    from vegglue.workflow.simulate import given_folder, is_up_to_date
 
+    if parameters is not None:
+        with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
+            run = opened.with_settings(runs, jobs, watch, force)
+            ensemble = vegglue.simulate(run, parameters=parameters)
+        folder = given_folder(run, parameters)
+        print_result(opened.case.model_copy(update={"name": folder.name}), folder.parent, ensemble, as_object)
+        return
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         run = opened.with_settings(runs, jobs, watch, force).sized(members)
         current = is_up_to_date(run)

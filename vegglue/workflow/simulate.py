@@ -4,18 +4,22 @@ import os
 import shutil
 from pathlib import Path
 
+from vegglue.case.parameter_space import sample_of
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
+from vegglue.case.text_files import names_in_files, write_text
 from vegglue.engine.command import command_runs
 from vegglue.errors import InputError, StorageError
 from vegglue.flow.status import FAILED
 from vegglue.inference.command_ensemble import run_ensemble
-from vegglue.inference.solve_ensemble import solve_ensemble
+from vegglue.inference.solve_ensemble import ensemble_hash, solve_ensemble
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
+from vegglue.results.calibration_files import ensemble_table, observation_names, read_parameters, solved_rows
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.result_files import read_ensemble, stored_hash
 from vegglue.results.resume import remove_left_over_fields
+from vegglue.whole_files import MAKE_ROOM
 from vegglue.workflow.case_run import CaseRun, case_run, other_size
 
 
@@ -28,6 +32,7 @@ def simulate(
     jobs: int = -1,
     watch: Watch = silent,
     force: bool = False,
+    parameters: Path | str | None = None,
 ) -> Ensemble:
     """Solve all members of the ensemble of a case, or run the command of its `engine` for each.
 
@@ -48,6 +53,9 @@ def simulate(
         Gets a `Progress` at each step.
     force : bool
         Whether to replace a larger ensemble of the case, and to run members again for which the command failed.
+    parameters : Path or str, optional
+        CSV with one row for each member, such as draws of another program (see `read_parameters`). These members are
+        kept in runs/<name>/given/<file>/, with their predictions also as predictions.csv.
 
     Returns
     -------
@@ -61,6 +69,8 @@ def simulate(
     StorageError
         If another run holds the folder, or if the disk is full.
     """
+    if parameters is not None:
+        return simulate_given(case_run(case, runs, jobs, watch, force), Path(parameters))
     run = case_run(case, runs, jobs, watch, force).sized(members)
     path = run.folder / "ensemble.h5"
     refuse_to_shrink(run)
@@ -75,6 +85,33 @@ def simulate(
                 run_ensemble(run.case, run.observations, path, commands, run.jobs, run.watch)
     remove_left_over_fields(path)
     return read_ensemble(path)
+
+
+def simulate_given(run: CaseRun, file: Path) -> Ensemble:
+    """Solve the members of a CSV. Raises InputError for one that does not fit the case."""
+    theta = read_parameters(file, run.case)
+    run, given = run.sized(len(next(iter(theta.values())))), sample_of(run.case, theta)
+    path = given_folder(run, file) / "ensemble.h5"
+    if stored_hash(path) != ensemble_hash(run.case, given):
+        if run.case.engine is None:
+            solve_ensemble(run.case, run.observations, path, run.jobs, run.watch, run.site, given)
+        else:
+            with at_most(run.jobs):
+                commands = command_runs(run.case, run.folder)
+                run_ensemble(run.case, run.observations, path, commands, run.jobs, run.watch, given)
+    remove_left_over_fields(path)
+    found = read_ensemble(path)
+    valued = found.station["value"].notna().to_numpy()
+    columns = observation_names(found.station[valued])
+    solved = solved_rows(found)
+    table = ensemble_table(dict(zip(columns, found.prediction[solved][:, valued].T, strict=True)), solved)
+    write_text(path.with_name("predictions.csv"), table, MAKE_ROOM)
+    return found
+
+
+def given_folder(run: CaseRun, file: Path) -> Path:
+    """Where the members of a CSV of parameters are kept."""
+    return run.folder / "given" / names_in_files([file.stem])[file.stem]
 
 
 def is_simulated(run: CaseRun) -> bool:
