@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from vegglue.case.config import load_case
     from vegglue.cluster import on_cluster
     from vegglue.errors import InputError, StorageError
+    from vegglue.progress import progress_lines
     from vegglue.workflow.check import check
     from vegglue.workflow.compare import compare
     from vegglue.workflow.demo import demo
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 __all__ = [
     "InputError", "StorageError", "__version__", "check", "compare", "demo", "diagnose", "discover", "export", "extend",
     "extend_stepwise", "import_folder", "infer", "load", "load_case", "make_twin", "new", "next_measurement",
-    "on_cluster", "overview", "report", "reveal", "run", "simulate",
+    "on_cluster", "overview", "progress_lines", "report", "reveal", "run", "simulate",
 ]  # fmt: skip
 
 __version__ = version.VERSION
@@ -50,6 +51,7 @@ _ELSEWHERE = {
     "extend_stepwise": "workflow.extend",
     "make_twin": "workflow.twin",
     "overview": "workflow.report",
+    "progress_lines": "progress",
     "reveal": "workflow.twin",
 }
 

@@ -27,7 +27,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
 
 
 def at_cells(done: Done) -> pd.DataFrame:
-    return pd.read_csv(done[2] / "flow-june.csv")
+    return pd.read_csv(done[2] / "flow-june.csv", float_precision="round_trip")
 
 
 def test_all_forms_are_written_and_named(done: Done) -> None:

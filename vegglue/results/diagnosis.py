@@ -24,7 +24,7 @@ from vegglue.results.causes import (
     Step,
 )
 from vegglue.results.verdict import ChiSquare, EstimatedErrors, Verdict
-from vegglue.wording.numbers import in_short, interval_in_short
+from vegglue.wording.numbers import in_short, in_short_html, interval_in_short
 from vegglue.wording.sentences import phrase, tagged
 
 
@@ -232,6 +232,9 @@ class Diagnosis:
                 stations_in_short(self.predictions.station),
             ],
         )
+
+    def _repr_html_(self) -> str:
+        return in_short_html(repr(self))
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:

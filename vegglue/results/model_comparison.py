@@ -9,6 +9,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.measurements.kinds import KINDS
 from vegglue.plain_json import number_kept
+from vegglue.wording.numbers import in_short, in_short_html, so_many
 
 
 @dataclass(frozen=True)
@@ -189,6 +190,30 @@ class ModelComparison:
     reason: str
     verdict: str = ""
     unclear: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return in_short(
+            f"Comparison of {so_many(len(self.steps), 'model')}",
+            [
+                f"{one.name}: RMSE {one.in_sample:.3g} m/s, sections left out {one.held_out_sections:.3g} m/s"
+                for one in self.steps
+            ],
+        )
+
+    def _repr_html_(self) -> str:
+        headings = ("model", "parameters", "RMSE [m/s]", "sections left out", "experiments left out", "validation")
+        rows = [
+            (
+                one.name,
+                f"{one.parameters}",
+                *(
+                    "" if np.isnan(error) else f"{error:.3g}"
+                    for error in (one.in_sample, one.held_out_sections, one.held_out_experiments, one.unseen)
+                ),
+            )
+            for one in self.steps
+        ]
+        return in_short_html(repr(self).split("\n")[0], headings, rows)
 
 
 def comparison_from(tree: Mapping[str, Any]) -> ModelComparison:

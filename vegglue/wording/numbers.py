@@ -37,6 +37,22 @@ def in_short(heading: str, lines: Iterable[str]) -> str:
     return "\n".join([heading, *(f"  {line}" for line in lines if line)])
 
 
+def in_short_html(text: str, headings: Sequence[str] = (), rows: Sequence[Sequence[str]] = ()) -> str:
+    """The text of `in_short` and a table as HTML of a notebook: all escaped, without script or style of its own."""
+    heading, *lines = [html.escape(line.strip()) for line in text.split("\n")]
+    parts = [f"<p><b>{heading}</b></p>"]
+    if lines:
+        parts.append(f"<ul>{''.join(f'<li>{line}</li>' for line in lines)}</ul>")
+    if rows:
+        cells = [
+            "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row)
+            for tag, row in [("th", headings), *(("td", row) for row in rows)]
+        ]
+        body = "".join(f"<tr>{row}</tr>" for row in cells[1:])
+        parts.append(f"<table><thead><tr>{cells[0]}</tr></thead><tbody>{body}</tbody></table>")
+    return f"<div>{''.join(parts)}</div>"
+
+
 def so_many(number: int, one: str, many: str = "") -> str:
     """`1 station`, `1,024 stations`; many: if it is not the one with an s."""
     return f"{number:,} {one if number == 1 else many or one + 's'}"

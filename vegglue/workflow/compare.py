@@ -20,7 +20,7 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.json_store import comparison_that_fits, model_score_that_fits, write_comparison, write_model_score
 from vegglue.results.model_comparison import ComparedModel, ModelComparison, ModelScore
-from vegglue.wording.numbers import in_short, so_many
+from vegglue.wording.numbers import in_short, in_short_html, so_many
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run, excluded_in_all
 
 # On which errors hang that are set side by side, of each station.
@@ -39,6 +39,9 @@ class Comparison:
     def __repr__(self) -> str:
         heading = f"Comparison of {so_many(len(self.model_scores), 'model')}, root mean square errors of velocity [m/s]"
         return in_short(heading, [*map(model_score_in_short, self.model_scores), exclusion_in_words(self.left_out)])
+
+    def _repr_html_(self) -> str:
+        return in_short_html(repr(self))
 
 
 @one_thread()

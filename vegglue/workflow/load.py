@@ -3,15 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pandas as pd
 
 from vegglue.errors import InputError, shown_command
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.labelled_arrays import read_inference_data, read_labelled
+from vegglue.results.labelled_arrays import as_tree, read_inference_data, read_labelled
 from vegglue.results.result_files import read_diagnosis
-from vegglue.wording.numbers import in_short, so_many
+from vegglue.wording.numbers import in_short, in_short_html, so_many
 
 if TYPE_CHECKING:
     import arviz
@@ -51,6 +51,23 @@ class LoadedRun:
     diagnosis: Diagnosis | None
     stations: pd.DataFrame | None
 
+    @property
+    def tree(self) -> "xarray.DataTree":
+        """All of it as one DataTree with the names and units of the CF conventions: the groups ensemble, fields,
+        members, stations and, of the draws of equal weight, posterior, prior and so on.
+        """
+        parts = {name: getattr(self, name) for name in ("ensemble", "fields", "members")}
+        if self.stations is not None:
+            parts["stations"] = self.stations.to_xarray()
+        if self.posterior is not None:
+            groups = self.posterior.groups
+            names = groups() if callable(groups) else [name.strip("/") for name in groups]
+            parts |= {name: self.posterior[name] for name in names if name and name not in parts}
+        return as_tree({name: dataset_of(part) for name, part in parts.items() if part is not None})
+
+    def _repr_html_(self) -> str:
+        return in_short_html(repr(self))
+
     def __repr__(self) -> str:
         sized = {name: getattr(self, name) for name in ("ensemble", "fields", "members")}
         lines = [
@@ -66,6 +83,11 @@ class LoadedRun:
         if self.stations is not None:
             lines.append(f"stations: {len(self.stations):,} rows")
         return in_short(f"Run in {self.folder}", lines)
+
+
+def dataset_of(part: Any) -> "xarray.Dataset":
+    """A dataset as it is, or that of a node of a tree."""
+    return part.to_dataset() if hasattr(part, "to_dataset") else part
 
 
 def load(folder: Path | str) -> LoadedRun:
