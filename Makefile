@@ -21,7 +21,7 @@ export OMP_NUM_THREADS := 1
 # Where Python may keep no bytecode, every process compiles all libraries anew: 8 s of a core for each of the tests' own.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo paper checked test check house bench blind laws faults confluence fuzz clean simulate infer report setup
+.PHONY: help demo paper checked test check release house bench blind laws faults confluence fuzz clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
@@ -61,6 +61,10 @@ test: checked  # everything that must pass
 
 check: checked  # the fast part
 	$(PYTEST) -m 'not slow'
+
+release: $(TESTABLE)  # wheel and sdist in dist: built twice with the same bytes, checked, not uploaded
+	$(INSTALL) '.[release]'
+	$(BIN)/python tests/release.py
 
 house: $(TESTABLE)  # counts of files, lines, helpers and words, for a reader
 	@$(BIN)/python tests/house.py
