@@ -67,6 +67,9 @@ def _stamp(file: Path) -> str:
     text = file.read_text(encoding="utf-8")
     names = re.findall(r"^from vegglue\.([\w.]+) import", text, re.MULTILINE)
     files = [Path(__file__).parent / f"{name.replace('.', '/')}.py" for name in names]
-    loops = "compilation import compiled"
-    below = [one for one in files if one.name in SHARED or (one.is_file() and loops in one.read_text(encoding="utf-8"))]
-    return sha256("".join([text, *map(_stamp, below)]).encode()).hexdigest()
+    return sha256("".join([text, *map(_stamp, filter(shapes_loops, files))]).encode()).hexdigest()
+
+
+def shapes_loops(file: Path) -> bool:
+    """Whether a file holds compiled loops, or constants and flags of loops."""
+    return file.name in SHARED or (file.is_file() and "compilation import compiled" in file.read_text(encoding="utf-8"))
