@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from reach import COARSE, said_to, write_reach
+from systems import POSIX_ALONE
 
 from vegglue.case.config import load_case
 from vegglue.case.grid import build_grid
@@ -243,6 +244,7 @@ def test_a_bend_lies_on_the_map_where_it_bends(tmp_path: Path) -> None:
         export(case, runs=tmp_path / "runs", forms=("geotiff",))
 
 
+@POSIX_ALONE
 def test_links_in_the_folder_are_replaced_and_not_followed(tmp_path: Path) -> None:
     """The folder of a run may come from others, and a kill leaves no half of a file under its name."""
     case, victim = load_case(write_reach(tmp_path, COARSE)), tmp_path / "thesis.tex"
