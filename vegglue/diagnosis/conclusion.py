@@ -23,8 +23,8 @@ from vegglue.decision_constants import constants
 from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, clearly_a_law, not_excluded
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.competition import tempering
-from vegglue.diagnosis.errors_elsewhere import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
+from vegglue.diagnosis.held_out import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.search_state import SearchState, rivals_in
 from vegglue.effects.definition import Stage
 from vegglue.engine.interface import Model, Point
