@@ -1,6 +1,6 @@
 """A calibrated model whose predictions are linear in z, prediction = slope z: no flow is solved for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Engine, Model, Point, Wanted, always
 from vegglue.engine.newton import NEWTON
+from vegglue.flow.local_changes import Term
 
 CASE_OF_TWINS = load_case(Path(__file__).parents[1] / "configs" / "twin.yaml")
 
@@ -39,14 +40,21 @@ def stations_of(case: Case, sections: tuple[str, ...], points: int) -> pd.DataFr
     return pd.DataFrame(rows).assign(standard_error=0.01, used=True, reason="", depth=np.nan, device="")
 
 
-def linear_engine(answer: Callable[[Model], tuple[Array, Array] | None], of_causes: Array | None = None) -> Engine:
-    """An engine of predictions a + J z, with (a, J) by model, None without a flow; of_causes (station, cause)."""
+def linear_engine(
+    answer: Callable[[Model], tuple[Array, Array] | None],
+    of_causes: Array | None = None,
+    of_cells: Mapping[Term, Array] | None = None,
+) -> Engine:
+    """An engine of predictions a + J z, with (a, J) by model, None without a flow.
+
+    of_causes (station, cause), of_cells (station, nx, ny): what predictions answer to causes, and to terms in cells.
+    """
 
     def linearise(model: Model, z: Array, _: Point | None = None, wanted: Wanted = always) -> Point | None:
         a, slope = answer(model) or (None, None)
         if a is None or slope is None or not wanted(a + slope @ z):
             return None
-        return Point(z, a + slope @ z, slope, {})
+        return Point(z, a + slope @ z, slope, dict.fromkeys(model.case.experiments))
 
     def predict(model: Model, _: object, z: Array) -> Array:
         a, slope = answer(model) or (np.full(len(model.station), np.nan), np.zeros((len(model.station), z.shape[1])))
@@ -56,8 +64,10 @@ def linear_engine(answer: Callable[[Model], tuple[Array, Array] | None], of_caus
         assert of_causes is not None
         return of_causes[: len(model.station)]
 
-    def responses_to_cells(model: Model, _: Point, experiment: str, terms: tuple[str, ...]) -> dict[str, Array]:
-        return {term: np.zeros((model.rows[experiment].size, *model.site.grid.shape), np.float32) for term in terms}
+    def responses_to_cells(model: Model, _: Point, experiment: str, terms: Sequence[Term]) -> dict[Term, Array]:
+        rows, grid = model.rows[experiment], model.site.grid
+        nothing = np.zeros((rows.size, grid.x.size, grid.y.size), np.float32)
+        return {term: nothing if of_cells is None else of_cells[term][rows] for term in terms}
 
     return Engine(
         "linear", linearise, predict, responses, responses_to_cells, NEWTON.flow_at_centres,
@@ -77,7 +87,7 @@ def at_best(case: Case, station: pd.DataFrame, values: Array, slope: Array, engi
     error = station["standard_error"].to_numpy(float)
     white = slope / error[:, None]
     z = np.linalg.solve(white.T @ white + np.eye(slope.shape[1]), white.T @ (values / error))
-    point = Point(z, slope @ z, slope, {})
+    point = Point(z, slope @ z, slope, {} if engine is NEWTON else dict.fromkeys(case.experiments))
     fitted = MapEstimate(point, chi2(noise, point), objective(noise, point), covariance(noise, point))
     site = _site_of_twins() if case is CASE_OF_TWINS else build_site(case)
     return Baseline(Model(case, site, station, engine), noise, fitted, None, None)
