@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from vegglue.workflow.load import load
     from vegglue.workflow.new import new
     from vegglue.workflow.next_measurement import next_measurement
+    from vegglue.workflow.plan import plan
     from vegglue.workflow.report import overview, report
     from vegglue.workflow.run import run
     from vegglue.workflow.simulate import simulate
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 __all__ = [
     "InputError", "StorageError", "__version__", "check", "compare", "demo", "diagnose", "discover", "export", "extend",
     "extend_stepwise", "import_folder", "infer", "load", "load_case", "make_twin", "new", "next_measurement",
-    "on_cluster", "overview", "progress_lines", "report", "reveal", "run", "simulate",
+    "on_cluster", "overview", "plan", "progress_lines", "report", "reveal", "run", "simulate",
 ]  # fmt: skip
 
 __version__ = version.VERSION

@@ -19,6 +19,7 @@ NAMES = [name for group in COMMANDS.values() for name in group if name not in BA
 CALLS: tuple[tuple[str, ...], ...] = (
     ("demo", "tour", "--short", "--jobs", "1"),
     ("new", "beck-MODE"),
+    ("plan", "brook.yaml", "--jobs", "1"),
     ("import", "mill", "--to", "mill-MODE.yaml"),
     ("check", "brook.yaml"),
     ("simulate", "brook.yaml", "--jobs", "1"),

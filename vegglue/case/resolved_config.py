@@ -20,7 +20,19 @@ from vegglue.errors import InputError, shown_path
 
 # Keys that a finished ensemble does not depend on, as pydantic wants those to leave out.
 NOT_SIMULATED = dict.fromkeys(
-    ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction", "frame", "imported"), True
+    (
+        "name",
+        "title",
+        "infer",
+        "survey",
+        "validation",
+        "reference",
+        "canopy_correction",
+        "frame",
+        "imported",
+        "planned",
+    ),
+    True,
 ) | {
     "exclude": True,
     "simulate": {"field_budget"},
@@ -45,9 +57,9 @@ def as_yaml(tree: Tree) -> str:
 def case_hash(case: Case) -> str:
     """sha256 of the resolved case, in its order, and of the contents of every file it names, wherever they lie.
 
-    Its title is not in it: no number hangs on that.
+    Its title and what is planned are not in it: no result hangs on them.
     """
-    return _hash(dumped(case) | {"title": ""})
+    return _hash(dumped(case, {"planned": True}) | {"title": ""})
 
 
 def simulation_hash(case: Case) -> str:

@@ -27,6 +27,7 @@ from vegglue.cli.loop_commands import (
     import_command,
     next_command,
     overview_command,
+    plan_command,
 )
 from vegglue.cli.options import FLAG
 from vegglue.errors import InputError, StorageError
@@ -127,6 +128,7 @@ COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Begin": {
         "demo": demo_command,
         "new": new_command,
+        "plan": plan_command,
         "import": import_command,
         "check": check_command,
         "run": run_command,

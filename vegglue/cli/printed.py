@@ -41,6 +41,7 @@ from vegglue.pages.headline import (
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.open_questions import Question
+from vegglue.results.plan import FieldPlan
 from vegglue.results.posterior import Posterior
 from vegglue.wording.numbers import FIRM, in_digits, range_in_digits, so_many
 from vegglue.wording.sentences import lines_of, phrase, sentence
@@ -117,6 +118,9 @@ def show(case: Case, runs: Path, result: Any, details: bool = False, more: str =
             print(sentence(result.sentence))
             print(sentence(result.reason))
             print(f"Last config: {result.cases[-1].source}")
+        case FieldPlan():
+            show_plan(result, details, more)
+            print(phrase("files_of_plan", folder / "plan"))
         case Comparison():
             show_ladder(result)
             print(f"Drawn in {folder / 'ladder.png'}")
@@ -344,3 +348,25 @@ def show_questions(name: str, found: Sequence[Question]) -> None:
         print("\n".join(wrapped([phrase("no_question", name)])))
     for question in found:
         print("\n".join(wrapped(repr(question).splitlines())))
+
+
+def show_plan(plan: FieldPlan, details: bool, more: str) -> None:
+    """Print what a plan would show, its parameters, and what to add; details: all effects in a table."""
+    for line in lines_of(plan):
+        print(textwrap.fill(line, TERMINAL_WIDTH, subsequent_indent="  " if line.startswith("-") else ""))
+    if not details:
+        print(phrase("more_of_plan", more))
+        return
+    rows = [
+        [
+            one.name,
+            in_digits(one.smallest, 2) if np.isfinite(one.smallest) else phrase("never_detected"),
+            in_digits(one.plausible, 2),
+            one.unit,
+            f"{100 * one.chance_plausible:.0f} %",
+            ", ".join(other.name for other in one.confused[:2]),
+        ]
+        for one in plan.effects
+    ]
+    headings = ["effect", "detected from", "plausible", "unit", "chance", "similar"]
+    print_table(headings, rows, ["detected from", "chance"])

@@ -24,7 +24,7 @@ from vegglue.importers.confluence import (
     mat_folder,
     tables_of_mat,
 )
-from vegglue.importers.field_folder import case_from_folder
+from vegglue.importers.field_folder import case_from_folder, case_from_sheet, case_of_sheet
 from vegglue.importers.site_file import assumptions_of_site, site_file
 from vegglue.measurements.observations import read_observations
 from vegglue.wording.sentences import sentence
@@ -61,7 +61,8 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
     if holds_confluence(folder) or mat_folder(folder) is not None:
         tree, texts, flat = confluence_case(folder, target)
     else:
-        made = case_from_folder(folder, target)
+        planned = case_of_sheet(folder) if folder.is_dir() else None
+        made = case_from_folder(folder, target) if planned is None else case_from_sheet(folder, target, planned)
         tree, texts, flat = made.tree, dict(made.texts), None
     refuse_unreadable_import(tree, texts, target, folder)
     made_by = f"# Made by `vegglue import` from {folder.name}.\n"
@@ -78,6 +79,8 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
 def assumptions_of(folder: Path | str) -> list[str]:
     """What `import` assumes of a folder because it is not stated, and what it does not read."""
     folder = Path(folder)
+    if case_of_sheet(folder) is not None:  # of a case that is there
+        return []
     if site_file(folder).is_file():
         return assumptions_of_site(folder)
     return list(NOT_STATED) if holds_confluence(folder) or mat_folder(folder) is not None else []
@@ -142,6 +145,6 @@ def with_full_paths(tree: Any, home: Path, made: Mapping[Path, str]) -> Any:
     full = {
         key: os.path.realpath(home / value)
         for key, value in tree.items()
-        if key in PATHS and isinstance(value, str) and Path(value) not in made
+        if key in (*PATHS, "extends") and isinstance(value, str) and Path(value) not in made
     }
     return {key: with_full_paths(value, home, made) for key, value in tree.items()} | full
