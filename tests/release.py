@@ -65,7 +65,8 @@ def main() -> None:
     subprocess.run([sys.executable, "-m", "twine", "check", "--strict", *map(str, files)], check=True)
     for path in files:
         print(f"{hashlib.sha256(made[path.name]).hexdigest()}  {path.relative_to(ROOT)}")
-    print(f"Built twice with the same bytes, checked, not uploaded: `twine upload {' '.join(p.name for p in files)}`")
+    shown = " ".join(str(path.relative_to(ROOT)) for path in files)
+    print(f"Built twice with the same bytes, checked, not uploaded: `twine upload {shown}`")
 
 
 if __name__ == "__main__":
