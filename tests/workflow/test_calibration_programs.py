@@ -182,6 +182,7 @@ def test_columns_may_stand_in_any_order_and_be_upper_case(tmp_path: Path) -> Non
         (("n_b,phi", "0.03,2", "0.03"), "row 3"),
         (("n_b,phi", "0.03,2", "nan,2"), "row 3"),
         (("n_b,phi", "0.03,-2"), "row 2"),
+        (("n_b,phi", "9" * 200_000), "given.csv"),
     ],
 )
 def test_what_does_not_fit_is_refused_with_its_row(tmp_path: Path, rows: tuple[str, ...], place: str) -> None:

@@ -246,7 +246,10 @@ def read_parameters(path: Path, case: Case) -> dict[str, Array]:
         For a missing, doubled or unknown column, and for a value that is none or outside the bounds of its prior.
     """
     shown = shown_path(path)
-    heading, *lines = list(csv.reader(io.StringIO(read_text(path, LARGEST_DATA)))) or [[]]
+    try:
+        heading, *lines = list(csv.reader(io.StringIO(read_text(path, LARGEST_DATA)))) or [[]]
+    except csv.Error as error:  # of a NUL, or a cell without end
+        raise InputError(f"{shown}: expected a table of numbers in CSV, got none ({error}); export it again.") from None
     columns, short = [word.strip() for word in heading], pest_names(case.parameters)
     if {one.lower() for one in columns} >= set(short.values()):  # through PEST++, which knows lower case alone
         columns, called = [one.lower() for one in columns], short
