@@ -193,6 +193,12 @@ def is_mark(value: float) -> bool:
     return size >= LARGEST_MEASURED or size in _SIZES or (size >= LEAST_NINES and is_of_nines(size))
 
 
+def is_mark_anywhere(value: float) -> bool:
+    """Whether a number stands for a missing value also among places, where 9 and 99 are measured."""
+    negative_nines = value <= -99.0 and is_of_nines(-value)
+    return negative_nines or value in MARKS_OF_ANY_COLUMN or not abs(value) <= LARGEST_COORDINATE
+
+
 def is_of_nines(value: float) -> bool:
     """Whether a number is written with nines alone: 9, 99.9, 9999."""
     return set(f"{value:g}") <= set("9.")
