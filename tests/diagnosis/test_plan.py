@@ -19,6 +19,7 @@ from vegglue.diagnosis.plan import (
     planned_pieces,
     possible_pieces,
     shown_by,
+    stations_of,
     verticals_at,
 )
 from vegglue.engine.interface import Model
@@ -154,11 +155,7 @@ def test_without_anything_planned_a_first_set_fits_the_hours(tmp_path: Path) -> 
 def test_measurements_at_hand_are_a_plan_too(model: Model) -> None:
     planned = model.case.planned
     assert planned is not None
-    pieces = planned_pieces(model, planned)
-    from vegglue.diagnosis.plan import stations_of
-    from vegglue.measurements.observations import station_table
-
-    table = station_table(*(stations_of(model, planned, one, model.station) for one in pieces))
+    table, _ = stations_of(model, planned, planned_pieces(model, planned), model.station)
     without = model.case.model_copy(update={"planned": None})
     found = plan_measurements(replace(model, case=without, station=table))
     assert found.at_hand == len(table)

@@ -1,4 +1,5 @@
-"""Is what `vegglue plan` calls detectable detected? `python tests/studies/plan.py CONFIG --sets 60 --minutes 4`.
+"""Is what `vegglue plan` calls detectable detected? `python tests/studies/plan.py CONFIG --sets 60 --minutes 4`,
+and with `--compare 24` a proposed plan against plans made by hand.
 
 The plan of the stations of a config states for each listed effect the size that is detected nine times of ten, and the
 chance that a plausible size is. Twins of the built-in engine hide testable effects at that size, and effects that are
@@ -19,9 +20,11 @@ import numpy as np
 import scipy.stats
 
 import vegglue
-from vegglue.diagnosis.plan import plan_measurements
+from vegglue.case.schema import Case, Planned, PlannedGauge, PlannedTransect
+from vegglue.case.zones import corners_of
+from vegglue.diagnosis.plan import plan_measurements, planned_pieces
 from vegglue.errors import InputError
-from vegglue.results.plan import FieldPlan, PlannedEffect
+from vegglue.results.plan import FieldPlan, PlannedEffect, hours_of
 from vegglue.workflow.case_run import CaseRun
 
 ROOT = Path(__file__).parents[2]
@@ -100,13 +103,80 @@ def figures(records: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def counted(plan: FieldPlan) -> tuple[int, int]:
+    """Effects of the case, of experiments and of patches that are testable, and all; those of sections are left out,
+    as each section brings its own.
+    """
+    of_places = ("probe_gain", "station_shift", "device_gain", "zero_offset")
+    kept = [one for one in plan.effects if not one.name.startswith(of_places)]
+    return sum(one.testable for one in kept), len(kept)
+
+
+def made_by_hand(case: Case, hours: float, beside_plants: bool) -> list[Planned]:
+    """Transects equally spaced along the reach, or all beside the plants, with a gauge at each, in one flow and more:
+    as many as fit the hours.
+    """
+    site = CaseRun(case).model
+    low, high = case.grid.x
+    ends = [corners_of(case, patch)[:, 0] for patch in case.plants.patches]
+    found, names = [], list(case.experiments)
+    for flows in range(1, len(names) + 1):
+        best = None
+        for count in range(1, 30):
+            x = np.linspace(low, high, count + 2)[1:-1]
+            if beside_plants:
+                middles = [0.5 * (one.min() + one.max()) for one in ends]
+                x = np.array((middles * count)[:count]) if count <= len(middles) else np.array(middles)
+            x = np.round(x, 1)
+            transects = tuple(
+                PlannedTransect(x=float(one), spacing=0.5, experiments=tuple(names[-flows:])) for one in x
+            )
+            gauges = tuple(PlannedGauge(x=float(one), experiments=tuple(names[-flows:])) for one in x)
+            planned = Planned(hours=hours, transects=transects, gauges=gauges)
+            pieces = planned_pieces(site, planned)
+            if hours_of(pieces, planned.costs.discharge) > hours:
+                break
+            best = planned
+            if beside_plants and count > len(ends):
+                break
+        if best is not None:
+            found.append(best)
+    return found
+
+
+def compare(config: Path, hours: float) -> str:
+    """A plan proposed for some hours against plans made by hand, each with the number of flows that is best for it."""
+    case = vegglue.load_case(config).model_copy(update={"observations": (), "planned": Planned(hours=hours)})
+    lines = []
+    began = time.process_time()
+    plan = plan_measurements(CaseRun(case).model)
+    lines.append(
+        f"proposed: {counted(plan)} testable in {plan.hours:.1f} h ({time.process_time() - began:.1f} s of CPU)"
+    )
+    for beside in (False, True):
+        shown = []
+        for planned in made_by_hand(case, hours, beside):
+            with_plan = case.model_copy(update={"planned": planned})
+            plan = plan_measurements(CaseRun(with_plan).model)
+            flows = len({one.experiment for one in plan.pieces})
+            shown.append(
+                f"{counted(plan)} with {len(planned.transects)} transects in {flows} flows, {plan.hours:.1f} h"
+            )
+        lines.append(f"{'beside the plants' if beside else 'equally spaced'}: {'; '.join(shown)}")
+    return "\n".join(lines)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("config", type=Path)
     parser.add_argument("--sets", type=int, default=60)
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--folder", type=Path, default=ROOT / "data/plan")
+    parser.add_argument("--compare", type=float, help="hours: compare a proposed plan with plans made by hand instead")
     given = parser.parse_args()
+    if given.compare is not None:
+        print(compare(given.config, given.compare))
+        return
     case = vegglue.load_case(given.config)
     path = given.folder / f"{case.name}.jsonl"
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from scipy.special import logsumexp, ndtr
+from scipy.special import ndtr
 
 from vegglue.arrays import Array
 from vegglue.calibration.score_test import HypothesisKind, log_factors, prior_shrinkage
@@ -31,8 +31,8 @@ from vegglue.calibration.score_test import HypothesisKind, log_factors, prior_sh
 PLANNED_POWER = 0.9
 # Largest score that is looked for [standard errors]: no data have more, and a longer fingerprint hides nothing.
 LARGEST_SCORE = 1e6
-# Halvings of an interval of lengths or of scores, which leave 1e-9 of it.
-HALVINGS = 60
+# Halvings of an interval of lengths or of scores, which leave 1e-12 of it.
+HALVINGS = 40
 # Shared errors whose standard deviation is below this share of a station's own error count as its own [-].
 SMALL_SHARE = 0.05
 # Independent patterns of shared errors that are kept at most. Chosen: those left out are counted as own errors.
@@ -91,14 +91,17 @@ def alarm_thresholds(kind: HypothesisKind, columns: Sequence[np.ndarray], level:
     c_jk is the cosine between projected fingerprints: settings of one effect rise together. What other hypotheses add
     is left out, so that the chance of detection is a lower bound.
     """
-    units, found = kind.projected.units, np.full(kind.size.size, LARGEST_SCORE)
+    units, found = kind.projected.units, single_threshold(kind.size, kind.log_prior, level)
     for own in columns:
+        if own.size == 1:
+            continue
         cosine = units[:, own].T @ units[:, own]
         size, prior = kind.size[own], kind.log_prior[own]
-        low, high = np.zeros(own.size), np.full(own.size, LARGEST_SCORE)
+        low, high = np.zeros(own.size), found[own]  # others only add
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            enough = logsumexp(log_factors(middle[:, None] * cosine, size) + prior, axis=1) >= level
+            evidence = log_factors(middle[:, None] * cosine, size) + prior
+            enough = np.logaddexp.reduce(evidence, axis=1) >= level
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
         found[own] = high
     return found

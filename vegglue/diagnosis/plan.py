@@ -14,7 +14,7 @@ that helps (Fedorov 1972; not checked against it).
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -235,9 +235,6 @@ def plan_measurements(
     )
 
 
-# --- pieces of field work ---------------------------------------------------------------------------------------------
-
-
 def water_across(model: Model, experiment: str, x: float) -> tuple[Array, Array]:
     """y of the cells and the expected depth there [m] of one experiment at x."""
     site = in_experiment(model.site, experiment)
@@ -377,29 +374,29 @@ def _with_flows(model: Model, lower: Sequence[float] = LOWER) -> Model:
     return model if case is model.case else replace(model, case=case, site=build_site(case))
 
 
-def stations_of(model: Model, planned: Planned, piece: PlannedPiece, at_hand: pd.DataFrame) -> pd.DataFrame:
-    """The stations of a piece as a table; a line of bed levels has none. Their errors are the stated ones, else those
-    of the same kind at hand, else the usual ones.
+def stations_of(
+    model: Model, planned: Planned, pieces: Sequence[PlannedPiece], at_hand: pd.DataFrame
+) -> tuple[pd.DataFrame, list[int]]:
+    """The stations of some pieces as one table, and how many each has; a line of bed levels has none. Their errors are
+    the stated ones, else those of the same kind at hand, else the usual ones.
     """
-    if piece.work is Work.SURVEY_LINE:
-        return station_table()
-    kind = KIND_OF_WORK[piece.work]
-    stated = getattr(planned.errors, kind, None)
-    there = at_hand.loc[at_hand["kind"] == kind, "standard_error"].dropna()
-    usual = float(there.median()) if len(there) else KINDS[kind].usual_error
     middle = 0.5 * (model.case.grid.y[0] + model.case.grid.y[1])
-    y = piece.y or (middle,)
-    section = "points" if piece.work is Work.POINT else f"x{piece.x:g}"
-    return station_table(
-        pd.DataFrame(
-            {"experiment": piece.experiment, "kind": kind, "section": section, "x": piece.x, "y": list(y),
-             "value": 0.0, "standard_error": usual if stated is None else stated, "used": True, "reason": "",
-             "depth": np.nan, "device": ""}
-        )
-    )  # fmt: skip
-
-
-# --- flows and fingerprints -------------------------------------------------------------------------------------------
+    error: dict[str, float] = {}
+    for kind in set(KIND_OF_WORK.values()):
+        stated = getattr(planned.errors, kind, None)
+        there = at_hand.loc[at_hand["kind"] == kind, "standard_error"].dropna()
+        usual = float(there.median()) if len(there) else KINDS[kind].usual_error
+        error[kind] = usual if stated is None else stated
+    rows = [
+        (piece.experiment, KIND_OF_WORK[piece.work], "points" if piece.work is Work.POINT else f"x{piece.x:g}",
+         piece.x, y, error[KIND_OF_WORK[piece.work]])
+        for piece in pieces if piece.work is not Work.SURVEY_LINE
+        for y in piece.y or (middle,)
+    ]  # fmt: skip
+    table = pd.DataFrame(rows, columns=["experiment", "kind", "section", "x", "y", "standard_error"])
+    table = table.assign(value=0.0, used=True, reason="", depth=np.nan, device="")
+    counts = [0 if piece.work is Work.SURVEY_LINE else max(len(piece.y), 1) for piece in pieces]
+    return station_table(table), counts
 
 
 def plan_model(
@@ -431,24 +428,21 @@ def _plan_model(
     possible: Sequence[PlannedPiece],
     known: Sequence[PlanDraw],
 ) -> PlanModel | None:
-    tables = [at_hand, *(stations_of(wide, planned, one, at_hand) for one in base if one.work is not Work.SURVEY_LINE)]
-    stations = station_table(*tables)
-    lines = [one for one in base if one.work is Work.SURVEY_LINE]
-    count, parts, rows = len(stations), [stations], list[np.ndarray]()
-    surveyed = list(lines)
-    for piece in possible:
-        table = stations_of(wide, planned, piece, at_hand).assign(used=False)
-        rows.append(np.arange(count, count + len(table)))
-        count += len(table)
-        parts.append(table)
-    surveyed += [one for one in possible if one.work is Work.SURVEY_LINE]
-    places = [(one.x, y) for one in surveyed for y in one.y]
-    first = count
-    for j, piece in enumerate(possible):  # bed levels stand behind all stations, those of the plan first
+    stations = station_table(at_hand, stations_of(wide, planned, base, at_hand)[0])
+    further, counts = stations_of(wide, planned, possible, at_hand)
+    here = replace(wide, station=station_table(stations, further.assign(used=False)))
+    # Bed levels stand behind all stations, those of the plan first.
+    places = [(one.x, y) for one in (*base, *possible) if one.work is Work.SURVEY_LINE for y in one.y]
+    station = len(stations)
+    level = len(here.station) + sum(len(one.y) for one in base if one.work is Work.SURVEY_LINE)
+    rows = list[np.ndarray]()
+    for piece, count in zip(possible, counts, strict=True):
         if piece.work is Work.SURVEY_LINE:
-            begin = first + sum(len(one.y) for one in surveyed[: surveyed.index(piece)])
-            rows[j] = np.arange(begin, begin + len(piece.y))
-    here = replace(wide, station=station_table(*parts))
+            rows.append(np.arange(level, level + len(piece.y)))
+            level += len(piece.y)
+        else:
+            rows.append(np.arange(station, station + count))
+            station += count
     on_coarse = coarser(here)
     search = on_coarse if on_coarse is not None and cells_across(on_coarse.site) >= FEWEST_CELLS_ACROSS else here
     other = here if search is on_coarse else on_coarse
@@ -520,9 +514,6 @@ def _bed_levels(model: Model, places: Array, columns: Array) -> Array:
     return found
 
 
-# --- what the plan shows ----------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class ShownByPlan:
     """The hypotheses of a diagnosis at one draw, without a residual: kinds as in a screening, the first of listed
@@ -587,7 +578,9 @@ def shown_by(wide: PlanModel, draw: PlanDraw, level: float | None = None) -> Sho
         errors = draw_whitened_errors(noise, ALARM_DRAWS, np.random.default_rng(1))
         level = alarm_level(kinds, errors, 1, constants().false_alarm_rate)
     units = projected.units
-    spots = {term: np.abs(units.T @ one.units).max(axis=1, initial=0.0) for term, one in in_places.items()}
+    spots: dict[str, Array] = {
+        str(term): np.abs(units.T @ one.units).max(axis=1, initial=0.0) for term, one in in_places.items()
+    }
     lengths = np.maximum(np.linalg.norm(white, axis=0), 1e-300), np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
     return ShownByPlan(
         noise=noise,
@@ -614,51 +607,55 @@ def _after_survey(shared: Array, known: np.ndarray, surveyed: np.ndarray, error:
 
 def _effects(wide: PlanModel, shown: Sequence[ShownByPlan]) -> tuple[PlannedEffect, ...]:
     """Each effect, averaged over draws and settings of its shapes."""
-    found = []
-    cosines = np.mean([np.abs(one.kinds[0].projected.units.T @ one.kinds[0].projected.units) for one in shown], axis=0)
-    kinds = [one.kinds[0] for one in shown]
-    prints = shown[0].fingerprints
-    best = [int(own[np.argmax(np.mean([kind.size[own] for kind in kinds], axis=0))]) for own in prints.columns]
-    for j, (one, own) in enumerate(zip(prints.candidates, prints.columns, strict=True)):
+    kinds, prints = [one.kinds[0] for one in shown], shown[0].fingerprints
+    cosines = np.mean([np.abs(kind.projected.units.T @ kind.projected.units) for kind in kinds], axis=0)
+    size = np.mean([kind.size for kind in kinds], axis=0)
+    best = [int(own[np.argmax(size[own])]) for own in prints.columns]
+
+    def effect(j: int) -> PlannedEffect:
+        one, own, column = prints.candidates[j], prints.columns[j], best[j]
         amplitude = one.amplitude
         length = np.array([kind.projected.length[own] for kind in kinds])
         threshold = np.array([part.thresholds[own] for part in shown])
 
-        def chance(size: float, length: Array = length, threshold: Array = threshold) -> Array:
-            gain = abs(size) ** amplitude.power  # noqa: B023
-            return detection_chance(gain * length, threshold, amplitude.only_sign).mean(axis=1)  # noqa: B023
+        def chances(size: float) -> Array:
+            """That a size is detected, of each draw."""
+            gain = abs(size) ** amplitude.power
+            return np.asarray(detection_chance(gain * length, threshold, amplitude.only_sign).mean(axis=1))
 
-        each = [_smallest(lambda size, d=d: float(chance(size)[d]), amplitude.furthest) for d in range(len(shown))]
-        size = np.array([kind.size[own] for kind in kinds])
+        def chance_at(draw: int, size: float) -> float:
+            return float(chances(size)[draw])
+
+        of_draws = [_smallest(partial(chance_at, d), amplitude.furthest) for d in range(len(shown))]
         others = [
-            Confusion(other.name, float(cosines[best[j], best[k]]))
+            Confusion(other.name, float(cosines[column, best[k]]))
             for k, other in enumerate(prints.candidates)
-            if k != j and cosines[best[j], best[k]] > SIMILAR_FROM
+            if k != j and cosines[column, best[k]] > SIMILAR_FROM
         ]
-        at_places = {term: float(np.mean([part.with_places[term][best[j]] for part in shown])) for term in
-                     shown[0].with_places}  # fmt: skip
-        nearest = max(at_places, key=lambda term: at_places[term], default="")
-        with_slopes = np.mean([part.with_slopes[best[j]] for part in shown], axis=0)
+        terms = {term: float(np.mean([part.with_places[term][column] for part in shown])) for term in
+                 shown[0].with_places}  # fmt: skip
+        nearest = max(terms, key=lambda term: terms[term], default="")
+        with_slopes = np.mean([part.with_slopes[column] for part in shown], axis=0)
         parameter = int(np.argmax(np.abs(with_slopes)))
-        found.append(
-            PlannedEffect(
-                name=one.name,
-                title=one.effect.title,
-                unit=amplitude.unit,
-                smallest=_smallest(lambda size: float(chance(size).mean()), amplitude.furthest),
-                best=min(each),
-                worst=max(each),
-                plausible=amplitude.scale,
-                furthest=amplitude.furthest,
-                chance_plausible=float(chance(min(amplitude.scale, amplitude.furthest)).mean()),
-                chance=float(chance_over_prior(size, threshold).mean()),
-                visibility=float(np.mean([part.visible[best[j]] for part in shown])),
-                confused=tuple(sorted(others, key=lambda other: -other.cosine)[:SIMILAR_SHOWN]),
-                place=Confusion(nearest, at_places[nearest]) if at_places.get(nearest, 0.0) > SIMILAR_FROM else None,
-                parameter=wide.model.names[parameter],
-                cosine=float(with_slopes[parameter]),
-            )
+        return PlannedEffect(
+            name=one.name,
+            title=one.effect.title,
+            unit=amplitude.unit,
+            smallest=_smallest(lambda size: float(chances(size).mean()), amplitude.furthest),
+            best=min(of_draws),
+            worst=max(of_draws),
+            plausible=amplitude.scale,
+            furthest=amplitude.furthest,
+            chance_plausible=float(chances(min(amplitude.scale, amplitude.furthest)).mean()),
+            chance=float(chance_over_prior(np.array([kind.size[own] for kind in kinds]), threshold).mean()),
+            visibility=float(np.mean([part.visible[column] for part in shown])),
+            confused=tuple(sorted(others, key=lambda other: -other.cosine)[:SIMILAR_SHOWN]),
+            place=Confusion(nearest, terms[nearest]) if terms.get(nearest, 0.0) > SIMILAR_FROM else None,
+            parameter=wide.model.names[parameter],
+            cosine=float(with_slopes[parameter]),
         )
+
+    found = [effect(j) for j in range(len(prints.candidates))]
     return tuple(sorted(found, key=lambda one: (-one.chance, one.name)))
 
 
@@ -748,9 +745,6 @@ def _parameters(case: Case, shown: Sequence[ShownByPlan]) -> tuple[PlannedParame
         )
         for j, (name, prior) in enumerate(case.parameters.items())
     )  # fmt: skip
-
-
-# --- what to add ------------------------------------------------------------------------------------------------------
 
 
 def _question(candidates: Sequence[Candidate], about: str, size: float | None, between: Sequence[str]) -> PlanQuestion:
@@ -889,7 +883,7 @@ class PlanSearch:
         """What could be added at once: each piece, and for each flow without measurements the places of the others."""
         pieces = self.wide.pieces
         free = [j for j in range(len(pieces)) if j not in chosen]
-        found = [(j,) for j in free]
+        found: list[tuple[int, ...]] = [(j,) for j in free]
         present = self.present | {pieces[j].experiment for j in chosen}
         known = self.wide.model.station.iloc[: self.wide.count]
         there = {round(float(x), 2) for x in known.loc[known["kind"] == STREAMWISE, "x"].unique()}

@@ -1,6 +1,6 @@
 """The page of a plan, to take along: the map, the order of the work, stations, and what they would show."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -134,9 +134,8 @@ def draw_plan_map(
 ) -> str:
     """SVG text: water and plants, where an object would be detected, and all stations; y stretched."""
     (west, east), (south, north) = case.grid.x, case.grid.y
-    water = np.stack(
-        [expected_depth(case, in_experiment(site, name), one) > 0.0 for name, one in case.experiments.items()]
-    ).any(axis=0)
+    depths = [expected_depth(case, in_experiment(site, name), one) for name, one in case.experiments.items()]
+    water = np.max(depths, axis=0) > 0.0
     wet = site.grid.y[water.any(axis=0)]
     if wet.size:
         south, north = max(south, float(wet[0]) - site.grid.dy), min(north, float(wet[-1]) + site.grid.dy)
@@ -144,7 +143,7 @@ def draw_plan_map(
     height = float(np.clip((north - south) / (east - west), FLATTEST, STEEPEST)) * inner
     along, across = linear_scale(west, east, BESIDE, MAP_WIDTH - 8.0), linear_scale(south, north, HEAD + height, HEAD)
 
-    def path(x: Sequence[float], y: Sequence[float]) -> str:
+    def path(x: Iterable[float], y: Iterable[float]) -> str:
         points = [f"{float(along(a)):.1f},{float(across(b)):.1f}" for a, b in zip(x, y, strict=True)]
         return f"M{'L'.join(points)}"
 
