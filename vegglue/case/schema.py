@@ -339,7 +339,7 @@ class PlannedHours(Part):
 
 
 class Planned(Part):
-    """Measurements that are planned, for `vegglue plan`; no other command uses them."""
+    """Measurements that are planned, for `vegglue plan`; `next` uses its errors and hours."""
 
     hours: Positive = Field(default=16.0, description="field work that is to be had, for what is proposed [h]")
     transects: tuple[PlannedTransect, ...] = Field(default=(), description="lines of verticals across the channel")

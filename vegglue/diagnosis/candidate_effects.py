@@ -14,6 +14,7 @@ import numpy as np
 
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import log_evidence
+from vegglue.calibration.detection import detected_length
 from vegglue.calibration.fit import objective
 from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.calibration.residual_screening import Screening
@@ -38,9 +39,8 @@ UNDETECTED_LENGTHS = (2.0, 3.0, 4.0)
 NOT_EXCLUDED_CHANCE = 0.9
 # Standard deviations of an effect's prior beyond which its size is not taken to be possible.
 LARGEST_POSSIBLE = 3.0
-# By how many standard errors a fingerprint must be longer than the threshold to be detected 19 times of 20: the 95 %
-# point of a standard normal score.
-POWER_QUANTILE = 1.645
+# Chance with which an effect of the smallest size is detected [-].
+DETECTED = 0.95
 # Standard deviations of its prior within which an effect must be detectable to be testable, and within its support.
 TESTABLE = 2.0
 
@@ -57,6 +57,7 @@ def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
         screening.base,
         screening.kinds[0],
     )
+    detected = float(detected_length(np.array(threshold), DETECTED))
     projected, prints = screening.projected, screening.fingerprints
     least_squares = objective(base.noise, base.fitted.point)
 
@@ -69,7 +70,7 @@ def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
         amplitude, gain = prints.amplitudes[column], float(kind.gain[column])
         reach = NORMAL95 * amplitude.plausible_gain / float(np.hypot(1.0, kind.size[column]))
         taken = float(screening.effects.scores[column] ** 2 * prior_shrinkage(kind.size[column]))
-        smallest = amplitude.size((threshold + POWER_QUANTILE) / max(float(projected.length[column]), 1e-300))
+        smallest = amplitude.size(detected / max(float(projected.length[column]), 1e-300))
         confounder, cosine = "", 0.0  # the parameter whose slope is most like the fingerprint
         if base.model.names:
             cosines = unit(screening.whitened_fingerprints[:, column]) @ unit(screening.whitened_slopes)

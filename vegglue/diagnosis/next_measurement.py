@@ -24,14 +24,12 @@ from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import Noise
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import in_experiment
-from vegglue.case.schema import Case
+from vegglue.case.schema import Case, Planned
 from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.observations import section_places, station_table
 from vegglue.wording.numbers import in_digits
 
-# Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
-HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0}
 # Places along the reach where a section is thought of, and how near to one that was measured it is that one, over the
 # distance between these places. Chosen, not measured.
 SECTIONS, AS_MEASURED = 12, 0.3
@@ -88,6 +86,8 @@ def worth_of_measurements(
     for kind in dict.fromkeys(kinds):
         there = errors[(kinds == kind) & np.isfinite(errors)]
         usual = np.median(there) if there.size else kind_of(str(kind)).usual_error
+        if wide.case.planned is not None:
+            usual = getattr(wide.case.planned.errors, str(kind), None) or usual
         errors[(kinds == kind) & ~np.isfinite(errors)] = usual
     covariance = np.diag(errors**2) + own_error @ own_error.T
     traces = responses(wide, point, changed) * np.array([gain for _, _, gain in every])
@@ -140,6 +140,7 @@ def _ideas(
     """Name, experiment, x, y, kind and hours of every measurement worth a thought; sections as those that were
     measured, as far as water reaches, none where no velocity was. model: with further experiments behind those at hand.
     """
+    costs = (model.case.planned or Planned()).costs
     usual, y = at_hand[-1], np.zeros(0)
     if not velocity.empty:  # where verticals stand in the section that has most of them
         counts = velocity.groupby("x")["y"].nunique()
@@ -154,20 +155,19 @@ def _ideas(
         at = f"the section at x = {round(x, 2):g} m"
         sections.append((f"{at} again ({usual})", usual, x, here, 0.0))
         others = [name for name in model.case.experiments if name not in at_hand]
-        sections += [(f"{at} {experiment}", experiment, x, here, HOURS["discharge"]) for experiment in others]
+        sections += [(f"{at} {experiment}", experiment, x, here, costs.discharge) for experiment in others]
     ideas = []
     for name, experiment, x, verticals, more in sections:  # verticals that the water covers, see `expected_depth`
         site, grid = in_experiment(model.site, experiment), model.site.grid
         depth = expected_depth(model.case, site, model.case.experiments[experiment])[np.abs(grid.x - x).argmin()]
         deep = depth[np.abs(grid.y[:, None] - verticals).argmin(axis=0)] > model.case.numerics.film_depth
         if (wet := verticals[deep]).size:
-            hours = HOURS["section"] + wet.size * HOURS["vertical"] + more
+            hours = costs.transect + wet.size * costs.vertical + more
             ideas.append((name, experiment, x, wet, STREAMWISE, hours))
     across = y if y.size else np.array(model.case.grid.y)
     middle = np.array([float(0.5 * (across[0] + across[-1]))])
     return ideas + [
-        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), middle, WATER_LEVEL, HOURS["gauge"])
-        for x in places[::2]
+        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), middle, WATER_LEVEL, costs.gauge) for x in places[::2]
     ]
 
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from vegglue.calibration.baseline import Baseline, baseline, for_prediction
 from vegglue.calibration.candidates import Candidate
+from vegglue.calibration.detection import detected_length
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
-from vegglue.diagnosis.candidate_effects import POWER_QUANTILE
+from vegglue.diagnosis.candidate_effects import DETECTED
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
 from vegglue.diagnosis.comparison import excluded_by
 from vegglue.diagnosis.next_measurement import Explanation, MeasurementWorth, worth_of_measurements
@@ -82,7 +83,8 @@ def next_measurement(
     run = case_run(case, runs, jobs, watch)
     case, wanted = run.case, run.config_hash
     found = diagnose(run)
-    kept = None if between else questions_that_fit(run.folder, wanted)
+    # Hours and errors that are planned are in no hash: with them questions are weighed again.
+    kept = None if between or case.planned is not None else questions_that_fit(run.folder, wanted)
     if kept is not None:
         return [*kept]
     by_name = [one.name for one in found.candidate_effects]
@@ -99,13 +101,18 @@ def next_measurement(
             run.watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
         # D^2 of an effect that passes the alarm over all effects 19 times of 20.
-        seen = (found.first_screening.threshold + POWER_QUANTILE) ** 2
+        seen = _detected_length(found) ** 2
         for (about, rivals), worth in zip(asked, worths, strict=True):
             answers = questions_about(about, rivals, worth)
             questions += [replace(one, seen_from=seen) if isinstance(about, HiddenEffect) else one for one in answers]
     if not between:
         write_questions(run.folder, questions, wanted)
     return questions
+
+
+def _detected_length(found: Diagnosis) -> float:
+    """Length of a trace that passes the alarm over all effects 19 times of 20 [standard errors]."""
+    return float(detected_length(np.array(found.first_screening.threshold), DETECTED))
 
 
 def with_places(base: Baseline, found: Diagnosis) -> Baseline:
@@ -173,8 +180,7 @@ def what_is_open(case: Case, found: Diagnosis) -> list[tuple[Subject, list[Expla
         """Length of the trace of a plausible amplitude before projection [standard errors]."""
         amplitude = candidate_named(case, found.predictions.station, one.name).effect.amplitude
         gain = amplitude.gain(amplitude.off + one.detectability.smallest)
-        length = found.first_screening.threshold + POWER_QUANTILE
-        return length * amplitude.plausible_gain / gain / max(one.detectability.visibility, 1e-6)
+        return _detected_length(found) * amplitude.plausible_gain / gain / max(one.detectability.visibility, 1e-6)
 
     # What calibration hides best, of all that would leave a trace without it.
     seen = found.verdict.significant_effects
