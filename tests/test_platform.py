@@ -9,6 +9,9 @@ import pytest
 from kills import WITH_ERRORS
 from reach import COARSE, write_reach
 
+from vegglue.case.config import load_case
+from vegglue.case.resolved_config import resolved_yaml
+from vegglue.errors import shell_line, shown_path
 from vegglue.parallel import no_ctrl_c_for_children
 
 # Hides what Windows lacks; the fast tests pass there, too (docs/platforms.md).
@@ -42,3 +45,27 @@ def test_processes_start_without_signal_masks(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.delattr("signal.pthread_sigmask")
     with no_ctrl_c_for_children():
         assert os.environ["PYTHONSAFEPATH"] == "1"
+
+
+@pytest.fixture
+def two_drives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A path on another drive than the folder it is seen from, for which Windows has no relative path."""
+
+    def no_path(*_: object) -> str:
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr("os.path.relpath", no_path)
+
+
+def test_files_on_another_drive_are_named_in_full(tmp_path: Path, two_drives: None) -> None:
+    write_reach(tmp_path)
+    case = load_case(tmp_path / "brook.yaml")
+    assert shown_path(case.source) == str(case.source)
+    assert str(tmp_path / "velocities.csv") in resolved_yaml(case)
+
+
+def test_commands_to_be_copied_are_quoted_as_the_shell_wants(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ["vegglue", "diagnose", "my site.yaml"]
+    assert shell_line(words) == "vegglue diagnose 'my site.yaml'"
+    monkeypatch.setattr(sys, "platform", "win32")
+    assert shell_line([*words, r"runs\brook.yaml"]) == r'vegglue diagnose "my site.yaml" runs\brook.yaml'

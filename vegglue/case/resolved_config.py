@@ -7,7 +7,6 @@ content, was made or edited by hand.
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 from vegglue.case.safe_yaml import yaml_of
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError, path_from, shown_path
 
 # Keys that a finished ensemble does not depend on, as pydantic wants those to leave out.
 NOT_SIMULATED = dict.fromkeys(
@@ -46,7 +45,7 @@ Tree = dict[str, Any]
 
 def resolved_yaml(case: Case) -> str:
     """The case as one file without `extends`; data files are named relative to the file it was read from."""
-    return as_yaml(plain_tree(dumped(case), lambda file: Path(os.path.relpath(file, case.source.parent)).as_posix()))
+    return as_yaml(plain_tree(dumped(case), lambda file: path_from(case.source.parent, file)))
 
 
 def as_yaml(tree: Tree) -> str:

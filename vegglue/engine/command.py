@@ -329,7 +329,9 @@ def command_runs(case: Case, folder: Path) -> CommandRuns:
             "out of the config."
         )
     words = settings.words(sys.executable)
-    from_here = os.sep in words[0] and not os.path.isabs(words[0])  # but it is started in a folder of its own
+    from_here = ("/" in words[0] or os.sep in words[0]) and not os.path.isabs(
+        words[0]
+    )  # but it is started in a folder of its own
     if from_here or shutil.which(words[0]) is None:
         raise InputError(
             f"{shown_path(case.source)}: `engine.command` expected a program that can be run, got {words[0]!r}; "

@@ -8,7 +8,6 @@ experiments (discharge_m3_s, downstream_level_m), and, if needed, frame and grid
 """
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +22,7 @@ from vegglue.case.resolved_config import Tree
 from vegglue.case.site_schema import Frame
 from vegglue.case.text_files import case_name, told_apart
 from vegglue.case.zones import BANK_SLOPE
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError, path_from, shown_path
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
     MODEL_ERROR_OF_FLUME,
@@ -239,7 +238,7 @@ def case_from_sheet(folder: Path, target: Path, config: Path) -> FolderCase:
     place = Placement(case.frame, centreline_in(case))
     measured = measured_files(folder, target, site, place, (), level)
     tree: Tree = {
-        "extends": Path(os.path.relpath(config.resolve(), target.resolve().parent)).as_posix(),
+        "extends": path_from(target.resolve().parent, config.resolve()),
         "name": case_name(target.stem),
         "observations": measured.observations,
         "imported": measured.imported,

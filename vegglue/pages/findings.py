@@ -1,11 +1,11 @@
 """What a run states beside its verdict, as values; those that limit the use of the result come first."""
 
-import shlex
 from dataclasses import dataclass
 
 import numpy as np
 
 from vegglue.case.channel_geometry import discharges_upstream_of
+from vegglue.errors import shell_line
 from vegglue.flow.status import FAILED, STATUS_WORDS, members_with
 from vegglue.inference.command_ensemble import doubts_of_predictions
 from vegglue.inference.statements import (
@@ -144,7 +144,7 @@ def findings(run: Run) -> list[tuple[object, bool]]:
     for _, row in observations.table[~observations.table["used"]].iterrows():
         found.append((StationNotUsed(str(row["experiment"]), row["x"], row["y"], str(row["reason"])), False))
     if run.excluded_since:
-        found.append((ReadingsExcludedSince(run.excluded_since, shlex.quote(case.source.name)), True))
+        found.append((ReadingsExcludedSince(run.excluded_since, shell_line([case.source.name])), True))
     for (experiment, section), rules in observations.discharge.items():
         x, measured = section_place(observations.table, experiment, section), rules["profile"]
         given = discharges_upstream_of(case, case.experiments[experiment], x)

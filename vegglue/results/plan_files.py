@@ -4,7 +4,6 @@
 
 import csv
 import io
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from vegglue.case.grid import centreline_in, on_map
 from vegglue.case.safe_yaml import yaml_of
 from vegglue.case.schema import Case, Planned
 from vegglue.case.text_files import write_text
-from vegglue.errors import InputError
+from vegglue.errors import InputError, path_from
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL
 from vegglue.results.plan import FieldPlan, PlannedPiece, Work
 from vegglue.whole_files import MAKE_ROOM
@@ -175,7 +174,7 @@ def sheets(folder: Path, case: Case, plan: FieldPlan) -> dict[str, str]:
         if rows:
             found[of.file] = _table(["experiment", "section", "x", "y", of.column, of.error_column], rows)
             files[of.file] = {"coordinates": "channel"}
-    named = Path(os.path.relpath(case.source, folder.resolve())).as_posix()
+    named = path_from(folder.resolve(), case.source)
     text = yaml_of({OF_CASE: named, "files": files})
     return {**found, "site.yaml": f"# Fill in the tables beside this file; rows left empty count for nothing.\n{text}"}
 

@@ -2,7 +2,6 @@
 
 import base64
 import json
-import os
 import re
 import zlib
 from collections.abc import Sequence
@@ -20,7 +19,7 @@ from vegglue.case.resolved_config import as_yaml, case_hash, write_made
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, case_name, read_text
 from vegglue.effects.grammar import LAWS
-from vegglue.errors import InputError, shown_command, shown_path
+from vegglue.errors import InputError, path_from, shown_command, shown_path
 from vegglue.measurements.kinds import KINDS, kind_of
 from vegglue.parallel import one_thread
 from vegglue.results.diagnosis import Diagnosis
@@ -65,7 +64,7 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
         used = used.assign(x=used["x"].where(~at_point, x), y=used["y"].where(~at_point, y))
     kinds = [kind for kind in KINDS.values() if (used["kind"] == kind.name).any()]
     tree = {
-        "extends": Path(os.path.relpath(case.source, folder.resolve())).as_posix(),
+        "extends": path_from(folder.resolve(), case.source),
         "name": name,
         "title": f"Twin of {case.name}, something may be hidden (synthetic)",
         "observations": [{"kind": kind.name, "file": kind.file, "synthetic": True} for kind in kinds],
