@@ -9,6 +9,7 @@ from contextlib import redirect_stdout
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -95,6 +96,7 @@ from vegglue.results.plan import (
 from vegglue.results.verdict import (
     ChiSquare,
     CommandCompared,
+    Conclusion,
     CorrelatedErrors,
     EffectsExcluded,
     EffectsNotExcluded,
@@ -168,6 +170,10 @@ VERDICTS: dict[str, Diagnosis] = {
     "a field": brook(kind="none-of-these", effects=(), field=EVERY_KIND.field),
     "a law": brook(kind="none-of-these", effects=(), laws=candidate_laws_of("law_bank_speed_step")),
     "perhaps a law": doubt(laws=candidate_laws_of("law_bank_speed_step")),
+    "a law and a doubt": doubt(UncertainBetweenSections(1.5), laws=candidate_laws_of("law_bank_speed_step")),
+    "an instrument and perhaps a law": brook(
+        kind="instrument", effects=(), instruments=(an_instrument(),), laws=candidate_laws_of("law_bank_speed_step"),
+    ),
     "nothing": replace(NOTHING, name="brook"),
     "an instrument": brook(kind="instrument", effects=(), instruments=(an_instrument(),), clears_the_model=True),
     "an instrument and a doubt": brook(
@@ -347,6 +353,10 @@ def test_a_verdict_is_short_and_a_command_is_whole() -> None:
         lines = verdict_lines(found, COMMAND, 13)
         assert len(lines) <= 13, name
         assert max(map(len, lines)) <= TERMINAL_WIDTH, name
+
+
+def test_each_conclusion_is_among_the_examples() -> None:
+    assert {found.verdict.conclusion for found in VERDICTS.values()} == set(get_args(Conclusion))
 
 
 if __name__ == "__main__":

@@ -424,6 +424,25 @@ Note = (
 )
 
 
+Conclusion = Literal[
+    "measurements_to_correct",
+    "law_beside_instrument",
+    "law_in_doubt",
+    "law",
+    "law_possible",
+    "field",
+    "several_possible",
+    "too_many_possible",
+    "named",
+    "best_explanation",
+    "instrument",
+    "nothing_missing",
+    "misfit_unexplained",
+    "few_testable",
+    "silence_in_doubt",
+]
+
+
 @dataclass(frozen=True)
 class Verdict:
     """The verdict: its kind, what was found, and why no more is known.
@@ -485,6 +504,41 @@ class Verdict:
     def doubts_the_data(self) -> bool:
         """Whether the measurements have to be corrected before anything is known of the model."""
         return any(isinstance(one, get_args(OfTheData)) for one in self.reasons)
+
+    @property
+    def carries_other_discharges(self) -> bool:
+        """Whether what is wrong with the measurements is the discharge that sections carry."""
+        return bool(self.reasons) and isinstance(self.reasons[0], DischargeMismatch)
+
+    @property
+    def conclusion(self) -> Conclusion:
+        """What the first sentence states; each conclusion has a template of its own."""
+        reason = self.reasons[0] if self.reasons else None
+        if self.doubts_the_data:
+            return "measurements_to_correct"
+        if self.laws is not None:
+            if self.kind == "instrument":
+                return "law_beside_instrument"
+            if reason is not None:
+                return "law_in_doubt"
+            return "law" if self.kind == "none-of-these" else "law_possible"
+        if self.field is not None:
+            return "field"
+        if self.undecided:
+            return "several_possible"
+        if isinstance(reason, TooManyGroups):
+            return "too_many_possible"
+        if self.kind in ("identified", "one-of", "none-of-these"):
+            return "named"
+        if self.places or self.effects:
+            return "best_explanation"
+        if self.instruments:
+            return "instrument"
+        if self.kind == "nothing-missing":
+            return "nothing_missing"
+        if isinstance(reason, MisfitUnexplained):
+            return "misfit_unexplained"
+        return "few_testable" if isinstance(reason, FewTestable) else "silence_in_doubt"
 
     @property
     def tells_laws(self) -> bool:
