@@ -1,8 +1,6 @@
 # Two commands do all the set-up: `make demo` runs the main job, `make test` passes the tests.
 PYTHON ?= python3
 JOBS ?= -1
-# What the demo's one page shows, the best thing first.
-DEMO_CONFIGS := runs/demo/willows.yaml configs/d3a_refined.yaml configs/d3a.yaml
 # How long the fuzzer runs, and how many kills the faults are tried with.
 MINUTES ?= 60
 KILLS ?= 208
@@ -23,7 +21,7 @@ export OMP_NUM_THREADS := 1
 # Where Python may keep no bytecode, every process compiles all libraries anew: 8 s of a core for each of the tests' own.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo paper checked test check house bench blind laws faults confluence fuzz clean simulate infer report setup
+.PHONY: help demo paper checked test check release house bench blind laws faults confluence fuzz clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
@@ -38,19 +36,7 @@ $(TESTABLE): $(READY)
 	touch $@
 
 demo: $(READY)  # the loop on a site with a hidden effect, then the paper's D3a, to finished reports
-	@echo "1 of 3: round the loop, on a channel with willows in which something is hidden"
-	@mkdir -p runs/demo/measured && cp -R data/open_cases/open-b/. runs/demo/measured/willows
-	$(VEGGLUE) import runs/demo/measured/willows --to runs/demo/willows.yaml --quiet
-	$(VEGGLUE) run runs/demo/willows.yaml --jobs $(JOBS) --runs runs/demo
-	@$(VEGGLUE) overview runs/demo/willows.yaml --runs runs/demo --quiet
-	@echo "2 of 3: the paper's D3a with all members, weighed as printed and refined; make paper runs the other cases"
-	@for case in d3a d3a_refined; do \
-	  $(VEGGLUE) simulate configs/$$case.yaml --jobs $(JOBS) --runs runs/demo && \
-	  $(VEGGLUE) infer configs/$$case.yaml --runs runs/demo && \
-	  $(VEGGLUE) report configs/$$case.yaml --runs runs/demo || exit $$?; \
-	done
-	@echo "3 of 3: everything on one page"
-	$(VEGGLUE) overview $(DEMO_CONFIGS) --runs runs/demo
+	$(VEGGLUE) demo runs/demo --jobs $(JOBS)
 
 paper: report  # the paper's cases with all 5,000 members
 simulate: $(CASES:%=runs/%/ensemble.h5)  # ensembles that are out of date
@@ -75,6 +61,10 @@ test: checked  # everything that must pass
 
 check: checked  # the fast part
 	$(PYTEST) -m 'not slow'
+
+release: $(TESTABLE)  # wheel and sdist in dist: built twice with the same bytes, checked, not uploaded
+	$(INSTALL) '.[release]'
+	$(BIN)/python tests/release.py
 
 house: $(TESTABLE)  # counts of files, lines, helpers and words, for a reader
 	@$(BIN)/python tests/house.py

@@ -13,9 +13,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "vegglue"
-# Calls and keywords whose texts are entries of a registry: effects, schemas, options, constants.
+# Calls and keywords whose texts are entries of a registry: effects, laws, schemas, options, constants.
 REGISTERED = {
-    "Effect", "Amplitude", "Shape", "Quantity", "Term", "Kind", "Constant", "Field", "Option", "Argument",
+    "Effect", "_at_place", "_unlisted", "Amplitude", "Shape", "LawTerm", "LawQuantity", "LawForm", "Kind", "_constant",
+    "Field", "Option", "Argument",
     "description", "help", "source", "meaning", "title", "provenance",
 }  # fmt: skip
 FILES = sorted(PACKAGE.rglob("*.py"))

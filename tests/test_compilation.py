@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from house import FILES, PACKAGE
 
-from vegglue.compilation import SHARED, _of_loops, _stamp
+from vegglue.compilation import SHARED, _stamp, shapes_loops
 
 CHEZY = """
 from vegglue.effects.plant_laws import baptist_chezy
@@ -75,13 +75,13 @@ def test_without_a_folder_to_write_to_loops_are_compiled_each_time_and_it_is_sai
 
 def test_loops_use_nothing_of_the_package_but_loops_and_shared_constants() -> None:
     """What else a loop took from another file would be frozen in its cache."""
-    for path in filter(_of_loops, FILES):
+    for path in filter(shapes_loops, FILES):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         foreign = {
             alias.asname or alias.name
             for node in tree.body
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("vegglue.")
-            and not _of_loops(PACKAGE.parent / f"{node.module.replace('.', '/')}.py")
+            and not shapes_loops(PACKAGE.parent / f"{node.module.replace('.', '/')}.py")
             for alias in node.names
         }  # fmt: skip
         loops = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.decorator_list]

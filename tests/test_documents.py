@@ -122,7 +122,7 @@ def table_of_options() -> dict[str, set[str]]:
     found = {}
     for command, *marks, own in rows[: next(i for i, row in enumerate(rows) if row[0] == "exit code")]:
         marked = {option for option, mark in zip(shared, marks, strict=True) if mark == "x"}
-        found[command.strip("`")] = marked | set(re.findall(r"--[a-z]+", own))
+        found[command.strip("`")] = marked | set(re.findall(r"--[a-z-]+", own))
     return found
 
 

@@ -13,7 +13,7 @@ MODULES = [path for path in FILES if path.name != "__init__.py"]
 AT_HOME_EVERYWHERE = {"numpy", "scipy"}
 # Folders or files where each library may be imported. A new home is a decision: say it here.
 HOMES = {
-    "h5py": {"results"},
+    "h5py": {"importers", "results"},
     "jinja2": {"wording"},
     "joblib": {"parallel"},
     "matplotlib": {"pages"},
@@ -35,6 +35,7 @@ HOMES_OF_EXTRAS = {
     "distributed": {"cluster"},
     "mhkit": {"importers"},
     "openpyxl": {"importers"},
+    "pyproj": {"results"},
     "shapefile": {"importers"},
     "tifffile": {"importers", "results"},
     "xarray": {"results", "workflow"},

@@ -74,6 +74,18 @@ def test_whatever_is_no_python_is_declared_as_data() -> None:
     assert [path for path in others if not any(path.match(pattern) for pattern in patterns)] == []
 
 
+def test_the_demonstration_has_the_files_of_the_checkout() -> None:
+    """They stand twice: an installed package has neither `configs` nor `data`."""
+    shipped = PACKAGE / "workflow" / "demo_files"
+    origin = {"measured": ROOT / "data" / "open_cases", "configs": ROOT / "configs", "data": ROOT / "data"}
+    files = [path.relative_to(shipped) for path in shipped.rglob("*") if path.is_file()]
+    assert len(files) == 10
+    for path in files:
+        first, *rest = path.parts
+        there = origin[first].joinpath(*("open-b" if name == "willows" else name for name in rest))
+        assert (shipped / path).read_bytes() == there.read_bytes(), path
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built("wheel", tmp_path_factory.mktemp("wheel"))

@@ -6,12 +6,14 @@ import threading
 from pathlib import Path
 
 import pytest
+from systems import POSIX_ALONE
 
 from vegglue import whole_files
 from vegglue.errors import StorageError
 from vegglue.whole_files import MAKE_ROOM, folder_within, write_file
 
 
+@POSIX_ALONE
 @pytest.mark.parametrize("name", ["result.h5", "result.h5.new"])
 @pytest.mark.parametrize("link", [os.symlink, os.link], ids=["soft", "hard"])
 def test_a_link_in_a_received_folder_is_replaced_and_not_followed(tmp_path: Path, name: str, link) -> None:
@@ -80,6 +82,7 @@ def test_a_name_that_is_taken_by_a_folder_or_too_long_is_told(tmp_path: Path) ->
             write_file(tmp_path / name, b"new", MAKE_ROOM)
 
 
+@POSIX_ALONE
 def test_a_folder_that_is_a_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
     thesis, run = tmp_path / "thesis", tmp_path / "run"
     thesis.mkdir()

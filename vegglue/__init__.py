@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from vegglue.case.config import load_case
     from vegglue.cluster import on_cluster
     from vegglue.errors import InputError, StorageError
+    from vegglue.progress import progress_lines
     from vegglue.workflow.check import check
     from vegglue.workflow.compare import compare
+    from vegglue.workflow.demo import demo
     from vegglue.workflow.diagnose import diagnose
     from vegglue.workflow.discover import discover
     from vegglue.workflow.export import export
@@ -28,15 +30,16 @@ if TYPE_CHECKING:
     from vegglue.workflow.load import load
     from vegglue.workflow.new import new
     from vegglue.workflow.next_measurement import next_measurement
+    from vegglue.workflow.plan import plan
     from vegglue.workflow.report import overview, report
     from vegglue.workflow.run import run
     from vegglue.workflow.simulate import simulate
     from vegglue.workflow.twin import make_twin, reveal
 
 __all__ = [
-    "InputError", "StorageError", "__version__", "check", "compare", "diagnose", "discover", "export", "extend",
+    "InputError", "StorageError", "__version__", "check", "compare", "demo", "diagnose", "discover", "export", "extend",
     "extend_stepwise", "import_folder", "infer", "load", "load_case", "make_twin", "new", "next_measurement",
-    "on_cluster", "overview", "report", "reveal", "run", "simulate",
+    "on_cluster", "overview", "plan", "progress_lines", "report", "reveal", "run", "simulate",
 ]  # fmt: skip
 
 __version__ = version.VERSION
@@ -49,6 +52,7 @@ _ELSEWHERE = {
     "extend_stepwise": "workflow.extend",
     "make_twin": "workflow.twin",
     "overview": "workflow.report",
+    "progress_lines": "progress",
     "reveal": "workflow.twin",
 }
 

@@ -30,10 +30,15 @@ def _cached(loop: Callable[..., Any], **flags: Any) -> Any:
     """The loop, its machine code kept between runs where there is a folder for it."""
     flags |= {"nogil": True, "error_model": "numpy"}
     try:
-        return _fresh(njit(cache=True, **flags)(loop))
+        kept = njit(cache=True, **flags)(loop)
     except RuntimeError:  # numba found no folder that it can write to: a read-only install without a home
         _say_uncached()
         return njit(**flags)(loop)
+    # The cache is stale as soon as any file that the loop is made of changes: numba looks at the file of the loop only.
+    index: Any = getattr(getattr(kept, "_cache", None), "_cache_file", None)
+    if hasattr(index, "_source_stamp"):  # documented nowhere: a numba without it caches as it always does
+        index._source_stamp = (index._source_stamp, _stamp(Path(loop.__code__.co_filename)))
+    return kept
 
 
 @cache
@@ -45,14 +50,6 @@ def _say_uncached() -> None:
             "set NUMBA_CACHE_DIR to one that can.",
             file=sys.stderr,
         )
-
-
-def _fresh(loop: Any) -> Any:
-    """The loop, its cache stale as soon as any file it is made of changes: numba looks at the file of the loop only."""
-    index: Any = getattr(getattr(loop, "_cache", None), "_cache_file", None)
-    if hasattr(index, "_source_stamp"):  # documented nowhere: a numba without it caches as it always does
-        index._source_stamp = (index._source_stamp, _stamp(Path(loop.py_func.__code__.co_filename)))
-    return loop
 
 
 def is_kept(loop: Any) -> bool:
@@ -69,9 +66,10 @@ def _stamp(file: Path) -> str:
         return ""
     text = file.read_text(encoding="utf-8")
     names = re.findall(r"^from vegglue\.([\w.]+) import", text, re.MULTILINE)
-    below = [file for name in names if _of_loops(file := Path(__file__).parent / f"{name.replace('.', '/')}.py")]
-    return sha256("".join([text, *map(_stamp, below)]).encode()).hexdigest()
+    files = [Path(__file__).parent / f"{name.replace('.', '/')}.py" for name in names]
+    return sha256("".join([text, *map(_stamp, filter(shapes_loops, files))]).encode()).hexdigest()
 
 
-def _of_loops(file: Path) -> bool:
+def shapes_loops(file: Path) -> bool:
+    """Whether a file holds compiled loops, or constants and flags of loops."""
     return file.name in SHARED or (file.is_file() and "compilation import compiled" in file.read_text(encoding="utf-8"))

@@ -3,6 +3,8 @@
 import os
 import re
 import shlex
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 # Signs that end a line or steer a terminal; files of strangers may hold them, and sentences quote files.
@@ -14,7 +16,7 @@ def _in_one_line(sentence: str) -> str:
 
 
 class InputError(ValueError):
-    """Something handed in is wrong: says where, what was expected, what came, and what to do."""
+    """Something handed in is wrong: where, what was expected, what came, and what to do."""
 
     def __str__(self) -> str:
         return _in_one_line(super().__str__())
@@ -30,11 +32,31 @@ class StorageError(OSError):
 
 
 def shown_path(path: Path) -> str:
-    """The path as sentences name it: relative to where the user stands."""
-    return os.path.relpath(path)
+    """The path as sentences name it: relative to where the user stands; as it is on another drive of Windows."""
+    try:
+        return os.path.relpath(path)
+    except ValueError:
+        return str(path)
+
+
+def path_from(folder: Path, path: Path) -> str:
+    """The path as a file in the folder names it, with slashes; in full on another drive of Windows."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return Path(path).absolute().as_posix()
+
+
+def shell_line(words: Sequence[str]) -> str:
+    """Words as one line that can be copied into a shell: Windows quotes otherwise, and has backslashes in paths."""
+    if sys.platform == "win32":
+        from subprocess import list2cmdline
+
+        return list2cmdline(words)
+    return shlex.join(words)
 
 
 def shown_command(verb: str, config: Path | None, *options: str) -> str:
-    """`vegglue VERB CONFIG` as sentences name it, to be copied; CONFIG where nobody knows which."""
+    """`vegglue VERB CONFIG` as sentences name it, to be copied; CONFIG if it is not known."""
     named = "CONFIG" if config is None else shown_path(config)
-    return f"`{shlex.join(['vegglue', verb, named, *options])}`"
+    return f"`{shell_line(['vegglue', verb, named, *options])}`"

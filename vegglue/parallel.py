@@ -182,7 +182,7 @@ def in_threads(
 def submit(work: Callable[..., Any], *task: Any) -> Callable[[], Any]:
     """Start work(*task) in a thread that `at_most` can spare; calling what is returned waits for the result.
 
-    Without a spare thread the work is done when the result is asked for.
+    Without a spare thread the work is done when the result is needed.
     """
     spare = _SPARE.get()
     if spare is None or not spare.acquire(blocking=False):

@@ -121,7 +121,7 @@ def serve() -> None:
         try:
             why = getattr(import_module(module), function)(os.fsdecode(bytes.fromhex(path))) or ""
         except MemoryError:
-            why = "it asks for more memory than it can fill"
+            why = "it needs more memory than it can fill"
         except Exception as error:  # whatever the library raises
             why = str(error) or type(error).__name__
         os.write(sys.stdout.fileno(), " ".join(why.split()).encode(errors="replace")[:LONGEST_ANSWER] + b"\n")

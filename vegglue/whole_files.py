@@ -17,7 +17,7 @@ MAKE_ROOM = "make room and run it again"
 NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
 # Flags of POSIX; Windows opens neither links nor pipes by accident.
 NOT_FOLLOWED = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-LOCKED_BYTE = 1 << 40  # [bytes] from the beginning: beyond what is written, as Windows lets nobody write a locked byte
+LOCKED_BYTE = 1 << 40  # [bytes] from the beginning: beyond what is written, as Windows writes no locked byte
 
 
 def lock(handle: int, shared: bool = False) -> None:
@@ -85,7 +85,7 @@ def write_file(path: Path, content: bytes, advice: str) -> None:
 
 @contextmanager
 def failed_writes_told(path: Path, advice: str) -> Iterator[None]:
-    """Turn a failed write into one sentence that ends with the advice; h5py tells some of them as RuntimeError."""
+    """Turn a failed write into one sentence that ends with the advice; h5py raises some of them as RuntimeError."""
     try:
         yield
     except StorageError:

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 from small_case import SMALL, changed, write
+from systems import POSIX_ALONE
 
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash, write_made
@@ -137,6 +138,7 @@ def test_a_folder_and_bytes_that_are_no_text_stay(texts: Texts, tmp_path: Path) 
         write_made(texts, ADVICE)
 
 
+@POSIX_ALONE
 @pytest.mark.parametrize("force", [False, True])
 def test_what_is_no_file_is_neither_read_nor_replaced(tmp_path: Path, force: bool) -> None:
     """Reading a pipe would wait for ever; a link that leads nowhere was made by somebody."""

@@ -17,7 +17,9 @@ NAMES = [name for group in COMMANDS.values() for name in group if name not in BA
 # One call of each command in a folder with a brook, in an order in which each finds what it needs; MODE keeps what two
 # passes write apart.
 CALLS: tuple[tuple[str, ...], ...] = (
+    ("demo", "tour", "--short", "--jobs", "1"),
     ("new", "beck-MODE"),
+    ("plan", "brook.yaml", "--jobs", "1"),
     ("import", "mill", "--to", "mill-MODE.yaml"),
     ("check", "brook.yaml"),
     ("simulate", "brook.yaml", "--jobs", "1"),

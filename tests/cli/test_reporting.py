@@ -6,8 +6,8 @@ import sys
 import pytest
 from rich.console import Console
 
-from vegglue.cli.reporting import moving_line, now_and_then, pace_in_words, progress_reporter
-from vegglue.progress import Progress, Watch, counted
+from vegglue.cli.reporting import moving_line, progress_reporter
+from vegglue.progress import Progress, Watch, counted, now_and_then, pace_in_words
 
 
 def at_seconds() -> tuple[list[str], Watch, list[float]]:

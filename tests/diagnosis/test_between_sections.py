@@ -5,17 +5,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 import pytest
-from linear_baseline import CASE_OF_TWINS, at_best, stations_of
+from linear_baseline import CASE_OF_TWINS, at_best, linear_engine, stations_of
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.noise import with_model_error
-from vegglue.diagnosis.errors_elsewhere import acts_elsewhere, halfway, largest_error_between
-from vegglue.engine.interface import Model, Point
+from vegglue.case.schema import ModelError
+from vegglue.diagnosis.held_out import acts_elsewhere, halfway, largest_error_between
+from vegglue.engine.interface import Point
 
 pytestmark = pytest.mark.slow
 
-SECTIONS, POINTS, PARAMETERS, COLUMNS, ERROR = ("A",), 12, 3, 5, 0.01
+SECTIONS, POINTS, PARAMETERS, ERROR = ("A",), 12, 3, 0.01
+# One column of the model's error for each experiment: what predictions answer to its discharge.
+COLUMNS = len(CASE_OF_TWINS.experiments)
+CASE = CASE_OF_TWINS.model_copy(update={"model_error": ModelError(discharge=1.0)})
 STATION = stations_of(CASE_OF_TWINS, SECTIONS, POINTS)
 
 
@@ -39,7 +43,8 @@ def calibrated(one: Linear, truth: Array, random: np.random.Generator) -> Baseli
     """A model calibrated to measurements of a truth (2 station,), with the errors that it is allowed."""
     count = len(STATION)
     measured = truth[:count] + ERROR * random.standard_normal(count)
-    base = at_best(CASE_OF_TWINS, STATION, measured, one.slope[:count])
+    whole = linear_engine(lambda model: (np.zeros(len(model.station)), one.slope[: len(model.station)]), one.columns)
+    base = at_best(CASE, STATION, measured, one.slope[:count], whole)
     noise = with_model_error(base.noise, one.columns[:count])
     white, value = noise.whiten(one.slope[:count]), noise.whiten(measured)
     z = np.linalg.solve(white.T @ white + np.eye(PARAMETERS), white.T @ value)
@@ -47,34 +52,25 @@ def calibrated(one: Linear, truth: Array, random: np.random.Generator) -> Baseli
     return replace(base, noise=noise, fitted=replace(base.fitted, point=point))
 
 
-def told_and_true(one: Linear, seed: int, patched: pytest.MonkeyPatch) -> tuple[float, float]:
+def told_and_true(one: Linear, seed: int) -> tuple[float, float]:
     random = np.random.default_rng((seed, 2))
     truth = one.slope @ random.standard_normal(PARAMETERS) + one.columns @ random.standard_normal(COLUMNS)
     base = calibrated(one, truth, random)
-
-    def linearised(model: Model, z: Array, _: Point) -> Point:
-        assert len(model.station) == 2 * len(STATION)
-        return Point(z, one.slope @ z, one.slope, {})
-
-    patched.setattr("vegglue.diagnosis.errors_elsewhere.linearise", linearised)
-    patched.setattr("vegglue.diagnosis.errors_elsewhere.model_error_columns", lambda *_: one.columns)
     error = (truth - one.slope @ base.fitted.point.z)[len(STATION) :]
     return largest_error_between(base), float(np.sqrt(1.0 + np.mean(error**2) / ERROR**2))
 
 
 @pytest.mark.parametrize("error_of_model", [0.0, 0.01, 0.03])
-def test_of_a_hundred_models_some_five_err_by_more_than_is_told(
-    error_of_model: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_a_hundred_models_some_five_err_by_more_than_is_told(error_of_model: float) -> None:
     one = linear(1, error_of_model)
-    pairs = [told_and_true(one, seed, monkeypatch) for seed in range(200)]
+    pairs = [told_and_true(one, seed) for seed in range(200)]
     beyond = sum(true > told for told, true in pairs)
     assert 3 <= beyond <= 20  # of 200, 10 are meant: 99 % of binomial draws
 
 
-def test_a_model_that_is_known_does_not_err(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_that_is_known_does_not_err() -> None:
     one = Linear(np.zeros((2 * len(STATION), PARAMETERS)), np.zeros((2 * len(STATION), COLUMNS)))
-    assert told_and_true(one, 1, monkeypatch)[0] == pytest.approx(1.0)
+    assert told_and_true(one, 1)[0] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("kind", ["speed", "velocity_across"])
@@ -83,9 +79,9 @@ def test_velocities_of_other_directions_are_judged_where_none_is_along_the_chann
 ) -> None:
     """Speeds of a propeller know no direction: nothing was told of what the model may miss between their sections."""
     one = linear(1, 0.03)
-    along, _ = told_and_true(one, 3, monkeypatch)
+    along, _ = told_and_true(one, 3)
     monkeypatch.setattr(f"{__name__}.STATION", STATION.assign(kind=kind))
-    other, _ = told_and_true(one, 3, monkeypatch)
+    other, _ = told_and_true(one, 3)
     assert other == pytest.approx(along)
 
 
@@ -115,24 +111,18 @@ def test_a_section_that_lies_a_little_off_in_another_experiment_is_no_next_one()
 
 
 @pytest.mark.parametrize(("there", "told"), [(0.29, False), (0.31, True), (-0.31, True)])
-def test_what_acts_mostly_where_nobody_measured_is_told(
-    there: float, told: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_acts_mostly_where_nobody_measured_is_told(there: float, told: bool) -> None:
     """Three times as much there as at the stations, of either sign, at one place halfway."""
     count = len(STATION)
-    before = at_best(CASE_OF_TWINS, STATION, np.zeros(count), np.zeros((count, PARAMETERS)))
-    changed = np.full(count, 0.02)
-    changed[3] = 0.1
-    moved = Point(before.fitted.point.z, before.fitted.point.prediction + changed, before.fitted.point.slope, {})
-    after = replace(before, fitted=replace(before.fitted, point=moved))
-    behind = np.full(count, 0.05)
-    behind[5] = there
-    answers = iter([np.zeros(count), behind])
-
-    def predicted(model: Model, points: list[Point], z: Array) -> Array:
-        return next(answers)[None]
-
-    monkeypatch.setattr("vegglue.diagnosis.errors_elsewhere.predict", predicted)
+    changed, behind = np.full(count, 0.02), np.full(count, 0.05)
+    changed[3], behind[5] = 0.1, there
+    slope = np.zeros((count, PARAMETERS))
+    before, moved = (
+        at_best(CASE_OF_TWINS, STATION, np.zeros(count), slope, linear_engine(lambda _, a=a: (a, slope)))
+        for a in (np.zeros(count), behind)
+    )
+    point = replace(moved.fitted.point, prediction=changed)
+    after = replace(moved, fitted=replace(moved.fitted, point=point))
     why = acts_elsewhere(before, after)
     assert (why is not None) == told
     if why is not None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.stats
-from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
+from linear_baseline import CASE_OF_TWINS, at_best, linear_engine, measured_linearly, stations_of
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel, search_model
@@ -32,14 +32,11 @@ def responses() -> CellResponses:
     return CellResponses(GRID, of)
 
 
-@pytest.fixture(autouse=True)
-def known_responses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vegglue.diagnosis.field_scan.cell_responses", lambda *_: responses())
-
-
 def searched(missing: Array | float = 0.0) -> SearchModel:
     slope, values = measured_linearly(SECTIONS, POINTS, PARAMETERS)
-    return search_model(at_best(CASE_OF_TWINS, stations_of(CASE_OF_TWINS, SECTIONS, POINTS), values + missing, slope))
+    engine = linear_engine(lambda _: (np.zeros(COUNT), slope), of_cells=responses().of)
+    station = stations_of(CASE_OF_TWINS, SECTIONS, POINTS)
+    return search_model(at_best(CASE_OF_TWINS, station, values + missing, slope, engine))
 
 
 def smooth_field() -> Array:

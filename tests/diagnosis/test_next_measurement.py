@@ -10,9 +10,12 @@ import pytest
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import in_experiment
-from vegglue.diagnosis.next_measurement import HIGHER, HOURS, LEVEL_POWER, planned, with_other_discharges
+from vegglue.case.schema import Planned, PlannedHours
+from vegglue.diagnosis.next_measurement import HIGHER, LEVEL_POWER, planned, with_other_discharges
 from vegglue.engine.interface import Model
 from vegglue.workflow.case_run import CaseRun
+
+HOURS = PlannedHours()
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +31,7 @@ def test_a_section_again_costs_its_own_verticals(model: Model) -> None:
     again = {plan.name.split("(")[0]: plan for plan in plans if "again" in plan.name}
     assert len(again) == few.loc[few["section"] != "", "section"].nunique()
     for plan in again.values():
-        assert plan.hours == pytest.approx(HOURS["section"] + len(plan.stations) * HOURS["vertical"])
+        assert plan.hours == pytest.approx(HOURS.transect + len(plan.stations) * HOURS.vertical)
     assert len({plan.hours for plan in again.values()}) > 1
 
 
@@ -115,7 +118,7 @@ def test_no_vertical_is_planned_where_a_lower_discharge_leaves_it_dry(model: Mod
         at = abs(grid.x - plan.x).argmin(), [abs(grid.y - y).argmin() for y in plan.stations["y"]]
         assert (depth[at] > 0).all()
         assert 0 < len(plan.stations) <= len(full.stations)
-        assert plan.hours == pytest.approx(full.hours - HOURS["vertical"] * (len(full.rows) - len(plan.rows)))
+        assert plan.hours == pytest.approx(full.hours - HOURS.vertical * (len(full.rows) - len(plan.rows)))
     assert sum(len(plan.rows) for plan in lower) < sum(len(full.rows) for full in higher)
 
 
@@ -125,3 +128,11 @@ def test_sections_of_one_experiment_are_two_however_near(model: Model) -> None:
     both = pd.concat([station, beside], ignore_index=True)
     before, after = (planned(replace(model, station=one), model.case)[1] for one in (station, both))
     assert sum("again" in plan.name for plan in after) == sum("again" in plan.name for plan in before) + 1
+
+
+def test_hours_are_those_of_the_config(model: Model) -> None:
+    case = model.case.model_copy(update={"planned": Planned(costs=PlannedHours(gauge=2.0, discharge=9.0))})
+    usual, changed = (planned(replace(model, case=one), one)[1] for one in (model.case, case))
+    more = {before.name: after.hours - before.hours for before, after in zip(usual, changed, strict=True)}
+    assert {round(hours, 9) for name, hours in more.items() if "gauge" in name} == {1.5}
+    assert {round(hours, 9) for name, hours in more.items() if "gauge" not in name} == {0.0}

@@ -2,24 +2,23 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 import scipy.stats
-from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
+from linear_baseline import CASE_OF_TWINS, at_best, linear_engine, measured_linearly, stations_of
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import log_evidence
+from vegglue.calibration.baseline import log_evidence, search_model
 from vegglue.calibration.candidates import Candidate, with_effect
 from vegglue.calibration.fit import covariance
 from vegglue.case.parameter_space import theta_at, z_of
-from vegglue.diagnosis import refits
 from vegglue.diagnosis.competition import Hypothesis, chances_of, tempering
-from vegglue.diagnosis.refits import RefitTrial
+from vegglue.diagnosis.refits import RefitTrial, pruned, refits_of
 from vegglue.diagnosis.search_state import rivals_among
 from vegglue.effects.library import library
+from vegglue.engine.interface import Model, Point, Wanted, always
+from vegglue.progress import silent
 
 Kept = tuple[dict[str, float], tuple[tuple[str, ...], ...]]
 
@@ -65,9 +64,7 @@ def test_of_less_than_all_chances_the_set_holds_its_share_of_what_effects_have()
 
 @pytest.mark.parametrize(("errors_away", "dropped"), [(0.5, True), (1.5, True), (3.0, False), (8.0, False)])
 @pytest.mark.parametrize("name", ["edge_mixing", "discharge_error"])
-def test_what_the_data_no_longer_need_is_dropped(
-    name: str, errors_away: float, dropped: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_the_data_no_longer_need_is_dropped(name: str, errors_away: float, dropped: bool) -> None:
     """Also where it has one sign only: its prior ends at off, so that it seemed to be far from there always."""
     effect = library(None)[name]
     one = Candidate(effect, experiments=("low",) if effect.name == "discharge_error" else ())
@@ -79,11 +76,13 @@ def test_what_the_data_no_longer_need_is_dropped(
     slope = np.zeros((len(station), z.size))
     # So much of the gain is one error of the data: with residuals of zero they want what there is.
     slope[0, -1] = 0.01 * errors_away / gain * (after - before) / (2.0 * step)
-    base = at_best(case, station, slope @ z, slope)
+    engine = linear_engine(lambda model: (np.zeros(len(station)), slope[:, : len(model.names)]))
+    base = at_best(case, station, slope @ z, slope, engine)
     point = replace(base.fitted.point, z=z, prediction=slope @ z)
     fitted = replace(base.fitted, point=point, covariance=covariance(base.noise, point))
-    monkeypatch.setattr(refits, "without_effect", lambda base, _: base)
-    assert refits.pruned(replace(base, fitted=fitted), [one.name], lambda *_: None)[1] == [one.name] * dropped
+    left, names = pruned(replace(base, fitted=fitted), [one.name], silent)
+    assert names == [one.name] * dropped
+    assert (one.key in left.model.case.effects) != dropped
 
 
 def test_chances_are_those_of_the_evidence_where_little_is_explained() -> None:
@@ -137,18 +136,27 @@ def test_a_parameter_that_explains_nothing_is_charged() -> None:
     assert found[1] - found[0] == pytest.approx(-0.5 * np.log1p(length)), "Occam's factor"
 
 
-def test_a_later_start_has_to_promise_more_than_the_best_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    ends = {0.0: 9.0, 1.0: None, 2.0: 4.0, 3.0: 7.0}
-    asked = list[float]()
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
+def test_of_all_starts_the_best_end_counts(order: tuple[int, ...]) -> None:
+    """One starts where no flow is found, one where predictions are off, one beyond amplitudes of 1."""
+    station, one = stations_of(CASE_OF_TWINS, ("A",), 4), Candidate(library(None)["viscosity"])
+    count, parameters = len(station), len(CASE_OF_TWINS.parameters)
+    slope = 0.01 * np.random.default_rng(3).standard_normal((count, parameters + 1))
+    values = np.full(count, 0.4)
 
-    def refitted(search: Any, trial: RefitTrial, start: Array, enough: float) -> Any:
-        asked.append(enough)
-        objective = ends[float(start[0])]
-        return None if objective is None else SimpleNamespace(objective=objective)
+    def linearised(model: Model, z: Array, _: Point | None = None, wanted: Wanted = always) -> Point | None:
+        amplitude = z[-1] if z.size > parameters else 0.0
+        prediction = values + 0.03 * (amplitude < 1.0) + slope[:, : z.size] @ z
+        return Point(z, prediction, slope[:, : z.size], {}) if amplitude > -1.0 and wanted(prediction) else None
 
-    monkeypatch.setattr(refits, "_refitted", refitted)
-    trial = RefitTrial(Candidate(library(None)["edge_mixing"]), {}, tuple(np.full(1, start) for start in ends))
-    best = refits._best_of_starts(None, trial)  # type: ignore[arg-type]
-    assert best is not None
-    assert best.objective == 4.0
-    assert asked == [np.inf, *(one - refits.WORTH_FOLLOWING for one in (9.0, 9.0, 4.0))]
+    engine = replace(linear_engine(lambda _: None), linearise=linearised)
+    base = at_best(CASE_OF_TWINS, station, values, slope[:, :parameters], engine)
+    found = linearised(base.model, np.zeros(parameters))
+    assert found is not None
+    starts = tuple(np.append(np.zeros(parameters), (-8.0, 0.5, 1.5)[k]) for k in order)
+    search = search_model(replace(base, fitted=replace(base.fitted, point=found)))
+    (refit,) = refits_of(search, [RefitTrial(one, {}, starts)])
+    assert refit is not None
+    assert refit.fitted.point.z[-1] > 1.0
+    (none,) = refits_of(search, [RefitTrial(one, {}, starts[:0])])
+    assert none is None

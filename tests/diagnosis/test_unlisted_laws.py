@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnoses import IMPLAUSIBLE, an_anomaly, candidate_laws_of
+from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
 from vegglue.case.config import load_case
 from vegglue.decision_constants import constants
@@ -25,26 +26,22 @@ CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 NAMES = ("law_bank_speed_step", "law_bank_speed_ramp", "law_floor_along_trend")
 
 
-def suspected(
-    patched: pytest.MonkeyPatch, found: SearchState, p: float = 1e-3, rivals: tuple[float, ...] = (0.0,)
-) -> CandidateLaws | None:
-    """What is said of three laws of ln evidence 9, 7 and 1, with this alarm, beside kinds of these ln evidences."""
+def suspected(found: SearchState, p: float = 1e-3, rivals: tuple[float, ...] = (0.0,)) -> CandidateLaws | None:
+    """What is reported of three laws of ln evidence 9, 7 and 1, with this alarm, beside kinds of these ln evidences."""
     laws = [SimpleNamespace(law=LAWS[name], candidate=SimpleNamespace(amplitude=LAWS[name].effect.amplitude))
             for name in NAMES]  # fmt: skip
-    screening = SimpleNamespace(
+    screening: Any = SimpleNamespace(
         p=p, of_each=np.array([9.0, 7.0, 1.0]), laws=laws, settings=[{"reference": 0.4}] * 2 + [{}],
         best_column=lambda law: law, gain=lambda law: -0.5,
     )  # fmt: skip
-    patched.setattr(candidate_effects, "law_fingerprints", lambda *_: SimpleNamespace(laws=laws))
-    patched.setattr(candidate_effects, "screen_laws", lambda *_: screening)
-    kinds = tuple(SimpleNamespace(total=one) for one in rivals)
-    base = SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None)))
-    last: Any = SimpleNamespace(base=base, flagged=(), fingerprints=None, kinds=kinds)
-    return candidate_laws(last, last, found, partial(laws_beside, last))
+    slope, values = measured_linearly(("A",), 4, 2)
+    base = at_best(CASE_OF_TWINS, stations_of(CASE_OF_TWINS, ("A",), 4), values, slope)
+    last: Any = SimpleNamespace(base=base, kinds=tuple(SimpleNamespace(total=one) for one in rivals))
+    return candidate_laws(last, last, found, lambda: screening)
 
 
-def test_laws_are_told_that_hold_their_chance_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    laws = suspected(monkeypatch, SearchState())
+def test_laws_are_told_that_hold_their_chance_together() -> None:
+    laws = suspected(SearchState())
     assert laws is not None
     assert [one.name for one in laws.laws] == list(NAMES[:2])
     assert laws.chance > 0.95
@@ -60,33 +57,29 @@ def test_where_no_law_has_anything_to_act_on_none_is_told(monkeypatch: pytest.Mo
     assert candidate_laws(last, last, SearchState(), partial(laws_beside, last)) is None
 
 
-def test_laws_compete_with_what_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    laws = suspected(monkeypatch, SearchState(), rivals=(0.0, 20.0))
+def test_laws_compete_with_what_is_listed() -> None:
+    laws = suspected(SearchState(), rivals=(0.0, 20.0))
     assert laws is not None
     assert laws.chance < 0.1
     assert not clearly_a_law(laws)
 
 
-def test_their_alarm_keeps_its_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert suspected(monkeypatch, SearchState(), p=constants().law_alarm_rate) is None
-    assert suspected(monkeypatch, SearchState(implausible=(IMPLAUSIBLE,))) is None
+def test_their_alarm_keeps_its_rate() -> None:
+    assert suspected(SearchState(), p=constants().law_alarm_rate) is None
+    assert suspected(SearchState(implausible=(IMPLAUSIBLE,))) is None
 
 
-def test_beside_a_listed_effect_a_law_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(candidate_effects, "log_evidence", lambda _: 0.0)
+def test_beside_a_listed_effect_a_law_has_to_explain_clearly_more() -> None:
     step = Step("wind", ("wind",), (1.0,), (("wind",),), 200.0, 5.0, 1e-4)
-    assert suspected(monkeypatch, SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, 8.0),))) is None
-    assert suspected(monkeypatch, SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, 1.0),))) is not None
+    assert suspected(SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, 8.0),))) is None
+    assert suspected(SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, 1.0),))) is not None
 
 
-def test_a_place_is_compared_with_laws_by_what_it_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_place_is_compared_with_laws_by_what_it_explained() -> None:
     """To explain more than laws it has to have gained more evidence."""
-    monkeypatch.setattr(candidate_effects, "log_evidence", lambda _: 0.0)
     chances = []
     for gained in (1.0, 30.0):
-        laws = suspected(
-            monkeypatch, SearchState(places=(an_anomaly(),), prior_weights=(PriorWeight("any", 0.0, gained),))
-        )
+        laws = suspected(SearchState(places=(an_anomaly(),), prior_weights=(PriorWeight("any", 0.0, gained),)))
         assert laws is not None
         chances.append(laws.chance)
     assert chances[0] > 0.9 > 0.1 > chances[1]

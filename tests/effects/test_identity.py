@@ -14,6 +14,8 @@ TEXTS = {
     "discharge_error[high]": EffectIdentity("discharge_error", ("high",)),
     "discharge_error[low,mid]": EffectIdentity("discharge_error", ("low", "mid")),
     "probe_gain[km 12.5, left]": EffectIdentity("probe_gain", ("km 12.5", " left")),
+    'probe_gain["A, left",B]': EffectIdentity("probe_gain", ("A, left", "B")),
+    'probe_gain["the ""old"" bridge, left"]': EffectIdentity("probe_gain", ('the "old" bridge, left',)),
     "device_gain[adv [2]]": EffectIdentity("device_gain", ("adv [2]",)),
     "patch_density[p5]": EffectIdentity("patch_density", ("p5",)),
     "unlisted_bed[x47.29,y-0.23]": EffectIdentity.at_place("unlisted_bed", 47.29, -0.23),

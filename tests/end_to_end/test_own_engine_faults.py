@@ -65,7 +65,7 @@ def test_members_that_fail_are_counted_with_their_reason(tmp_path: Path) -> None
     high = ensemble.parameters["phi"] > 10
     assert 0 < high.sum() < MEMBERS
     np.testing.assert_array_equal(ensemble.status, np.where(high, FAILED, RUN_BY_COMMAND))
-    assert set(ensemble.reason[high].astype(str)) == {"the command ended with exit code 1, and said: dry"}
+    assert set(ensemble.reason[high].astype(str)) == {"the command ended with exit code 1, its last line: dry"}
     assert np.isnan(ensemble.prediction[high]).all()
     assert np.isfinite(ensemble.prediction[~high]).all()
     posterior = vegglue.infer(case, ensemble, runs=tmp_path / "runs", method="glue")
@@ -84,7 +84,7 @@ def test_where_all_fail_it_is_said_why(
     assert (
         "brook.yaml: the command of `engine` failed at the medians of the priors: the command ended with exit" in said
     )
-    assert "and said: no licence; its files lie in runs/brook/engine." in said
+    assert "its last line: no licence; its files lie in runs/brook/engine." in said
     done = shell(tmp_path, "simulate", "brook.yaml", "--trust", succeed=False)
     assert "8 members, run by the command, 8 failed; 8 of them: the command ended with exit code 1" in done.stdout
     assert done.returncode == 2

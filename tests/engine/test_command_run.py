@@ -14,8 +14,8 @@ from commands import commanded
 
 from vegglue.engine import command
 from vegglue.engine.command import (
-    BadPredictionsError,
     CommandEnd,
+    FailedRunError,
     parameters_text,
     read_predictions,
     run_command_once,
@@ -73,7 +73,7 @@ def test_a_run_that_ends_badly_has_a_reason(tmp_path: Path, program: str, facts:
 )
 def test_bad_predictions_are_refused_by_row(tmp_path: Path, content: bytes, facts: str) -> None:
     (tmp_path / "predictions.csv").write_bytes(content)
-    with pytest.raises(BadPredictionsError) as refused:
+    with pytest.raises(FailedRunError) as refused:
         read_predictions(tmp_path / "predictions.csv", 2)
     assert all(fact in str(refused.value) for fact in facts.split("|")), refused.value
 

@@ -1,6 +1,7 @@
 """What files mark as no measurement is none: marks of every format, rows of summaries, flags, zeros, and copies."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -14,6 +15,7 @@ from instrument_files import flowtracker, pd0, winriver
 from reach import here
 
 import vegglue
+from vegglue.case.bed import read_points, read_raster
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.gaugings import read_flowtracker2, read_gauging
@@ -423,3 +425,30 @@ def test_a_floor_of_seven_cells_comes_to_a_verdict(tmp_path: Path) -> None:
     table = "\n".join(["section,x [m],y [m],u [m/s]", *rows])
     case = vegglue.import_folder(folder_of(tmp_path / "brook", site, v__csv=table), tmp_path / "brook.yaml")
     vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1)
+
+
+RDB = """# U.S. Geological Survey
+#  agency_cd  code
+agency_cd\tsite_no\tdatetime\ttz_cd\t1_00060\t1_00060_cd
+5s\t15s\t20d\t6s\t14n\t10s
+USGS\t01\t2020-01-01 00:00\tEST\t10.0\tP
+USGS\t01\t2020-01-01 00:15\tEST\t{mark}\tP
+USGS\t01\t2020-01-01 00:30\tEST\t12.0\tP
+"""
+
+
+@pytest.mark.parametrize("mark", ["Ice", "Eqp", "***", "-999999", "Bkw", ""])
+def test_a_table_of_a_gauging_office_has_a_row_of_types_and_words_for_no_value(tmp_path: Path, mark: str) -> None:
+    path = tmp_path / "gauge.txt"
+    path.write_text(RDB.format(mark=mark), encoding="utf-8")
+    options = FileOptions(columns={"discharge": "1_00060"}, units={"discharge": "cfs"}, x=3.0)
+    values = read_rows(path, replace(options, x=None)).numbers["discharge"] / 0.3048**3
+    assert values == pytest.approx([10.0, np.nan, 12.0], nan_ok=True)
+
+
+def test_exponents_of_fortran_are_levels_of_a_bed(tmp_path: Path) -> None:
+    grid, points = tmp_path / "bed.asc", tmp_path / "bed.csv"
+    grid.write_text("ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1.0D-01 0.2D+00\n3.d-1 0.4\n", "utf-8")
+    points.write_text("x,y,z\n0,0,1.0D-01\n1,0,2D-1\n0,1,0.3\n", encoding="utf-8")
+    assert read_raster(grid).values.tolist() == [[0.3, 0.1], [0.4, 0.2]]
+    assert read_points(points)[:, 2].tolist() == [0.1, 0.2, 0.3]

@@ -12,7 +12,7 @@ from reach import COARSE
 
 import vegglue
 from vegglue.case.config import load_case
-from vegglue.engine.command import not_predicted
+from vegglue.engine.command import FailedRunError, refuse_marks
 from vegglue.errors import InputError
 from vegglue.flow.status import FAILED, RUN_BY_COMMAND
 from vegglue.inference.command_ensemble import (
@@ -37,6 +37,15 @@ STATION = pd.DataFrame({
 })  # fmt: skip
 
 
+def predicted(prediction: np.ndarray, station: pd.DataFrame) -> bool:
+    """Whether these are predictions, and no marks."""
+    try:
+        refuse_marks(prediction, station)
+    except FailedRunError:
+        return False
+    return True
+
+
 @pytest.mark.parametrize(
     ("station", "value", "refused"),
     [
@@ -48,21 +57,21 @@ STATION = pd.DataFrame({
 def test_a_mark_or_a_zero_at_a_measured_flow_is_no_prediction(station: int, value: float, refused: bool) -> None:
     prediction = U.copy()
     prediction[station] = value
-    assert bool(not_predicted(prediction, STATION)) == refused
+    assert predicted(prediction, STATION) != refused
 
 
 def test_a_mark_that_was_measured_is_a_value() -> None:
     """A level of 99.9 m beside one of 99.87 m, a discharge of 999 m3/s."""
     station = STATION.assign(kind=["level", "level", "discharge", "discharge"], value=[99.87, 99.8, 1010.0, 30.0])
-    assert not not_predicted(np.array([99.9, 99.0, 999.0, 29.0]), station.assign(value=[99.87, 99.8, 998.0, 30.0]))
-    assert not_predicted(np.array([99.9, 99.0, -999.0, 29.0]), station)
+    assert predicted(np.array([99.9, 99.0, 999.0, 29.0]), station.assign(value=[99.87, 99.8, 998.0, 30.0]))
+    assert not predicted(np.array([99.9, 99.0, -999.0, 29.0]), station)
 
 
 def test_a_straight_flow_has_no_velocity_across_and_an_unused_station_may_be_dry() -> None:
     across = STATION.assign(kind=["velocity", "velocity_across", "velocity", "level"])
-    assert not not_predicted(np.array([0.4, 0.0, 0.02, 0.9]), across)
-    assert not not_predicted(np.array([0.4, 0.0, 0.02, 0.9]), STATION.assign(used=[True, False, True, True]))
-    assert not_predicted(np.zeros(4), STATION.assign(value=0.01)), "all of them: a run that failed"
+    assert predicted(np.array([0.4, 0.0, 0.02, 0.9]), across)
+    assert predicted(np.array([0.4, 0.0, 0.02, 0.9]), STATION.assign(used=[True, False, True, True]))
+    assert not predicted(np.zeros(4), STATION.assign(value=0.01)), "all of them: a run that failed"
 
 
 def an_ensemble(predict: Callable[[np.ndarray, np.ndarray], np.ndarray], failed: float = 2.0) -> Ensemble:

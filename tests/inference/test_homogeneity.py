@@ -106,9 +106,7 @@ def test_a_bed_that_changes_between_experiments_is_noticed(tmp_path: Path, rough
     assert again.chi2[0] == pytest.approx(free.chi2[0], rel=0.1, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    ("apart", "outcome"), [(0.0, "one-value"), (0.028, "hardly-one-value"), (0.06, "differs")]
-)
+@pytest.mark.parametrize(("apart", "outcome"), [(0.0, "one-value"), (0.028, "hardly-one-value"), (0.06, "differs")])
 def test_what_is_stated_of_experiments(refined: Posterior, apart: float, outcome: str) -> None:
     value, error = np.array([0.05, 0.05 + apart]), np.array([0.01, 0.008])
     chi2, freedom, p = equal_values_test(value, error)

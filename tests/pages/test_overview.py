@@ -1,5 +1,6 @@
 """One page of several runs: each ladder once, parameters of one prior side by side, nothing claimed of a first look."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,3 +87,36 @@ def test_nothing_of_it_runs_off_the_page(runs: list[Run], tmp_path: Path, width:
     seen = "(page, document) => [document.scrollingElement.scrollWidth, page.innerWidth]"
     needed, there = found_in_page(page, width, seen)
     assert needed <= there == width
+
+
+@pytest.mark.slow  # a browser is started
+@pytest.mark.parametrize("width", [360, 1200])
+def test_three_clicks_lead_through_the_loop(runs: list[Run], tmp_path: Path, width: int) -> None:
+    page = write_overview(tmp_path / "overview.html", runs)
+    shown = """(page, document) => {
+      const parts = [".step-before", ".answer .verdict", ".halves", "path.before", "path.after"];
+      const seen = () => parts.map((one) => {
+        const there = document.querySelector(`.tour ${one}`);
+        return there.getClientRects().length > 0 && page.getComputedStyle(there).display !== "none";
+      });
+      const found = {};
+      for (const step of ["all", "before", "missing", "after"]) {
+        const label = document.querySelector(`.tour label[for$=tour-${step}]`);
+        label.click();
+        found[step] = [...seen(), label.getBoundingClientRect().height >= 40];
+      }
+      return found;
+    }"""
+    assert found_in_page(page, width, shown) == {
+        "all": [False, True, True, True, True, True],
+        "before": [True, False, False, True, False, True],
+        "missing": [False, True, False, True, True, True],
+        "after": [False, False, True, False, True, True],
+    }
+
+
+def test_a_page_needs_nothing_from_outside_its_folder(runs: list[Run], tmp_path: Path) -> None:
+    """It is read from a stick or a telephone: links are relative, and nothing is loaded."""
+    page = render_overview(tmp_path, runs)
+    assert not re.findall(r'(?:src|href|action)="(?:[a-z]+:|/)(?!/doi)', page)
+    assert not re.findall(r"@import|url\((?!#)", page)

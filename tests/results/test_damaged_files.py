@@ -62,7 +62,7 @@ def test_damaged_members_of_an_unfinished_run_are_solved_again(path: Path, name:
         start, each = file[name].id.get_offset(), file[name].nbytes // len(file[name])
     flip(part, start + each, 7)  # of member or chunk 1
     with ensemble_writer(path, header) as writer:
-        assert writer.set_aside is None
+        assert writer.moved_to is None
         assert writer.done == {0, 1}
         writer.reopen_damaged(CHUNKS_OF_MEMBERS)
         assert writer.done == {0}
@@ -132,11 +132,11 @@ def test_what_leads_out_of_a_received_file_is_neither_read_nor_filled(path: Path
         read_ensemble(path, HASH)
     path.unlink()
     with ensemble_writer(path, a_header()) as writer:
-        assert writer.set_aside is not None
+        assert writer.moved_to is not None
         assert writer.done == set()
         for chunk in ALL:
             append(writer, chunk)
-    writer.set_aside.unlink()
+    writer.moved_to.unlink()
     assert_whole(path, a_header())
     assert victim.read_bytes() == kept
 

@@ -162,8 +162,8 @@ def test_rows_whose_fields_are_lost_are_solved_again(path: Path, damage: Callabl
     damage(path.with_name("fields.part"))
     with ensemble_writer(path, HEADER) as writer:
         assert writer.done == set()
-        assert writer.set_aside == path.with_name("ensemble.h5.part.old")
-        writer.set_aside.unlink()
+        assert writer.moved_to == path.with_name("ensemble.h5.part.old")
+        writer.moved_to.unlink()
         for chunk in ALL:
             append(writer, chunk)
     assert_whole(path, HEADER)

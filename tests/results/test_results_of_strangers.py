@@ -223,10 +223,10 @@ def test_a_part_that_is_read_in_circles_is_set_aside(tmp_path: Path, monkeypatch
     path.write_bytes(endless(path))
     path.rename(part_file(path))
     with ensemble_writer(path, a_header()) as writer:
-        assert writer.set_aside is not None
+        assert writer.moved_to is not None
         for chunk in ALL:
             append(writer, chunk)
-    writer.set_aside.unlink()
+    writer.moved_to.unlink()
     assert_whole(path, a_header())
 
 
@@ -242,8 +242,8 @@ def test_a_part_with_other_contents_is_gone_on_with_or_set_aside(
         writer.reopen_damaged([np.sort(np.arange(chunk, 12, 3)) for chunk in sorted(ALL)])
         for chunk in ALL - writer.done:
             append(writer, chunk)
-    if writer.set_aside is not None:
-        writer.set_aside.unlink()
+    if writer.moved_to is not None:
+        writer.moved_to.unlink()
     assert_whole(path, a_header())
 
 

@@ -88,7 +88,7 @@ def test_members_survive_a_kill_while_appending(path: Path, header: Header, dela
         process.send_signal(signal.SIGKILL)
         process.wait()
     with ensemble_writer(path, header) as writer:
-        assert writer.set_aside is None
+        assert writer.moved_to is None
         assert 1 in writer.done
         for chunk in ALL - writer.done:
             append(writer, chunk)
@@ -103,7 +103,7 @@ OTHER_PARAMETERS = {"z_last": np.ones(MEMBERS), "a_first": np.ones(MEMBERS)}
     [
         {"config_hash": "e" * 64},
         {"seed": 6},
-        {"version": "0.2.0"},
+        {"version": "0.1.0"},
         {"chunks": 4},
         {"cut": "otherwise"},
         {"parameters": OTHER_PARAMETERS},
@@ -113,8 +113,8 @@ def test_unfinished_run_of_another_config_is_set_aside(path: Path, changes: dict
     write_chunks(path, {1}, a_header())
     with ensemble_writer(path, a_header(**changes)) as writer:
         assert writer.done == set()
-        assert writer.set_aside is not None
-        with h5py.File(writer.set_aside) as old:
+        assert writer.moved_to is not None
+        with h5py.File(writer.moved_to) as old:
             assert old["progress/finished"][:].tolist() == [0, 1, 0]
 
 
@@ -123,7 +123,7 @@ def test_broken_part_file_is_set_aside(path: Path) -> None:
     part(path).write_bytes(part(path).read_bytes()[:700])
     with ensemble_writer(path, a_header()) as writer:
         assert writer.done == set()
-        assert writer.set_aside == path.with_name("ensemble.h5.part.old")
+        assert writer.moved_to == path.with_name("ensemble.h5.part.old")
 
 
 def test_rows_that_do_not_match_the_file_are_refused(path: Path) -> None:

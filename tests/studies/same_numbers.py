@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 CONFIGS = ("d0", "d3a", "d3a_refined", "d3b", "d3b_paper")
 MEMBERS = "256"
 # What tells of the build, the machine or the hour, and not of the case.
-OF_THE_BUILD = ("version", "hash", "seconds", "created", "config", "path", "picture", "file", "source")
+OF_THE_BUILD = ("version", "hash", "digest", "seconds", "created", "config", "path", "picture", "file", "source")
 # Results are computed in the same order in both builds; printing and reading back costs the last digits.
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-9, 1e-12
 

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from diagnoses import NOTHING, a_diagnosis
 from model_scores import a_model_score
+from posteriors import a_posterior
 from reach import write_reach
 from stored import ALL, a_header, write_chunks
 
@@ -18,6 +19,7 @@ from vegglue.cli.printed import show_ladder
 from vegglue.diagnosis.comparison import MEASUREMENT
 from vegglue.flow.status import FAILED
 from vegglue.measurements.kinds import errors_in_short
+from vegglue.results.model_comparison import ComparedModel, ModelComparison
 from vegglue.results.open_questions import HiddenEffect, ProposedMeasurement, Question, RivalEffects
 from vegglue.results.result_files import read_ensemble
 from vegglue.wording.numbers import (
@@ -114,6 +116,32 @@ def test_a_question_names_its_best_measurements() -> None:
     for other in ((replace(best, then=2.1),), (replace(best, now=9.0, then=9.1),), ()):
         assert Question(about, other).useful == ()
         assert len(repr(Question(about, other)).splitlines()) == 1
+
+
+MARKUP = "<script>alert(1)</script>"
+
+
+def shown_in_a_notebook(folder: Path) -> list[object]:
+    write_chunks(folder / "ensemble.h5", ALL, a_header())
+    posterior, step = (
+        a_posterior(canopy=False),
+        ComparedModel(MARKUP, "a.yaml", "", (), 4, 0.02, 0.03, float("nan"), 0.04, 0.01),
+    )
+    scores = Comparison((a_model_score(MARKUP),), pd.DataFrame(columns=MEASUREMENT))
+    odd = replace(posterior, sample=replace(posterior.sample, unit=dict.fromkeys(posterior.parameters, MARKUP)))
+    ensemble = replace(read_ensemble(folder / "ensemble.h5"), version=MARKUP)
+    return [ensemble, odd, replace(a_diagnosis(), name=MARKUP), ModelComparison((step,), 0, ""), scores]
+
+
+def test_a_notebook_shows_values_short_escaped_and_without_scripts(tmp_path: Path) -> None:
+    for value in shown_in_a_notebook(tmp_path):
+        page = value._repr_html_()  # type: ignore[attr-defined]
+        assert "<script" not in page, type(value)
+        assert "&lt;script&gt;" in page, type(value)
+        assert len(page) < 4 * MOST_LETTERS, type(value)
+        assert not re.search(r"[\x00-\x1f]", page)
+        open_tags, closed = re.findall(r"<([a-z]+)>", page), re.findall(r"</([a-z]+)>", page)
+        assert sorted(open_tags) == sorted(closed)
 
 
 @pytest.mark.parametrize(("now", "answered"), [(12.0, False), (26.0, True)])

@@ -9,6 +9,7 @@ from contextlib import redirect_stdout
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -32,6 +33,7 @@ from vegglue.cli.printed import (
     posterior_lines,
     show_diagnosis,
     show_ladder,
+    show_plan,
     show_questions,
     verdict_lines,
 )
@@ -79,11 +81,24 @@ from vegglue.pages.parameters import PosteriorVerdict, ResidualCompared
 from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.open_questions import HiddenEffect, OneOfRivals, ProposedMeasurement, Question, RivalEffects
+from vegglue.results.plan import (
+    Confusion,
+    EffectsInGeneral,
+    FieldPlan,
+    OneEffect,
+    PlannedEffect,
+    PlannedParameter,
+    PlannedPiece,
+    ProposedPieces,
+    TwoEffects,
+    Work,
+)
 from vegglue.results.verdict import (
     AmplitudeBeyondPlausible,
     BedCorrected,
     ChiSquare,
     CommandCompared,
+    Conclusion,
     CorrelatedErrors,
     EffectsExcluded,
     EffectsNotExcluded,
@@ -157,6 +172,10 @@ VERDICTS: dict[str, Diagnosis] = {
     "a field": brook(kind="none-of-these", effects=(), field=EVERY_KIND.field),
     "a law": brook(kind="none-of-these", effects=(), laws=candidate_laws_of("law_bank_speed_step")),
     "perhaps a law": doubt(laws=candidate_laws_of("law_bank_speed_step")),
+    "a law and a doubt": doubt(UncertainBetweenSections(1.5), laws=candidate_laws_of("law_bank_speed_step")),
+    "an instrument and perhaps a law": brook(
+        kind="instrument", effects=(), instruments=(an_instrument(),), laws=candidate_laws_of("law_bank_speed_step"),
+    ),
     "nothing": replace(NOTHING, name="brook"),
     "an instrument": brook(kind="instrument", effects=(), instruments=(an_instrument(),), clears_the_model=True),
     "an instrument and a doubt": brook(
@@ -279,6 +298,33 @@ def posterior() -> str:
     return "\n".join([*lines, "", wrapped([*posterior_statements(found), *posterior_statements(refined)])])
 
 
+def plan() -> str:
+    def effect(name: str, smallest: float, chance: float, *similar: str) -> PlannedEffect:
+        others = tuple(Confusion(other, 0.95) for other in similar)
+        sizes = smallest, 0.5 * smallest, 2.0 * smallest, 0.5, 2.0
+        return PlannedEffect(name, "", "-", *sizes, chance, chance, 0.9, others, None, "n_b", 0.3)
+
+    transect = PlannedPiece(Work.TRANSECT, "low", 46.0, (-0.5, 0.0, 0.5), 1.4)
+    gauge = PlannedPiece(Work.GAUGE, "low", 10.0, (0.0,), 0.5)
+    line = PlannedPiece(Work.SURVEY_LINE, "", 46.0, (-1.0, 0.0, 1.0), 1.0)
+    again = replace(transect, experiment="high", again=True)
+    found = FieldPlan(
+        case="brook", pieces=(transect, gauge), at_hand=0, proposed=False, hours=1.9, budget=16.0, draws=3,
+        effects=(effect("elder", 0.2, 1.0, "viscosity"), effect("wind", 0.8, 0.5), effect("foliage", np.inf, 0.02)),
+        places=(), instruments=(),
+        parameters=(PlannedParameter("n_b", "s m^(-1/3)", "", 0.045, (0.0, 1.0), (0.4, 0.5)),),
+        question=EffectsInGeneral(3), answer=1.2,
+        further=(ProposedPieces((again,), 5.4, 1.2, 1.9, 1.7), ProposedPieces((line,), 1.0, 1.2, 1.25, 1.2)),
+        extended=ProposedPieces((again, line), 6.4, 1.2, 2.0, 1.8),
+    )  # fmt: skip
+    about = replace(found, question=OneEffect("streamlining", -0.5, "-"), answer=0.3, further=(), extended=None)
+    between = replace(about, question=TwoEffects("elder", "viscosity"), proposed=True, at_hand=12)
+    return "\n\n".join(
+        printed(lambda one=one, details=details: show_plan(one, details, "vegglue plan brook.yaml --details"))
+        for one, details in ((found, False), (about, False), (between, True))
+    )
+
+
 def page() -> str:
     return "\n".join(page_sentence(one) for one in (brook().verdict, *STATEMENTS[4:6], *STEPS[6:9]))
 
@@ -297,6 +343,7 @@ RENDERED: dict[str, Callable[[], str]] = {
     "ladder": ladder,
     "questions": lambda: printed(lambda: (show_questions("brook", QUESTIONS), show_questions("brook", []))[0]),
     "effect": lambda: layout("effect_described", STEEP),
+    "plan": plan,
     "page": page,
 }
 
@@ -311,6 +358,10 @@ def test_a_verdict_is_short_and_a_command_is_whole() -> None:
         lines = verdict_lines(found, COMMAND, 13)
         assert len(lines) <= 13, name
         assert max(map(len, lines)) <= TERMINAL_WIDTH, name
+
+
+def test_each_conclusion_is_among_the_examples() -> None:
+    assert {found.verdict.conclusion for found in VERDICTS.values()} == set(get_args(Conclusion))
 
 
 if __name__ == "__main__":

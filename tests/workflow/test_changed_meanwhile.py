@@ -75,7 +75,7 @@ def test_a_best_fit_is_of_the_data_that_were_read(case: Case, meanwhile: Meanwhi
 def test_questions_are_of_the_data_that_were_read(case: Case, meanwhile: Meanwhile) -> None:
     before = case_hash(case)
     meanwhile(next_measurement, "diagnose", lambda *given, **more: a_diagnosis())
-    meanwhile(next_measurement, "_questions", lambda *given: [])
+    meanwhile(next_measurement, "what_is_open", lambda *given: [])
     vegglue.next_measurement(case, jobs=1)
     assert json.loads(Path("runs/brook/questions.json").read_text())["config_hash"] == before != case_hash(case)
 

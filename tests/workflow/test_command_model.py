@@ -166,7 +166,7 @@ def test_a_parameter_without_slope_is_named(tmp_path: Path) -> None:
     picky = f"{SMOOTH}\nif abs(phi - 10) > 0.01: raise SystemExit('dry')\n"
     case = commanded(tmp_path, picky, "", COARSE, SMALL, WITH_ERROR)
     own = model_of(case, read_observations(case))
-    with pytest.raises(InputError, match=r"failed on both sides of its best place for phi.*said: dry"):
+    with pytest.raises(InputError, match=r"failed on both sides of its best place for phi.*its last line: dry"):
         correction_at(command_runs(case, tmp_path), own, np.zeros(2), watch=silent)
 
 

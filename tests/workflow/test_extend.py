@@ -18,6 +18,8 @@ from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread
 from vegglue.diagnosis.stepwise_choice import (
     Addition,
     Choice,
+    HeldOutErrorsDidNotFall,
+    UnclearFall,
     found_additions,
     in_doubt,
     nominees,
@@ -30,7 +32,8 @@ from vegglue.measurements.observations import read_observations
 from vegglue.results.causes import LocalAnomaly, Step
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import write_diagnosis
-from vegglue.workflow.extend import extend, in_words, write_child
+from vegglue.wording.sentences import sentence
+from vegglue.workflow.extend import ExtensionReason, extend, extension_reason, write_child
 
 ROOT = Path(__file__).parents[2]
 
@@ -148,8 +151,8 @@ def test_a_place_that_was_found_is_added_as_it_is_spread() -> None:
     assert shapes["length"] == dict(candidate.fixed)["length"] == pytest.approx(np.hypot(1.8, 3.0 * 2**0.5), abs=0.01)
     values = values_found(case, found)
     assert values[candidate.parameter] == pytest.approx(1.8 / shapes["length"])  # 1.0 in `found_in`
-    words = in_words(case, found, Choice(((), (candidate.name,)), {}))
-    assert "half length 4.6 m" in words
+    ((name, length, width),) = extension_reason(case, found, Choice(((), (candidate.name,)), {})).spread
+    assert (name, length, width) == (candidate.name, shapes["length"], shapes["width"])
 
 
 def test_a_place_that_is_added_by_name_is_as_the_diagnosis_found_it(tmp_path: Path) -> None:
@@ -187,27 +190,16 @@ def test_a_place_likelier_than_an_effect_is_tried_after_it(chance: float, tried:
     assert [candidate.name for candidate, _ in found_additions(case, found)] == ["streamlining"]
     sizes = set(values_tried(case, found)) - set(values_found(case, found))
     assert sizes == {"unlisted_bed_x47_29_y_0_29_rise"} if tried == 2 else not sizes
-    words = in_words(case, found, Choice(((), (name,)), {"streamlining": "held-out errors did not fall"}))
-    assert ("is spread over where it may lie" in words) == (tried == 2)
+    reason = extension_reason(case, found, Choice(((), (name,)), {"streamlining": HeldOutErrorsDidNotFall()}))
+    assert [one for one, _, _ in reason.spread] == [name][: tried - 1]
 
 
-@pytest.mark.parametrize(
-    ("kind", "said"),
-    [
-        ("nothing-missing", "the diagnosis finds nothing missing"),
-        ("instrument", "only readings are off"),
-        ("none-of-these", "no effect of the library"),
-        ("cannot-tell", "cannot tell what is missing"),
-    ],
-)
-def test_why_nothing_is_added_is_one_sentence(kind: str, said: str) -> None:
+@pytest.mark.parametrize("kind", ["nothing-missing", "instrument", "none-of-these", "cannot-tell"])
+def test_the_verdict_is_why_nothing_is_added(kind: str) -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
     found = found_in(case, kind)
     assert found_additions(case, found) == []
-    words = in_words(case, found, Choice(((),), {}))
-    assert said in words
-    assert words.startswith("Nothing is added: ")
-    assert words.count(".") == 1
+    assert extension_reason(case, found, Choice(((),), {})) == ExtensionReason((), kind)
 
 
 def test_what_acts_in_one_experiment_or_section_says_so() -> None:
@@ -225,9 +217,9 @@ def test_what_acts_in_one_experiment_or_section_says_so() -> None:
 def test_a_law_that_stands_out_is_left_to_discover() -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
     found = replace(found_in(case, "none-of-these"), laws=candidate_laws_of("law_bank_speed_step"))
-    assert "`vegglue discover` adds one" in in_words(case, found, Choice(((),), {}))
+    assert extension_reason(case, found, Choice(((),), {})).nothing == "law"
     unlikely = replace(found, verdict=replace(found.verdict, kind="cannot-tell"))
-    assert in_words(case, unlikely, Choice(((),), {})).endswith("the diagnosis cannot tell what is missing.")
+    assert extension_reason(case, unlikely, Choice(((),), {})).nothing == "cannot-tell"
 
 
 def test_doubt_is_a_verdict_that_cannot_tell() -> None:
@@ -236,16 +228,12 @@ def test_doubt_is_a_verdict_that_cannot_tell() -> None:
     assert not in_doubt(found_in(case, "identified"))
 
 
-def test_what_is_not_kept_is_told() -> None:
+def test_what_is_not_kept_and_what_is_unclear_are_reported() -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
-    words = in_words(case, found_in(case, "identified"), Choice(((), ("a",)), {"b": "held-out errors did not fall"}))
-    assert words == "Added: a. b was not kept: held-out errors did not fall."
-
-
-def test_a_fall_that_cannot_be_told_from_none_is_told() -> None:
-    case = load_case(ROOT / "configs" / "twin.yaml")
-    words = in_words(case, found_in(case, "identified"), Choice(((), ("a",)), {}, {"a": "20 ± 4e+02 by sections"}))
-    assert words.startswith("Added: a. That held-out errors fall with a cannot be told from chance (20 ± 4e+02 by sec")
+    choice = Choice(((), ("a",)), {"b": HeldOutErrorsDidNotFall()}, {"a": UnclearFall((("sections", 2e-5, 4e-4),))})
+    reason = extension_reason(case, found_in(case, "identified"), choice)
+    assert (reason.added, reason.refused, reason.unclear) == (("a",), choice.refused, choice.unclear)
+    assert sentence(reason)
 
 
 @pytest.mark.parametrize(

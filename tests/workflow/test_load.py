@@ -1,5 +1,6 @@
 """`vegglue.load`: what lies in the folder of a run, as xarray and ArviZ know it."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -104,3 +105,28 @@ def test_a_missing_library_is_one_sentence(run: Path, missing: str, monkeypatch:
     monkeypatch.setattr(labelled_arrays, "import_module", without)
     with pytest.raises(vegglue.InputError, match=rf"the library {missing}, .* `pip install 'vegglue\[arviz\]'`"):
         vegglue.load(run)
+
+
+def test_all_results_are_one_tree_with_names_and_units_of_cf(run: Path) -> None:
+    tree = vegglue.load(run).tree
+    assert isinstance(tree, pytest.importorskip("xarray").DataTree)
+    assert {"ensemble", "fields", "members", "stations", "posterior", "prior", "log_likelihood"} <= set(tree.children)
+    assert tree.attrs["Conventions"].startswith("CF-")
+    assert tree["ensemble/prediction"].dims == ("member", "station")
+    assert tree["ensemble"]["member"].attrs["standard_name"] == "realization"
+    assert tree["fields/level"].attrs["standard_name"] == "water_surface_height_above_reference_datum"
+    assert tree["fields/u"].attrs["units"] == "m/s"
+    status = tree["ensemble/status"].attrs
+    assert len(status["flag_values"]) == len(status["flag_meanings"].split())
+    for node in tree.subtree:
+        for name, variable in node.variables.items():
+            unit = variable.attrs.get("units", "1")
+            assert re.fullmatch(r"1|(?:(?:m|s|kg|N|W)\d*)(?:[ /](?:m|s|kg)\d*)*", unit), (node.path, name, unit)
+            assert variable.attrs["long_name"]
+
+
+def test_the_tree_is_written_and_read_again(run: Path, tmp_path: Path) -> None:
+    xarray, tree = pytest.importorskip("xarray"), vegglue.load(run).tree
+    tree.to_netcdf(tmp_path / "all.nc", engine="h5netcdf")
+    with xarray.open_datatree(tmp_path / "all.nc", engine="h5netcdf") as again:
+        np.testing.assert_array_equal(again["ensemble/prediction"], tree["ensemble/prediction"])

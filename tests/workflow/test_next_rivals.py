@@ -10,7 +10,7 @@ from diagnoses import IMPLAUSIBLE, a_diagnosis
 
 from vegglue.diagnosis.next_measurement import MeasurementWorth, least_distances
 from vegglue.results.open_questions import OneOfRivals, RivalEffects
-from vegglue.workflow.next_measurement import _answers, _questions
+from vegglue.workflow.next_measurement import questions_about, what_is_open
 
 
 def rival(name: str) -> Any:
@@ -29,11 +29,11 @@ FAR, SHALLOW = worth("a section far off", [0.2, 0.2, 9.0]), worth("a lower disch
 def test_nothing_is_asked_of_data_that_are_in_doubt() -> None:
     doubted = a_diagnosis((), (), verdict={"kind": "cannot-tell", "reasons": (IMPLAUSIBLE,)})
     case: Any = SimpleNamespace()
-    assert _questions(case, replace(doubted, steps=a_diagnosis().steps)) == []
+    assert what_is_open(case, replace(doubted, steps=a_diagnosis().steps)) == []
 
 
 def test_what_tells_one_rival_from_all_others_is_proposed_for_it() -> None:
-    whole, *single = _answers(RivalEffects(("depth", "even", "trend")), THREE, [SHALLOW, FAR])
+    whole, *single = questions_about(RivalEffects(("depth", "even", "trend")), THREE, [SHALLOW, FAR])
     assert whole.useful == ()
     others = [OneOfRivals("depth", ("even", "trend")), OneOfRivals("trend", ("depth", "even"))]
     assert [one.about for one in single] == others
@@ -42,9 +42,9 @@ def test_what_tells_one_rival_from_all_others_is_proposed_for_it() -> None:
 
 
 def test_a_question_that_is_answered_is_one_and_so_is_one_of_two_rivals() -> None:
-    (answered,) = _answers(RivalEffects(("depth", "even", "trend")), THREE, [worth("everything", [4.0, 5.0, 6.0])])
+    (answered,) = questions_about(RivalEffects(("depth", "even", "trend")), THREE, [worth("all", [4.0, 5.0, 6.0])])
     assert answered.useful[0].then == 4.0
-    assert len(_answers("both", THREE[:2], [worth("little", [1.0, 1.0])])) == 1
+    assert len(questions_about("both", THREE[:2], [worth("little", [1.0, 1.0])])) == 1
 
 
 def test_each_rival_is_as_far_as_from_the_nearest_either_way() -> None:

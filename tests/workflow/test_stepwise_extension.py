@@ -16,7 +16,7 @@ from vegglue.diagnosis.comparison import excluded_by
 from vegglue.results.json_store import write_model_score
 from vegglue.workflow import extend
 from vegglue.workflow.case_run import CaseRun
-from vegglue.workflow.compare import Comparison, comparison_of, keep_comparison, rows_set_aside
+from vegglue.workflow.compare import Comparison, comparison_of, excluded_rows, keep_comparison
 from vegglue.workflow.extend import kept_extension, verdict_digest
 
 FOUND = a_diagnosis()
@@ -31,7 +31,7 @@ def family(tmp_path: Path) -> tuple[Case, Case]:
     several = [CaseRun(one, tmp_path / "runs") for one in cases]
     comparison = Comparison(tuple(a_model_score(one.name) for one in cases), ASIDE)
     for run, model_score in zip(several, comparison.model_scores, strict=True):
-        write_model_score(run.folder, model_score, rows_set_aside(ASIDE), run.config_hash)
+        write_model_score(run.folder, model_score, excluded_rows(ASIDE), run.config_hash)
     keep_comparison(comparison_of(comparison, several, "Added: streamlining.", verdict_digest(FOUND)), several)
     return cases
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from house import FILES
 from reach import COARSE, said_to, write_reach
+from systems import POSIX_ALONE
 
 import vegglue
 from vegglue.case import config as case_config
@@ -88,6 +89,7 @@ def test_nothing_that_is_read_can_hold_code() -> None:
         assert "allow_pickle=True" not in path.read_text(encoding="utf-8"), path
 
 
+@POSIX_ALONE
 def test_a_file_without_end_or_name_is_refused_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     os.symlink("loop.csv", "loop.csv")

@@ -13,7 +13,7 @@ from reach import COARSE, ROOT, write_reach
 import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.inference.statements import ReadingsExcluded, posterior_statements
-from vegglue.measurements.observations import SET_ASIDE, read_observations
+from vegglue.measurements.observations import EXCLUDED, read_observations
 from vegglue.progress import Progress
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import comparison_that_fits, questions_that_fit
@@ -162,10 +162,10 @@ def test_a_posterior_leaves_out_what_the_diagnosis_set_aside(tmp_path: Path) -> 
     found = a_diagnosis(predictions=predictions, errors={"flagged": (3, 7)})
     write_diagnosis(runs / "brook" / "diagnosis.h5", found, "", case_hash(case))
     assert not is_inferred(CaseRun(case, runs)), "it still holds them"
-    assert results_of(run, run).set_aside_since == 2
+    assert results_of(run, run).excluded_since == 2
     after = vegglue.infer(case, ensemble, method="glue", runs=runs, jobs=1)
     assert after.fit.used == 13
-    assert after.station.index[after.station["reason"] == SET_ASIDE].tolist() == [3, 7]
+    assert after.station.index[after.station["reason"] == EXCLUDED].tolist() == [3, 7]
     assert ReadingsExcluded(2, 15) in posterior_statements(after)
     assert is_inferred(CaseRun(case, runs))
-    assert results_of(run, run).set_aside_since == 0
+    assert results_of(run, run).excluded_since == 0

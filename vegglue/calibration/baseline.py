@@ -37,7 +37,7 @@ FEWEST_CELLS_ACROSS = 7.0
 MOST_KEPT = 2
 # Keys of a case that change no calibration, in the form in which pydantic leaves them out.
 ONLY_NAMED = dict.fromkeys(
-    ("name", "title", "simulate", "infer", "survey", "validation", "reference", "canopy_correction"), True
+    ("name", "title", "simulate", "infer", "survey", "validation", "reference", "canopy_correction", "planned"), True
 ) | {"frame": True, "imported": True}
 _kept: OrderedDict[str, "Baseline"] = OrderedDict()
 

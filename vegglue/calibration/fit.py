@@ -106,6 +106,12 @@ def fit(model: Model, noise: Noise, start: Point, steps: int = MOST_STEPS, enoug
     return at_point(noise, point)
 
 
+def fit_from(model: Model, noise: Noise, z: Array, near: Point | None = None) -> MapEstimate | None:
+    """`fit` from a place z (p,); None if no flow is found there. near: a point to start the flow from."""
+    start = linearise(model, z, near)
+    return None if start is None else fit(model, noise, start)
+
+
 def _step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Array, Array, float]:
     """The matrix H + l 1, damped until its step (p,) is no longer than `longest` (Levenberg 1944), the step, and the
     predicted decrease.

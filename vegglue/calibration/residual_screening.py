@@ -296,7 +296,7 @@ def conditional_screenings(screening: Screening) -> tuple[ConditionalScreening, 
 
 
 def conditional_places(search: SearchModel) -> list[Array]:
-    """z' (p,) of each parameter that is off, the furthest first; not of amplitudes, see `with_rivals_again`."""
+    """z' (p,) of each parameter that is off, furthest first; not of amplitudes of effects, see `with_rivals_again`."""
     noise, z = search.noise, search.point.z
     of_effects = parameters_of_effects(search.model.case)
     own = [j for j, name in enumerate(search.model.names) if name not in of_effects]

@@ -292,6 +292,16 @@ def alarm_p(kinds: Sequence[HypothesisKind], errors: Array, seed: int, slack: fl
         Never below 1 / (1 + draws).
     """
     found = logsumexp([logsumexp(kind.of_scores(np.maximum(np.abs(kind.scores) - slack, 0.0))) for kind in kinds])
+    return (1 + int(np.sum(_sums_under_errors(kinds, errors, seed) >= found))) / (1 + len(errors))
+
+
+def alarm_level(kinds: Sequence[HypothesisKind], errors: Array, seed: int, rate: float) -> float:
+    """ln of the sum of Bayes factors over all kinds that errors alone exceed at a rate [-]; arguments of `alarm_p`."""
+    return float(np.quantile(_sums_under_errors(kinds, errors, seed), 1.0 - rate))
+
+
+def _sums_under_errors(kinds: Sequence[HypothesisKind], errors: Array, seed: int) -> Array:
+    """ln of the sum over all kinds of each draw of errors alone (draws,)."""
     drawn = with_rows_of_prior(errors, kinds[0].projected, seed)
     terms = [
         _DrawnTerms(
@@ -303,11 +313,11 @@ def alarm_p(kinds: Sequence[HypothesisKind], errors: Array, seed: int, slack: fl
         for kind in kinds
     ]
 
-    def count_of(part: Single) -> int:
-        return int(np.sum(logsumexp([one.sums(part) for one in terms], axis=0) >= found))
+    def sums_of(part: Single) -> Array:
+        return np.asarray(logsumexp([one.sums(part) for one in terms], axis=0))
 
     parts = [(drawn[k : k + NULL_DRAWS_TOGETHER],) for k in range(0, len(drawn), NULL_DRAWS_TOGETHER)]
-    return (1 + sum(in_threads(count_of, parts))) / (1 + len(errors))
+    return np.concatenate(in_threads(sums_of, parts))
 
 
 @dataclass(frozen=True)

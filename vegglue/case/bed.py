@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
 
+FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")  # 3.7D-01
 # Keys of the header of an ESRI ASCII grid, in lower case.
 HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "nodata_value")
 
@@ -70,14 +72,13 @@ def read_raster(path: Path) -> Raster:
         corner[axis] = header.get(f"{axis}llcorner", header.get(f"{axis}llcenter", 0.0) - 0.5 * size)
     found = [np.empty(0)]  # a line at a time, so that a large file takes little more than its numbers do
     for number, line in enumerate(lines[first:], first + 1):
-        words = line.split()
         try:
-            found.append(np.array(words, dtype=np.float64))
+            found.append(np.array(FORTRAN_EXPONENT.sub("e", line).split(), dtype=np.float64))
         except ValueError as error:
             word = str(error).rpartition(": ")[2]
             raise InputError(f"{path}, line {number}: expected numbers, got {word}.") from None
         if np.isinf(found[-1]).any():
-            word = words[int(np.isinf(found[-1]).argmax())]
+            word = line.split()[int(np.isinf(found[-1]).argmax())]
             raise InputError(f"{path}, line {number}: expected finite numbers, got {word!r}.")
     values = np.concatenate(found)
     if len(values) != rows * columns:
@@ -157,7 +158,7 @@ def read_points(path: Path, columns: Sequence[str] = ("x", "y", "z")) -> Array:
 
 def _number(path: Path, row: int, text: str | None, name: str) -> float:
     try:
-        number = float(text or "")
+        number = float(FORTRAN_EXPONENT.sub("e", text or ""))
     except ValueError:
         number = math.nan
     if not math.isfinite(number):

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from vegglue.case.messages import KeyPath, Refusal, dotted, first_refusal, nearest, unknown_without_value
+from vegglue.case.messages import CaseError, KeyPath, dotted, first_refusal, nearest, refuse_unknown_without_value
 from vegglue.case.resolved_config import Tree
 from vegglue.case.safe_yaml import safe_yaml, yaml_problem
 from vegglue.case.schema import Case, Experiment, Observation, share_below
@@ -76,8 +76,10 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
             f"`vegglue import {shown_path(file.parent)}` makes a config of it."
         )
     for file, layer in layers:
-        if (refusal := unknown_without_value(layer)) is not None:
-            raise _input_error([(file, layer)], refusal)
+        try:
+            refuse_unknown_without_value(layer)
+        except CaseError as refusal:
+            raise _input_error([(file, layer)], refusal) from None
     tree: Tree = {}
     for _, layer in reversed(layers):
         tree = _merged(tree, layer)
@@ -102,9 +104,12 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
             f"{shown_path(path)}: `engine` names the command {case.engine.command!r}, which runs as code: read it and "
             "the files it runs, and add --trust if you trust them."
         )
-    refusal = disagreement(case)
-    if refusal is not None:
-        raise _input_error(layers, refusal)
+    try:
+        _agree_on_names(case)
+        _agree_on_effects(case)
+        _agree_on_values(case)
+    except CaseError as refusal:
+        raise _input_error(layers, refusal) from None
     return case
 
 
@@ -179,7 +184,7 @@ def _all_named(tree: Tree, inflow: str) -> Tree:
     return {"experiments": tree["experiments"] | named}
 
 
-def _input_error(layers: list[tuple[Path, Tree]], refusal: Refusal) -> InputError:
+def _input_error(layers: list[tuple[Path, Tree]], refusal: CaseError) -> InputError:
     """The message, with the file that has (or lacks) what is refused: the first of those with most of its keys."""
 
     def depth(tree: Any) -> int:
@@ -193,12 +198,6 @@ def _input_error(layers: list[tuple[Path, Tree]], refusal: Refusal) -> InputErro
     path, _ = max(layers, key=lambda layer: depth(layer[1]))
     end = "" if refusal.complaint.endswith(("?", ".")) else "."
     return InputError(f"{shown_path(path)}: `{dotted(refusal.place)}` {refusal.complaint}{end}")
-
-
-def disagreement(case: Case) -> Refusal | None:
-    """The first thing in a case that does not agree with the rest of it; None when all agrees."""
-    checks = (_names_and_files, _effects, _values_and_ranges)
-    return next((refusal for check in checks for refusal in check(case)), None)
 
 
 def values(case: Case) -> Iterator[tuple[KeyPath, Value | None, bool]]:
@@ -244,40 +243,44 @@ def _coefficients(place: KeyPath, law: FrictionClass) -> Iterator[tuple[KeyPath,
         yield (*place, key), getattr(law, key), True
 
 
-def _unknown(place: KeyPath, word: str, known: Iterable[str], what: str) -> Iterator[Refusal]:
+def _declared(place: KeyPath, word: str, known: Iterable[str], what: str) -> None:
     if word not in (names := list(known)):
-        yield Refusal(place, f"names the {what} `{word}`, which is not declared: {nearest(word, names)}")
+        raise CaseError(place, f"names the {what} `{word}`, which is not declared: {nearest(word, names)}")
 
 
-def _names_and_files(case: Case) -> Iterator[Refusal]:
+def _agree_on_names(case: Case) -> None:
     """Every name is declared, and every file is there and not too large."""
     classes, stands = case.friction.classes, case.plants.stands
-    yield from _unknown(("friction", "default"), case.friction.default, classes, "friction class")
+    _declared(("friction", "default"), case.friction.default, classes, "friction class")
     for i, zone in enumerate(case.friction.zones):
         for word in [zone.friction_class] if zone.friction_class else (zone.values or {}).values():
-            yield from _unknown(("friction", "zones", i), word, classes, "friction class")
+            _declared(("friction", "zones", i), word, classes, "friction class")
     patches = [patch.name for patch in case.plants.patches]
     for i, patch in enumerate(case.plants.patches):
-        yield from _unknown(("plants", "patches", i, "stand"), patch.stand, stands, "stand")
+        _declared(("plants", "patches", i, "stand"), patch.stand, stands, "stand")
         if patch.name in patches[:i]:
-            yield Refusal(("plants", "patches", i, "name"), f"is `{patch.name}` a second time: rename one of them")
+            raise CaseError(("plants", "patches", i, "name"), f"is `{patch.name}` a second time: rename one of them")
     for at, experiment in _experiments(case):
         for inflow in experiment.discharge:
-            yield from _unknown((*at, "discharge"), inflow, case.inflows, "inflow")
+            _declared((*at, "discharge"), inflow, case.inflows, "inflow")
         for inflow in case.inflows.keys() - experiment.discharge.keys():
-            yield Refusal((*at, "discharge"), f"lacks the inflow `{inflow}`: add it")
+            raise CaseError((*at, "discharge"), f"lacks the inflow `{inflow}`: add it")
         for stand in experiment.stands:
-            yield from _unknown((*at, "stands"), stand, stands, "stand")
+            _declared((*at, "stands"), stand, stands, "stand")
         for present in experiment.plants if isinstance(experiment.plants, tuple) else ():
-            yield from _unknown((*at, "plants"), present, patches, "patch")
+            _declared((*at, "plants"), present, patches, "patch")
     for at, observation, experiments in _observations(case):
         if observation.experiment is not None:
-            yield from _unknown((*at, "experiment"), observation.experiment, experiments, "experiment")
+            _declared((*at, "experiment"), observation.experiment, experiments, "experiment")
     for name, entry in case.effects.items():
         for word in entry.experiments or ():
-            yield from _unknown(("effects", name, "experiments"), word, case.experiments, "experiment")
+            _declared(("effects", name, "experiments"), word, case.experiments, "experiment")
+    for group in ("transects", "points", "gauges", "discharges") if case.planned is not None else ():
+        for i, one in enumerate(getattr(case.planned, group)):
+            for word in one.experiments or ():
+                _declared(("planned", group, i, "experiments"), word, case.experiments, "experiment")
     if case.canopy_correction is not None:
-        yield from _unknown(("canopy_correction", "stand"), case.canopy_correction.stand, stands, "stand")
+        _declared(("canopy_correction", "stand"), case.canopy_correction.stand, stands, "stand")
     beds: list[tuple[KeyPath, Iterable[BedLayer]]] = [((), case.bed)]
     beds += [(at, experiment.bed or ()) for at, experiment in _experiments(case)]
     named: list[tuple[KeyPath, Path | None]] = []
@@ -293,12 +296,12 @@ def _names_and_files(case: Case) -> Iterator[Refusal]:
         if file is None:
             continue
         if not os.path.isfile(file):  # False for every name that no file can have, where a Path would raise
-            yield Refusal(place, f"expected an existing file, got {shown_path(file)}: put it there or correct the path")
-        elif os.path.getsize(file) > LARGEST_DATA:
-            yield Refusal(place, f"expected a file of at most {LARGEST_DATA:,} bytes, got more: make it smaller")
+            raise CaseError(place, f"expected an existing file, got {shown_path(file)}: correct the path")
+        if os.path.getsize(file) > LARGEST_DATA:
+            raise CaseError(place, f"expected a file of at most {LARGEST_DATA:,} bytes, got more: make it smaller")
 
 
-def _effects(case: Case) -> Iterator[Refusal]:
+def _agree_on_effects(case: Case) -> None:
     """Effects and their parameters by name; none without its amplitude, and no number outside what it may be."""
     if not case.effects and not case.exclude and case.effect_file is None:
         return
@@ -306,54 +309,64 @@ def _effects(case: Case) -> Iterator[Refusal]:
 
     known = library(case.effect_file)
     for name in case.exclude or {}:
-        yield from _unknown(("exclude", name), name, known, "effect")
+        _declared(("exclude", name), name, known, "effect")
         if any((entry.effect or key) == name for key, entry in case.effects.items()):
-            yield Refusal(("exclude", name), "excludes an effect that `effects` has: take it out of one of the two")
+            raise CaseError(("exclude", name), "excludes an effect that `effects` has: take it out of one of the two")
     for key, entry in case.effects.items():
         place: KeyPath = ("effects", key)
         name = entry.effect or key
-        yield from _unknown(place if entry.effect is None else (*place, "effect"), name, known, "effect")
+        _declared(place if entry.effect is None else (*place, "effect"), name, known, "effect")
         effect = known[name]
         parameters = {parameter.name: parameter for parameter in effect.parameters}
         for word, value in entry.values.items():
             at: KeyPath = (*place, "values", word)
             if word not in parameters:
-                yield Refusal(at, f"is no parameter of this effect: {nearest(word, list(parameters))}")
+                raise CaseError(at, f"is no parameter of this effect: {nearest(word, list(parameters))}")
             low, high, unit = parameters[word].low, parameters[word].high, parameters[word].unit
             if isinstance(value, str) and value in case.parameters:
                 prior = case.parameters[value]
                 if share_below(prior, low) > LEAST_PROBABILITY or share_below(prior, high) < 1.0 - LEAST_PROBABILITY:
-                    complaint = f"may leave {low:g} to {high:g} {unit}, where `{dotted(at)}` must lie: bound it"
-                    yield Refusal(("parameters", value), complaint)
+                    raise CaseError(
+                        ("parameters", value),
+                        f"may leave {low:g} to {high:g} {unit}, where `{dotted(at)}` must lie: bound it",
+                    )
             elif not isinstance(value, str) and not low <= value <= high:
-                yield Refusal(at, f"expected a number from {low:g} to {high:g} {unit}, got {value:g}")
+                raise CaseError(at, f"expected a number from {low:g} to {high:g} {unit}, got {value:g}")
         if effect.amplitude.name not in entry.values:
-            complaint = f"lacks `{effect.amplitude.name}`, without which {name} is off: add it"
-            yield Refusal((*place, "values"), complaint)
+            raise CaseError(
+                (*place, "values"),
+                f"lacks `{effect.amplitude.name}`, without which {name} is off: add it",
+            )
         if effect.stage != "sensor" and (entry.sections or entry.devices):
-            yield Refusal(place, f"names sections or devices, but {name} acts on the flow: use `experiments`")
+            raise CaseError(place, f"names sections or devices, but {name} acts on the flow: use `experiments`")
 
 
-def _values_and_ranges(case: Case) -> Iterator[Refusal]:
+def _agree_on_values(case: Case) -> None:
     """Quantities are positive if they must be, every parameter is used, ranges lie in the grid, and a command has its
     files and keeps no fields.
     """
     for place, value, positive in values(case):
         if isinstance(value, str):
-            yield from _unknown(place, value, case.parameters, "parameter")
+            _declared(place, value, case.parameters, "parameter")
             if positive and share_below(case.parameters[value], 0.0) >= LEAST_PROBABILITY:
-                complaint = f"may fall to 0 or below, but `{dotted(place)}` must be above 0: raise its lower bound"
-                yield Refusal(("parameters", value), complaint)
+                raise CaseError(
+                    ("parameters", value),
+                    f"may fall to 0 or below, but `{dotted(place)}` must be above 0: raise its lower bound",
+                )
         elif value is not None and positive and value <= 0:
-            yield Refusal(place, f"expected a number above 0, got {value:g}")
+            raise CaseError(place, f"expected a number above 0, got {value:g}")
     used = {value for _, value, _ in values(case) if isinstance(value, str)}
     for name in case.parameters:
         if name in DIMENSIONS:
-            complaint = f"has one of the names {', '.join(DIMENSIONS)}, kept for results: rename it"
-            yield Refusal(("parameters", name), complaint)
+            raise CaseError(
+                ("parameters", name),
+                f"has one of the names {', '.join(DIMENSIONS)}, kept for results: rename it",
+            )
         if name not in used and case.engine is None:  # a command may know what the built-in solver does not
-            complaint = "is declared but used nowhere: name it where its value belongs, or remove it"
-            yield Refusal(("parameters", name), complaint)
+            raise CaseError(
+                ("parameters", name),
+                "is declared but used nowhere: name it where its value belongs, or remove it",
+            )
     ranges: list[tuple[KeyPath, Interval | None, Interval]] = [
         (("inflows", name, "range"), inflow.range, case.grid.y if inflow.side == "west" else case.grid.x)
         for name, inflow in case.inflows.items()
@@ -363,16 +376,28 @@ def _values_and_ranges(case: Case) -> Iterator[Refusal]:
         ranges.append((("simulate", "fields", "x"), case.simulate.fields.x, case.grid.x))
     for place, part, (low, high) in ranges:
         if part is not None and (part[0] < low or part[1] > high):
-            got = f"got {part[0]:g} to {part[1]:g} m"
-            yield Refusal(place, f"expected a range within {low:g} to {high:g} m, {got}")
+            got = f"{part[0]:g} to {part[1]:g}"
+            raise CaseError(place, f"expected a range within {low:g} to {high:g} m, got {got} m")
+    for group in ("transects", "points", "gauges", "discharges") if case.planned is not None else ():
+        for i, one in enumerate(getattr(case.planned, group)):
+            for axis, (low, high) in (("x", case.grid.x), ("y", case.grid.y)):
+                given = getattr(one, axis, None)
+                for value in given if isinstance(given, tuple) else () if given is None else (given,):
+                    if not low <= value <= high:
+                        complaint = f"expected a place within {low:g} to {high:g} m, got {value:g}"
+                        raise CaseError(("planned", group, i, axis), complaint)
     if case.infer.behavioural is not None and case.infer.likelihood == "gaussian":
-        complaint = "goes with an informal likelihood, not with gaussian: remove it"
-        yield Refusal(("infer", "behavioural"), complaint)
+        raise CaseError(
+            ("infer", "behavioural"),
+            "goes with an informal likelihood, not with gaussian: remove it",
+        )
     if case.engine is None:
         return
     for name, path in case.engine.files.items():
         if not os.path.exists(path):
-            complaint = f"expected an existing file or folder, got {shown_path(path)}: put it there or correct the path"
-            yield Refusal(("engine", "files", name), complaint)
+            raise CaseError(
+                ("engine", "files", name),
+                f"expected an existing file or folder, got {shown_path(path)}: put it there or correct the path",
+            )
     if case.simulate.fields is not None:
-        yield Refusal(("simulate", "fields"), "cannot be kept of a command, which predicts at stations only: remove it")
+        raise CaseError(("simulate", "fields"), "cannot be kept of a command, which predicts at stations: remove it")

@@ -4,7 +4,6 @@ import difflib
 import re
 import textwrap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, get_args, get_origin
 
 from vegglue.case.schema import Case
@@ -16,24 +15,24 @@ OF_A_PAIR = 2  # numbers in a range, or in a place
 KeyPath = tuple[str | int, ...]
 
 
-@dataclass(frozen=True)
-class Refusal:
-    """place: keys that lead to the refused value; complaint: the rest of the sentence about it."""
+class CaseError(ValueError):
+    """What is wrong with a part of a case: the keys that lead to it, and the rest of the sentence about it."""
 
-    place: KeyPath
-    complaint: str
+    def __init__(self, place: KeyPath, complaint: str) -> None:
+        super().__init__(complaint)
+        self.place, self.complaint = place, complaint
 
 
-def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]) -> Refusal:
+def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]) -> CaseError:
     """The first of pydantic's problems with a tree of keys and values; misspelt keys before what they leave missing."""
     problem = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
     kind, location, got = problem["type"], problem["loc"], problem["input"]
     if kind == "missing":
         place = (*_place(tree, location[:-1]), location[-1])
-        return Refusal(place, f"is missing{_meaning(place)}: add it")
+        return CaseError(place, f"is missing{_meaning(place)}: add it")
     place = _place(tree, location)
     if kind == "extra_forbidden":
-        return Refusal(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
+        return CaseError(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
     expected = expected_in_words(problem)
     for short, whole in (("greater", "a number greater"), ("less", "a number less")):
         expected = expected.replace(short, whole)
@@ -46,10 +45,10 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
         elif re.fullmatch(r"[-+\d.eE]+", got):
             advice = "; write numbers without quotes"
     if kind == "string_pattern_mismatch":  # of the name of a case, which is that of a folder
-        return Refusal(place, f"expected {_meaning(place)[2:-1]} alone, got {_shown(got)}; write {case_name(got)}")
+        return CaseError(place, f"expected {_meaning(place)[2:-1]} alone, got {_shown(got)}; write {case_name(got)}")
     if kind == "string_type":
         expected, advice = "a text", "; write it in quotes" if isinstance(got, int | float) else ""
-    return Refusal(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{advice}".lstrip())
+    return CaseError(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{advice}".lstrip())
 
 
 def expected_in_words(problem: Mapping[str, Any]) -> str:
@@ -62,19 +61,16 @@ def expected_in_words(problem: Mapping[str, Any]) -> str:
     return re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
 
 
-def unknown_without_value(tree: Mapping[str, Any], above: KeyPath = ()) -> Refusal | None:
-    """The first key of a tree that has no value and that no part of a case knows; null only takes known keys away."""
+def refuse_unknown_without_value(tree: Mapping[str, Any], above: KeyPath = ()) -> None:
+    """Raise CaseError for a key that has no value and that no part of a case knows; null only takes known keys away."""
     annotation = _annotation_at(above)
     free = any(get_origin(part) is dict for part in (annotation, *_alternatives(annotation)))
     known = None if free else _keys(above)  # free: names of the user's own, such as those of experiments
     for key, value in tree.items():
         if isinstance(value, Mapping):
-            found = unknown_without_value(value, (*above, key))
-            if found is not None:
-                return found
+            refuse_unknown_without_value(value, (*above, key))
         elif value is None and known and key not in known:
-            return Refusal((*above, key), f"is not a known key: {nearest(str(key), known)}")
-    return None
+            raise CaseError((*above, key), f"is not a known key: {nearest(str(key), known)}")
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -7,7 +7,6 @@ content, was made or edited by hand.
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,11 +15,23 @@ from typing import Any
 from vegglue.case.safe_yaml import yaml_of
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError, path_from, shown_path
 
 # Keys that a finished ensemble does not depend on, as pydantic wants those to leave out.
 NOT_SIMULATED = dict.fromkeys(
-    ("name", "title", "infer", "survey", "validation", "reference", "canopy_correction", "frame", "imported"), True
+    (
+        "name",
+        "title",
+        "infer",
+        "survey",
+        "validation",
+        "reference",
+        "canopy_correction",
+        "frame",
+        "imported",
+        "planned",
+    ),
+    True,
 ) | {
     "exclude": True,
     "bed": {"__all__": {"survey"}},
@@ -35,7 +46,7 @@ Tree = dict[str, Any]
 
 def resolved_yaml(case: Case) -> str:
     """The case as one file without `extends`; data files are named relative to the file it was read from."""
-    return as_yaml(plain_tree(dumped(case), lambda file: Path(os.path.relpath(file, case.source.parent)).as_posix()))
+    return as_yaml(plain_tree(dumped(case), lambda file: path_from(case.source.parent, file)))
 
 
 def as_yaml(tree: Tree) -> str:
@@ -46,9 +57,9 @@ def as_yaml(tree: Tree) -> str:
 def case_hash(case: Case) -> str:
     """sha256 of the resolved case, in its order, and of the contents of every file it names, wherever they lie.
 
-    Its title is not in it: no number hangs on that.
+    Its title and what is planned are not in it: no result hangs on them.
     """
-    return _hash(dumped(case) | {"title": ""})
+    return _hash(dumped(case, {"planned": True}) | {"title": ""})
 
 
 def simulation_hash(case: Case) -> str:

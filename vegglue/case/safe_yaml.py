@@ -7,6 +7,7 @@ complaints of the parser in plain words.
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import yaml
@@ -15,6 +16,7 @@ from yaml.reader import ReaderError
 
 from vegglue.case.size_limits import DEEPEST_KEYS, MOST_DIGITS, MOST_PARTS
 from vegglue.case.text_files import unprintable
+from vegglue.wording.sentences import sentence
 
 WHOLE = re.compile(r"[-+]?[0-9]+")
 BROKEN = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
@@ -92,11 +94,9 @@ def _refused(problem: str, at: Any) -> ConstructorError:
 def _whole(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
     digits = node.value.lstrip("+-")
     if len(digits) > 1 and digits.startswith("0"):
-        complaint = f"`{node.value}` may mean two numbers: write it without the 0 in front, or text in quotes"
-        raise _refused(complaint, node)
+        raise _refused(f"`{node.value}` may mean two numbers: write it without the 0 in front, or text in quotes", node)
     if len(digits) > MOST_DIGITS:
-        complaint = f"a number has {len(digits)} digits, more than {MOST_DIGITS}: correct it"
-        raise _refused(complaint, node)
+        raise _refused(f"a number has {len(digits)} digits, more than {MOST_DIGITS}: correct it", node)
     return int(node.value)
 
 
@@ -131,78 +131,55 @@ class _Dumper(yaml.SafeDumper):
 _Dumper.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(rf"(?:{BROKEN.pattern})$"), list("-+.0123456789"))
 
 
-QUOTES = "put the text in quotes"
-SPACES = "correct the spaces in front of the line"
-THERE = "correct the YAML there or just before"
 CLOSING = {"while parsing a flow mapping": ("{", "}"), "while parsing a flow sequence": ("[", "]")}
-# What a parser calls the things it meets.
-TOKENS = {
-    "<stream end>": "the end of the file",
-    "<scalar>": "a further text",
-    "<block mapping start>": "one further to the right",
-    "<block sequence start>": "a list",
-    "<block end>": "a line further to the left",
-    "?": "one in another place",
-    "-": "a line that begins with `-`",
-}
-# Problems of the parser, and of each the sentence; what a pattern finds is put where braces stand.
-PROBLEMS: tuple[tuple[str, str], ...] = (
-    (r"found character '\\t'", "expected spaces, got a tab; write spaces instead"),
-    (r"found character '(.+)' that cannot start", f"expected a text or a number, got the sign `{{}}`; {QUOTES}"),
-    (
-        r"mapping values are not allowed",
-        f"expected one `key: value` in a line, got a second colon; {SPACES}, write a space behind every colon, or put "
-        "a text that has a colon in quotes",
-    ),
-    (
-        r"could not find expected ':'",
-        f"expected `key: value`, got a line without a colon; add it and a space behind it, or {SPACES}",
-    ),
-    (r"expected <block end>, but found '([}\]])'", "got a `{}` that closes nothing; take it out"),
-    (
-        r"expected <block end>, but found '<scalar>'",
-        "expected the end of the line, got a further text; put all of it in quotes",
-    ),
-    (
-        r"expected <block end>, but found '(.+)'",
-        f"expected a key as far from the left as those above it, got {{}}; {SPACES}",
-    ),
-    (r"sequence entries are not allowed", "expected a value, got a `-`; begin a list in a line of its own"),
-    (r"expected the node content, but found '(.+)'", "expected a value, got {}; add the value, or take out the sign"),
-    (r"found unknown escape character '(.+)'", "expected no `\\{}` within double quotes; write single ones"),
-    (r"found undefined alias '(.+)'", f"expected a text, got `*{{}}`, a reference to nothing; {QUOTES}"),
-    (r"expected '<document start>'", "expected the end of the file, got more; take out a brace that closes too early"),
-    (r"but found another document", "expected one set of keys, got a further one below `---`; take one out"),
-    (r"expected alphabetic or numeric character", f"expected a text, got a sign that YAML takes for more; {QUOTES}"),
-    (r"expected chomping or indentation", f"expected a text, got a sign that YAML takes for more; {QUOTES}"),
+# Problems as the parser words them, and their kinds; a group of a pattern is what was found.
+YAML_PROBLEMS: tuple[tuple[str, str], ...] = (
+    (r"found character '\\t'", "tab"),
+    (r"found character '(.+)' that cannot start", "sign"),
+    (r"mapping values are not allowed", "second-colon"),
+    (r"could not find expected ':'", "no-colon"),
+    (r"expected <block end>, but found '([}\]])'", "closes-nothing"),
+    (r"expected <block end>, but found '<scalar>'", "further-text"),
+    (r"expected <block end>, but found '(.+)'", "indentation"),
+    (r"sequence entries are not allowed", "list-in-line"),
+    (r"expected the node content, but found '(.+)'", "no-value"),
+    (r"found unknown escape character '(.+)'", "escape"),
+    (r"found undefined alias '(.+)'", "reference"),
+    (r"expected '<document start>'", "closed-early"),
+    (r"but found another document", "second-document"),
+    (r"expected (alphabetic or numeric character|chomping or indentation)", "special-sign"),
 )
+
+
+@dataclass(frozen=True)
+class YamlProblem:
+    """Why a text is not YAML, in words by the macro of that name: `found` is the sign, token or text that the parser
+    met; opening, closing, begun: brackets that are not closed, and the line in which a part begins.
+    """
+
+    kind: str
+    found: str = ""
+    opening: str = ""
+    closing: str = ""
+    begun: int = 1
 
 
 def yaml_problem(error: yaml.YAMLError, text: str) -> str:
     """The place in the text and the rest of the sentence, as in `, line 3, column 1: expected ..., got ...; do ...`."""
     if isinstance(error, ReaderError):
         line = text[: error.position].count("\n") + 1
-        return f", line {line}: expected text, got the sign {chr(error.character)!a}, which is no letter; take it out"
+        return f", line {line}: {sentence(YamlProblem('no-letter', ascii(chr(error.character))))}"
     if not isinstance(error, yaml.MarkedYAMLError):
-        return f": {' '.join(str(error).split())}; {THERE}"
+        return f": {sentence(YamlProblem('other', ' '.join(str(error).split())))}"
     mark, problem = error.problem_mark, error.problem or "is not valid YAML"
     where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-    context, line = error.context or "", error.context_mark.line + 1 if error.context_mark else 1
-    found = re.fullmatch(r"expected ',' or '[}\]]', but got '(.+)'", problem)
-    if context in CLOSING and found:
-        opening, closing = CLOSING[context]
-        return (
-            f"{where}: expected a comma or the `{closing}` that closes the `{opening}` of line {line}, got "
-            f"{_token(found[1])}; add the `{closing}`, or a comma where one part ends"
-        )
+    context, begun = error.context or "", error.context_mark.line + 1 if error.context_mark else 1
+    open_part = re.fullmatch(r"expected ',' or '[}\]]', but got '(.+)'", problem)
+    if context in CLOSING and open_part:
+        return f"{where}: {sentence(YamlProblem('open-bracket', open_part[1], *CLOSING[context], begun))}"
     if "quoted scalar" in context and "found unexpected" in problem:
-        return f"{where}: expected the quote that ends the text begun in line {line}, got the end of the file; add it"
-    for pattern, sentence in PROBLEMS:
+        return f"{where}: {sentence(YamlProblem('open-quote', begun=begun))}"
+    for pattern, kind in YAML_PROBLEMS:
         if found := re.search(pattern, problem):
-            shown: Callable[[str], str] = _token if "got {}" in sentence else str
-            return f"{where}: {sentence.format(*(shown(group) for group in found.groups() or ('',)))}"
-    return f"{where}: {problem}; {THERE}"
-
-
-def _token(name: str) -> str:
-    return TOKENS.get(name, f"`{name}`")
+            return f"{where}: {sentence(YamlProblem(kind, found[1] if found.groups() else ''))}"
+    return f"{where}: {sentence(YamlProblem('other', problem))}"

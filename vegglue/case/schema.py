@@ -294,6 +294,66 @@ class CanopyCorrection(Part):
     depth: Positive = Field(description="depth at which C is to stay the same [m]")
 
 
+class PlannedTransect(Part):
+    x: Number = Field(description="where it crosses the channel [m]")
+    spacing: Positive = Field(description="distance between its verticals [m]")
+    y: Interval | None = Field(default=None, description="from where to where; all of the water when left out [m]")
+    experiments: tuple[str, ...] | None = Field(default=None, description="in which; in all when left out")
+
+
+class PlannedPoint(Part):
+    x: Number = Field(description="of a vertical, such as one among plants [m]")
+    y: Number = Field(description="[m]")
+    experiments: tuple[str, ...] | None = Field(default=None, description="in which; in all when left out")
+
+
+class PlannedGauge(Part):
+    x: Number = Field(description="[m]")
+    y: Number | None = Field(default=None, description="in the middle of the channel when left out [m]")
+    experiments: tuple[str, ...] | None = Field(default=None, description="in which; in all when left out")
+
+
+class PlannedDischarge(Part):
+    x: Number = Field(description="of the cross-section that is gauged [m]")
+    experiments: tuple[str, ...] | None = Field(default=None, description="in which; in all when left out")
+
+
+class PlannedErrors(Part):
+    """Standard errors of measurements that are planned; those of `measurements/kinds.py` when left out."""
+
+    velocity: Positive | None = Field(default=None, description="of the mean of a vertical [m/s]")
+    level: Positive | None = Field(default=None, description="of a gauge [m]")
+    discharge: Positive | None = Field(default=None, description="of a gauging [m3/s]")
+    survey: Positive = Field(default=0.01, description="of a surveyed bed level [m]")
+
+
+class PlannedHours(Part):
+    """Hours of field work. Chosen: of a party of two with a current meter and a level."""
+
+    vertical: Positive = Field(default=0.3, description="a vertical [h]")
+    transect: Positive = Field(default=0.5, description="a transect beside its verticals [h]")
+    gauge: Positive = Field(default=0.5, description="a gauge, read in one flow [h]")
+    gauging: Positive = Field(default=1.0, description="a discharge measured for itself [h]")
+    survey_line: Positive = Field(default=1.0, description="a line of bed levels across the channel [h]")
+    discharge: Positive = Field(default=4.0, description="each flow beside the first [h]")
+
+
+class Planned(Part):
+    """Measurements that are planned, for `vegglue plan`; `next` uses its errors and hours."""
+
+    hours: Positive = Field(default=16.0, description="field work that is to be had, for what is proposed [h]")
+    transects: tuple[PlannedTransect, ...] = Field(default=(), description="lines of verticals across the channel")
+    points: tuple[PlannedPoint, ...] = Field(default=(), description="single verticals")
+    gauges: tuple[PlannedGauge, ...] = Field(default=(), description="water levels")
+    discharges: tuple[PlannedDischarge, ...] = Field(default=(), description="gaugings of a cross-section")
+    errors: PlannedErrors = Field(default_factory=PlannedErrors, description="usual errors of the instruments")
+    costs: PlannedHours = Field(default_factory=PlannedHours, description="hours of each piece of work")
+
+    @property
+    def pieces(self) -> tuple[PlannedTransect | PlannedPoint | PlannedGauge | PlannedDischarge, ...]:
+        return (*self.transects, *self.points, *self.gauges, *self.discharges)
+
+
 class Case(Part):
     """Everything one run depends on. Results go to runs/<name>/."""
 
@@ -316,6 +376,7 @@ class Case(Part):
     engine: CommandEngine | None = Field(default=None, description="a command instead of the solver, needs --trust")
     parameters: dict[str, Parameter] = Field(default_factory=dict, description="unknowns and their priors")
     observations: tuple[Observation, ...] = Field(default=(), description="measurements")
+    planned: Planned | None = Field(default=None, description="measurements that `plan` judges and adds to")
     frame: Frame | None = Field(default=None, description="where the grid lies on the map")
     imported: tuple[ImportedFile, ...] | None = Field(default=None, description="files that `import` made it from")
     survey: Survey | None = Field(default=None, description="plant survey")

@@ -1,11 +1,16 @@
-"""The shell of the ensemble: check, simulate, infer, report; and run, which goes the whole way."""
+"""The shell of the ensemble: check, simulate, infer, report; and run and demo, which go the whole way."""
 
+import os
+import sys
+import webbrowser
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
 import vegglue
 from vegglue.cli.options import (
+    FLAG,
     RUNS,
     Cluster,
     Config,
@@ -21,14 +26,14 @@ from vegglue.cli.options import (
 )  # fmt: skip
 from vegglue.cli.output import command_line, print_object
 from vegglue.cli.reporting import print_result, progress_reporter
-from vegglue.errors import shown_path
-from vegglue.wording.commands import HELP
+from vegglue.errors import InputError, shown_path
+from vegglue.wording.commands import DEMO, HELP
 
 
 def check_command(
     config: Config, runs: Runs = RUNS, as_object: Json = False, quiet: Quiet = False, trust: Trust = False
 ) -> None:
-    """Read everything a case names, say what is odd, and draw the channel, before hours are spent."""
+    """Read everything a case names, report what is odd, and draw the channel, before hours are spent."""
     case = vegglue.load_case(config, trust)
     with progress_reporter(quiet, as_object):
         found = vegglue.check(case, runs=runs)
@@ -38,6 +43,7 @@ def check_command(
 def simulate_command(
     config: Config,
     members: Members = None,
+    parameters: Annotated[Path | None, typer.Option(help=HELP["simulate.parameters"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,
@@ -50,10 +56,19 @@ def simulate_command(
 
     With --force, members for which the command of an `engine` failed are run again.
     """
+    if members is not None and parameters is not None:
+        raise InputError("simulate: expected --members or --parameters, got both; leave one out.")
     opened = opened_run(config, trust)
     from vegglue.inference.command_ensemble import refuse_useless
-    from vegglue.workflow.simulate import is_up_to_date
+    from vegglue.workflow.simulate import given_folder, is_up_to_date
 
+    if parameters is not None:
+        with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
+            run = opened.with_settings(runs, jobs, watch, force)
+            ensemble = vegglue.simulate(run, parameters=parameters)
+        folder = given_folder(run, parameters)
+        print_result(opened.case.model_copy(update={"name": folder.name}), folder.parent, ensemble, as_object)
+        return
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         run = opened.with_settings(runs, jobs, watch, force).sized(members)
         current = is_up_to_date(run)
@@ -85,7 +100,7 @@ def infer_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Infer the parameters from the measurements and say what was found."""
+    """Infer the parameters from the measurements and report what was found."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         run = opened.with_settings(runs, jobs, watch)
@@ -144,3 +159,41 @@ def run_command(
     last, found = last_of(results, Diagnosis)
     if last.name != opened.case.name and (found.steps or found.places):
         print(f"Next: {command_line('extend', shown_path(last.source), '--auto', runs=runs, trust=trust)}")
+
+
+def demo_command(
+    folder: Annotated[Path, typer.Argument(help=HELP["demo.folder"])] = RUNS / "demo",
+    short: Annotated[bool, typer.Option("--short", metavar=FLAG, help=HELP["demo.short"])] = False,
+    no_open: Annotated[bool, typer.Option("--no-open", metavar=FLAG, help=HELP["demo.no-open"])] = False,
+    jobs: Jobs = -1,
+    as_object: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run the loop on measurements that come with the package, up to one page that shows it."""
+    results = list[tuple[Any, Any]]()
+
+    def show(of: Any, result: Any) -> None:
+        results.append((of, result))
+        if not as_object and not quiet:
+            print_result(of, folder, result, as_object)
+
+    def begin(part: int) -> None:
+        if not as_object and not quiet:
+            print(DEMO[str(part)], flush=True)
+
+    with progress_reporter(quiet, as_object) as watch:
+        page = vegglue.demo(folder, short=short, jobs=jobs, watch=watch, show=show, part=begin)
+    if as_object:
+        from vegglue.cli.objects import run_object
+
+        print_object(run_object(folder, results) | {"overview": page.resolve()})
+        return
+    print(DEMO["page"].format(page.resolve()))
+    if not quiet:
+        print(DEMO["copy"].format(folder))
+    # Only where a person is in front of a desktop: without one, Linux would open a browser of the terminal.
+    desktop = sys.platform in ("win32", "darwin") or bool(
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    )
+    if desktop and sys.stdout.isatty() and not (no_open or os.environ.get("CI")):
+        webbrowser.open(page.resolve().as_uri())

@@ -48,19 +48,24 @@ def new_command(
 def export_command(
     config: Config,
     only: Annotated[Literal["csv", "geotiff", "netcdf"] | None, typer.Option(help=HELP["export.only"])] = None,
+    to: Annotated[Literal["pest", "spotpy"] | None, typer.Option(help=HELP["export.to"])] = None,
     runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Write the flow and the stations for maps and tables: CSV, GeoTIFF, netCDF (UGRID); on the map, with a frame."""
+    """Write the flow and the stations for maps and tables: CSV, GeoTIFF, netCDF (UGRID); or the case for PEST++ or
+    SPOTPY.
+    """
+    if only is not None and to is not None:
+        raise InputError("export: expected --only or --to, got both; leave one out.")
     case = vegglue.load_case(config, trust)
     with progress_reporter(quiet, as_object) as watch:
-        found = vegglue.export(case, runs=runs, forms=(only,) if only else FORMS, watch=watch)
+        found = vegglue.export(case, runs=runs, forms=(only,) if only else FORMS, to=to, watch=watch)
     if as_object:
         print_object({"files": found.files, "parameters": found.parameters})
         return
-    print(f"Flow of {found.parameters}, {len(found.files)} files in {found.files[0].parent}:")
+    print(f"{'Members' if to else 'Flow'} of {found.parameters}, {len(found.files)} files in {found.files[0].parent}:")
     for path in found.files:
         print(f"  {path.name}")
 
@@ -176,7 +181,7 @@ def reveal_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Open the seal of a twin, and say how well its diagnosis guessed."""
+    """Open the seal of a twin, and report how well its diagnosis guessed."""
     lines = vegglue.reveal(folder, runs=runs, trust=trust)
     if as_object:
         print_object({"folder": folder, "sentences": lines})

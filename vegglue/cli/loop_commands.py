@@ -1,4 +1,4 @@
-"""The shell of the loop: import, diagnose, discover, extend, compare, next; and overview, of several runs."""
+"""The shell of the loop: plan, import, diagnose, discover, extend, compare, next; and overview, of several runs."""
 
 import sys
 from pathlib import Path
@@ -38,7 +38,7 @@ def import_command(
 ) -> None:
     """Make a case of a folder of measurements, with wide priors; `vegglue run` then needs no edit by hand.
 
-    Tables may have any separator, units and names of columns: one line says what was taken from each.
+    Tables may have any separator, units and names of columns: one line reports what was taken from each.
 
     The confluence set of R.B. Canelas makes two, one with the bed surveyed and one with a plane instead.
     """
@@ -190,8 +190,29 @@ def next_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Say which measurement would tell the remaining rivals apart, by gain per hour of field work."""
+    """Rank the measurements that would separate the remaining rivals, by gain per hour of field work."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.next_measurement(opened.with_settings(runs, jobs, watch), between=between or [])
     print_result(opened.case, runs, found, as_object)
+
+
+def plan_command(
+    config: Config,
+    about: Annotated[str, typer.Option(help=HELP["plan.about"])] = "",
+    size: Annotated[float | None, typer.Option(help=HELP["plan.size"])] = None,
+    between: Annotated[tuple[str, str] | None, typer.Option(help=HELP["plan.between"])] = None,
+    hours: Annotated[float | None, typer.Option(help=HELP["plan.hours"])] = None,
+    details: Annotated[bool, typer.Option("--details", metavar=FLAG, help=HELP["plan.details"])] = False,
+    jobs: Jobs = -1,
+    runs: Runs = RUNS,
+    as_object: Json = False,
+    quiet: Quiet = False,
+    trust: Trust = False,
+) -> None:
+    """Before measuring: report what planned measurements would show, which to add, and write a page to take along."""
+    opened = opened_run(config, trust)
+    with progress_reporter(quiet, as_object) as watch:
+        settings = opened.with_settings(runs, jobs, watch)
+        found = vegglue.plan(settings, about=about, size=size, between=between or (), hours=hours)
+    print_result(opened.case, runs, found, as_object, details, command_line("plan", config, "--details", runs=runs))

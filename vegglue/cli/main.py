@@ -10,7 +10,14 @@ from typing import Annotated
 
 import typer
 
-from vegglue.cli.ensemble_commands import check_command, infer_command, report_command, run_command, simulate_command
+from vegglue.cli.ensemble_commands import (
+    check_command,
+    demo_command,
+    infer_command,
+    report_command,
+    run_command,
+    simulate_command,
+)
 from vegglue.cli.library_commands import effects_command, export_command, new_command, reveal_command, twin_command
 from vegglue.cli.loop_commands import (
     compare_command,
@@ -20,6 +27,7 @@ from vegglue.cli.loop_commands import (
     import_command,
     next_command,
     overview_command,
+    plan_command,
 )
 from vegglue.cli.options import FLAG
 from vegglue.errors import InputError, StorageError
@@ -79,7 +87,7 @@ def _make_printable() -> None:
 
 
 def _flush() -> None:
-    """Print what waits, now, while a full disk can still be told."""
+    """Print what waits, now, while a full disk can still be reported."""
     try:
         sys.stdout.flush()
     except OSError as error:
@@ -117,7 +125,14 @@ def about(
 
 # By group, in the order in which they are used.
 COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
-    "Begin": {"new": new_command, "import": import_command, "check": check_command, "run": run_command},
+    "Begin": {
+        "demo": demo_command,
+        "new": new_command,
+        "plan": plan_command,
+        "import": import_command,
+        "check": check_command,
+        "run": run_command,
+    },
     "The loop": {
         "diagnose": diagnose_command,
         "discover": discover_command,

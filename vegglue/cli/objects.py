@@ -12,6 +12,7 @@ from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.inference.statements import off_its_prior, posterior_statements, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis, diagnosis_json
 from vegglue.results.ensemble import Ensemble
+from vegglue.results.plan import FieldPlan, plan_json
 from vegglue.results.posterior import Posterior
 from vegglue.wording.sentences import sentence, sentences, tagged
 from vegglue.workflow.check import CheckedCase
@@ -64,6 +65,8 @@ def object_of(case: Case, runs: Path, result: Any) -> Object:
             return told | _comparison(result.comparison)
         case Comparison():
             return _comparison(result)
+        case FieldPlan():
+            return plan_json(result) | {"page": (folder / "plan" / "plan.html").resolve()}
         case list():
             questions = [
                 {"tells_apart": one.tells_apart, "answered": one.answered,

@@ -20,7 +20,7 @@ FLAG = " "
 
 Config = Annotated[Path, typer.Argument(help=HELP["config"], show_default=False)]
 Runs = Annotated[Path, typer.Option(help=HELP["runs"])]
-# Where results lie unless told.
+# Where results lie by default.
 RUNS = Path("runs")
 
 

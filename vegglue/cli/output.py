@@ -1,7 +1,6 @@
 """How a command prints: lines, tables, or one JSON object; colour on a terminal only, none where NO_COLOR is set."""
 
 import json
-import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vegglue.cli.options import RUNS
+from vegglue.errors import shell_line
 from vegglue.plain_json import plain
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ COLUMN_GAP = 2
 def command_line(verb: str, *arguments: object, runs: Path = RUNS, trust: bool = False) -> str:
     """A command that can be copied, with the options that the one before was given."""
     options = [*(["--runs", str(runs)] if runs != RUNS else []), *(["--trust"] if trust else [])]
-    return shlex.join(["vegglue", verb, *map(str, arguments), *options])
+    return shell_line(["vegglue", verb, *map(str, arguments), *options])
 
 
 @cache

@@ -15,8 +15,8 @@ from vegglue.cli.output import command_line, console, print_table
 from vegglue.diagnosis.comparison import exclusion_in_words, held_out_rmse, improvement
 from vegglue.errors import shown_path
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
+from vegglue.inference.homogeneity import differing
 from vegglue.inference.statements import (
-    REJECTED_BELOW,
     CalibrationDiffers,
     correlations,
     fit_statements,
@@ -41,6 +41,7 @@ from vegglue.pages.headline import (
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.open_questions import Question
+from vegglue.results.plan import FieldPlan
 from vegglue.results.posterior import Posterior
 from vegglue.wording.numbers import FIRM, in_digits, range_in_digits, so_many
 from vegglue.wording.sentences import lines_of, phrase, sentence
@@ -117,6 +118,9 @@ def show(case: Case, runs: Path, result: Any, details: bool = False, more: str =
             print(sentence(result.sentence))
             print(sentence(result.reason))
             print(f"Last config: {result.cases[-1].source}")
+        case FieldPlan():
+            show_plan(result, details, more)
+            print(phrase("files_of_plan", folder / "plan"))
         case Comparison():
             show_ladder(result)
             print(f"Drawn in {folder / 'ladder.png'}")
@@ -312,7 +316,7 @@ def show_ladder(found: Comparison) -> None:
     headings = ("model", "parameters", "RMSE", "levels", *(f"{kind.words} [{kind.unit}]" for kind in others),
                 "chi2 / n", "section left out", "reduction", "exp. left out", "log score", "in 50 %", "in 95 %",
                 *validated)  # fmt: skip
-    rows, differing = [], []
+    rows, heterogeneous = [], []
     for before, one in zip([None, *scores[:-1]], scores, strict=True):
         seen, held = one.in_sample, one.predictive
         # By how much held-out squares fell [(mm/s)^2]; the error of that is unknown if one section alone was held out.
@@ -325,17 +329,16 @@ def show_ladder(found: Comparison) -> None:
             error(held_out_rmse(one, "experiments")), error(held.log_score, ".2f"), error(held.inside50, ".0%"),
             error(held.inside95, ".0%"), *([error(one.validation)] if validated else []),
         ))  # fmt: skip
-        moving = {name: p for name, p in one.homogeneity.items() if p * len(one.homogeneity) < REJECTED_BELOW}
-        if moving:
-            differing.append((one.name, moving))
+        if moves := differing(one.homogeneity):
+            heterogeneous.append((one.name, {name: p for name, p in one.homogeneity.items() if name in moves}))
     print_table(headings, rows, [one for one in FIRST_OF_LADDER if one in headings])
     if scores:
         console().print(phrase("units_of_ladder", scores[-1].in_sample.noise_floor))
     if note := exclusion_in_words(found.left_out):
         console().print(sentence(note))
-    for name, moving in differing:
+    for name, moving in heterogeneous:
         console().print(f"- {phrase('differs_between_experiments', name, moving)}")
-    if differing:
+    if heterogeneous:
         console().print(phrase("differences_under_stated_errors"))
 
 
@@ -345,3 +348,25 @@ def show_questions(name: str, found: Sequence[Question]) -> None:
         print("\n".join(wrapped([phrase("no_question", name)])))
     for question in found:
         print("\n".join(wrapped(repr(question).splitlines())))
+
+
+def show_plan(plan: FieldPlan, details: bool, more: str) -> None:
+    """Print what a plan would show, its parameters, and what to add; details: all effects in a table."""
+    for line in lines_of(plan):
+        print(textwrap.fill(line, TERMINAL_WIDTH, subsequent_indent="  " if line.startswith("-") else ""))
+    if not details:
+        print(phrase("more_of_plan", more))
+        return
+    rows = [
+        [
+            one.name,
+            in_digits(one.smallest, 2) if np.isfinite(one.smallest) else phrase("never_detected"),
+            in_digits(one.plausible, 2),
+            one.unit,
+            f"{100 * one.chance_plausible:.0f} %",
+            ", ".join(other.name for other in one.confused[:2]),
+        ]
+        for one in plan.effects
+    ]
+    headings = ["effect", "detected from", "plausible", "unit", "chance", "similar"]
+    print_table(headings, rows, ["detected from", "chance"])

@@ -14,6 +14,7 @@ import numpy as np
 
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import log_evidence
+from vegglue.calibration.detection import detected_length
 from vegglue.calibration.fit import objective
 from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.calibration.residual_screening import Screening
@@ -32,15 +33,14 @@ from vegglue.results.causes import (
 )
 
 # Lengths of a fingerprint, in standard errors, that may be there undetected: thresholds are near a score of 3.2, so
-# that longer ones stand out and shorter ones change little. Which it is nobody knows.
+# that longer ones stand out and shorter ones change little. Which it is, is not known.
 UNDETECTED_LENGTHS = (2.0, 3.0, 4.0)
 # Share of the chances that the effects listed as not excluded hold together.
 NOT_EXCLUDED_CHANCE = 0.9
 # Standard deviations of an effect's prior beyond which its size is not taken to be possible.
 LARGEST_POSSIBLE = 3.0
-# By how many standard errors a fingerprint must be longer than the threshold to be detected 19 times of 20: the 95 %
-# point of a standard normal score.
-POWER_QUANTILE = 1.645
+# Chance with which an effect of the smallest size is detected [-].
+DETECTED = 0.95
 # Standard deviations of its prior within which an effect must be detectable to be testable, and within its support.
 TESTABLE = 2.0
 
@@ -57,6 +57,7 @@ def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
         screening.base,
         screening.kinds[0],
     )
+    detected = float(detected_length(np.array(threshold), DETECTED))
     projected, prints = screening.projected, screening.fingerprints
     least_squares = objective(base.noise, base.fitted.point)
 
@@ -69,7 +70,7 @@ def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
         amplitude, gain = prints.amplitudes[column], float(kind.gain[column])
         reach = NORMAL95 * amplitude.plausible_gain / float(np.hypot(1.0, kind.size[column]))
         taken = float(screening.effects.scores[column] ** 2 * prior_shrinkage(kind.size[column]))
-        smallest = amplitude.size((threshold + POWER_QUANTILE) / max(float(projected.length[column]), 1e-300))
+        smallest = amplitude.size(detected / max(float(projected.length[column]), 1e-300))
         confounder, cosine = "", 0.0  # the parameter whose slope is most like the fingerprint
         if base.model.names:
             cosines = unit(screening.whitened_fingerprints[:, column]) @ unit(screening.whitened_slopes)
@@ -114,12 +115,12 @@ def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(names[j] for j in group) for group in groups)
 
 
-# Share of the chance of all laws that those told hold together.
+# Share of the chance of all laws that the reported ones hold together.
 LAWS_HELD = 0.95
 
 
 def laws_beside(screening: Screening) -> LawScreening | None:
-    """Laws screened beside all that is listed; None where none can be told: `discover` refuses a command."""
+    """Laws screened beside all that is listed; None if there can be none: `discover` refuses a command."""
     if screening.base.model.case.engine is not None:
         return None
     traces = law_fingerprints(screening.base, (), screening.fingerprints)
@@ -132,7 +133,7 @@ def candidate_laws(
     """Laws that stand out against the last model, or against the first one where something was accepted; None where
     errors alone leave as much, or beside listed effects that were accepted unless it is clearly a law.
 
-    beside_first: `laws_beside` the first screening, begun before it is known whether it is asked for.
+    beside_first: `laws_beside` the first screening, begun before it is known whether it is needed.
     """
     if found.implausible:
         return None

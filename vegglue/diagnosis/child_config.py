@@ -1,7 +1,6 @@
 """A child config: what it extends, which effects it adds, with a prior for the amplitude of each."""
 
 import hashlib
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +26,7 @@ from vegglue.case.schema import Case
 from vegglue.case.text_files import LONGEST_NAME, case_name
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
-from vegglue.errors import InputError
+from vegglue.errors import InputError, path_from
 from vegglue.results.causes import LocalAnomaly
 
 
@@ -111,7 +110,7 @@ def with_additions(parent: Case, added: Sequence[tuple[Candidate, Mapping[str, f
 def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Tree:
     """Keys and values of the child that `target` is to hold: effects, and the priors of their amplitudes."""
     tree: Tree = {
-        "extends": Path(os.path.relpath(parent.source, target.resolve().parent)).as_posix(),
+        "extends": path_from(target.resolve().parent, parent.source),
         "name": child_name(parent.name, [candidate for candidate, _ in added]),
         "title": f"{parent.title or parent.name}, with {' and '.join(candidate.name for candidate, _ in added)}",
         "effects": {},

@@ -28,7 +28,7 @@ from vegglue.engine.model import coarser
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
-from vegglue.measurements.observations import SET_ASIDE
+from vegglue.measurements.observations import EXCLUDED
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
 from vegglue.wording.sentences import phrase
@@ -55,7 +55,7 @@ def without_stations(station: pd.DataFrame, aside: pd.DataFrame) -> pd.DataFrame
     known = set(aside.itertuples(index=False, name=None))
     there = np.array([row in known for row in station[MEASUREMENT].itertuples(index=False, name=None)], dtype=bool)
     there &= station["used"].to_numpy()
-    return station.assign(used=station["used"].mask(there, False), reason=station["reason"].mask(there, SET_ASIDE))
+    return station.assign(used=station["used"].mask(there, False), reason=station["reason"].mask(there, EXCLUDED))
 
 
 def exclusion_in_words(aside: pd.DataFrame) -> str:
@@ -182,7 +182,7 @@ def improvement(
 def homogeneity(base: Baseline) -> dict[str, float]:
     """For each parameter the chance p that it is the same in all experiments, each moved to by one linear step [-].
 
-    The test of `transfer`; parameters of which fewer than two experiments say enough are left out.
+    The test of `transfer`; parameters that fewer than two experiments constrain are left out.
     """
     noise, point = base.noise, base.fitted.point
     slope, left = noise.used(point.slope), noise.residual(point.prediction)

@@ -45,7 +45,7 @@ from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.effects.library import library
 from vegglue.progress import Progress, Watch
 
-# Odds beyond e^this are told as this: larger numbers say no more.
+# Odds beyond e^this are reported as this: larger numbers mean no more.
 LARGEST_LOG_ODDS = 100.0
 
 

@@ -26,8 +26,8 @@ from vegglue.decision_constants import constants
 from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, clearly_a_law, not_excluded
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.competition import tempering
-from vegglue.diagnosis.errors_elsewhere import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
+from vegglue.diagnosis.held_out import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.search_state import SearchState, rivals_in
 from vegglue.effects.definition import Stage
 from vegglue.engine.interface import Model, Point
@@ -330,9 +330,10 @@ def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Mi
     """chi2 before and after, and where the first model misses."""
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
-    readings = after.noise.rows.size - int(np.linalg.matrix_rank(after.noise.unknown))
+    unknown = after.noise.unknown
+    readings = after.noise.rows.size - (int(np.linalg.matrix_rank(unknown)) if unknown.size else 0)  # numpy before 2.4
     freedom = freedom_of_misfit(readings, after.fitted.covariance)
-    # The errors that are told: those of the last model, whose residual holds the least that is no error.
+    # The errors that are reported: those of the last model, whose residual holds the least that is no error.
     errors_as_last = with_correlation(before.noise, after.noise.correlation, after.noise.scale)
     return Misfit(
         chi2_first=chi2(before.noise, before.fitted.point),
@@ -344,7 +345,7 @@ def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Mi
 
 
 def estimated_errors(screening: Screening, found: SearchState) -> EstimatedErrors:
-    """What the errors are taken to be after the last screening; that of the grid is told of velocities alone [m/s]."""
+    """The errors after the last screening; that of the grid is reported for velocities alone [m/s]."""
     noise = screening.base.noise
     flagged = tuple(int(noise.rows[row]) for row in found.flagged)
     velocity = velocity_rows(screening.base.model.station.iloc[noise.rows])
@@ -371,7 +372,7 @@ def _field(
 ) -> tuple[FieldFound, FieldMapKept] | tuple[None, None]:
     """A smooth field of one term and its map, where it explains the misfit of the first model better than all that was
     accepted, or closes a misfit in which nothing was; None where there is nothing to explain, or where a place of the
-    same term says it in fewer words.
+    same term explains it with fewer numbers.
     """
     if found.implausible or (not (found.accepted or found.undecided) and misfit.p >= constants().poor_fit_chance):
         return None, None

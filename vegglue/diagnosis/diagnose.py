@@ -2,7 +2,7 @@
 
 The model is calibrated, and its residual is screened by score tests of all that could be missing (Rao 1948,
 doi:10.1017/S0305004100023987). While an alarm is sounded (`score_test`), listed effects, places and instruments
-compete by their evidence (`competition`), and the best is taken into the model or its data set aside; what was accepted
+compete by their evidence (`competition`), and the best is taken into the model or its data excluded; what was accepted
 earlier and is no longer needed is dropped; and the residual is screened again. The verdict is drawn from what was found
 and from the last screening.
 """

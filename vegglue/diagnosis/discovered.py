@@ -16,7 +16,7 @@ from vegglue.effects.grammar import Law, signed
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 from vegglue.wording.numbers import in_short
-from vegglue.wording.sentences import phrase, sentence
+from vegglue.wording.sentences import file_text, phrase, sentence
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class LawFound:
 
 @dataclass(frozen=True)
 class ProductFound:
-    """found: a product of the best law with another quantity, told as any law; refit: of it, beside that law, whose a
-    is then strength_of_law [-]. found.chance: that it is what is left, among all else that could be.
+    """found: a product of the best law with another quantity, reported as any law; refit: of it, beside that law, whose
+    a is then strength_of_law [-]. found.chance: that it is what is left, among all else that could be.
     """
 
     found: LawFound
@@ -119,7 +119,7 @@ class Discovery:
 
     @property
     def enough_for_errors(self) -> bool:
-        """Whether errors alone leave as much as rarely as an alarm asks."""
+        """Whether errors alone leave as much no more often than the rate of an alarm."""
         return self.p <= constants().false_alarm_rate
 
     @property
@@ -159,25 +159,6 @@ class Discovery:
         return [line for lines in self.ranked for line in lines]
 
 
-IMPORTS = "import numpy as np\nfrom vegglue.effects.definition import Amplitude, Effect, SeenRange\n"
-OF_FLUXES = "from vegglue.effects.exchange import dispersion\n"
-FUNCTION = '''
-
-def {name}(cells, strength):
-    """{equation}."""
-    g = {g}
-    return {change}
-'''
-EFFECT = """Effect(
-    name="{name}", stage="{stage}", act={name},
-    title="{title}",
-    equation="{equation}",
-    source="found by `vegglue discover`; seen for {seen}",
-    amplitude=Amplitude("strength", "-", "strength {letter} of the law", scale={scale:.2g}, low={low:g}, high={high:g}),
-    seen=SeenRange("{symbol}", "{unit}", lambda cells: {quantity}, {least:.2g}, {most:.2g}),
-)"""
-
-
 def effect_name(found: LawFound) -> str:
     """The name of a law as an effect of a user's own: bank_speed_step."""
     return found.law.name.removeprefix("law_")
@@ -192,25 +173,16 @@ def effect_text(laws: Sequence[LawFound], own: Path | None) -> str:
     for name in map(effect_name, laws):
         if name in known:
             raise InputError(f"{own}: the effect `{name}` exists already; rename it there, then run discover again.")
-    before = IMPORTS if own is None else own.read_text(encoding="utf-8").rstrip() + "\n\n\n" + IMPORTS
     parts = []
     for found in laws:
         law = found.law
         g = _written(law, found.reference)
         if law.times is not None:
             g = f"({_written(law.times, found.first)}) * ({g})"
-        parts.append({
-            "name": effect_name(found), "equation": found.equation, "seen": found.range_seen, "g": g,
-            "change": law.term.change.format(factor=f"np.exp(strength * g{law.term.written})"),
-            "stage": law.term.stage, "title": law.title, "scale": found.scale, "low": -law.form.strongest,
-            "high": law.form.strongest, "symbol": law.quantity.symbol, "unit": law.quantity.unit,
-            "quantity": law.quantity.written, "letter": "a" if law.times is None else "c",
-            "least": found.seen[0], "most": found.seen[1],
-        })  # fmt: skip
-    functions = "".join(FUNCTION.format(**part) for part in parts)
-    before += OF_FLUXES if "dispersion(" in functions else ""
-    effects = ", ".join([*(["*EFFECTS"] if own is not None else []), *(EFFECT.format(**part) for part in parts)])
-    return f"{before}{functions}\n\nEFFECTS = ({effects},)\n"
+        change = law.term.change.format(factor=f"np.exp(strength * g{law.term.written})")
+        parts.append({"name": effect_name(found), "found": found, "g": g, "change": change})
+    before = "" if own is None else own.read_text(encoding="utf-8").rstrip() + "\n\n\n"
+    return before + file_text("effects.py.j2", {"parts": parts, "own": own is not None})
 
 
 def _written(law: Law, reference: float | None) -> str:

@@ -70,29 +70,29 @@ PAIRS = np.arange(len(TRIAL_STATIONS)).reshape(-1, 4)[:, ::-1].ravel()
 class ContractRule(Enum):
     """What every effect must keep. The comment gives what a Breach holds besides."""
 
-    WORD_MISSING = "every word of the declaration is stated"  # name of the word
-    PARAMETER_UNDECLARED = "every parameter has a unit and a meaning"  # name
-    PARAMETER_TWICE = "no two parameters share a name"  # name
-    AMPLITUDE_FINITE = "low, high, off and scale are finite"
-    OFF_WITHIN_SUPPORT = "off lies within low and high"  # values: off, low, high
-    SCALE_WITHIN_SUPPORT = "scale lies within the support, power is at least 1"
-    SHAPE_WITHIN_SUPPORT = "default and grid of a shape lie within low and high"  # name; values: low, high
-    FUNCTION_RUNS = "its function runs"  # name: the error
-    REPEATS = "the same flow gives the same answer"
-    FINITE = "all it changes stays finite"  # water
-    OFF_IS_OFF = "nothing changes while it is off"  # name of the amplitude; water
-    ACTS = "something changes in moving water"  # name of the amplitude
-    POWER = "a small amplitude acts with its power"  # name of the amplitude; values: power
-    TURNS = "below off it acts the other way round"  # name of the amplitude
-    DRAG_POSITIVE = "the friction rate stays at or above 0"  # water
-    VISCOSITY_POSITIVE = "the viscosity stays at or above 0"  # water
-    PLANTS_POSITIVE = "phi and canopy height stay above 0"  # name
-    INFLOW_POSITIVE = "discharge and spread of an inflow stay above 0"
-    MIRRORED = "a mirrored flow feels the mirrored effect"
-    MEMBERS_ALONE = "members do not act on each other"
-    ROWS_ALONE = "it depends on the next cells across only"
-    DOWNSTREAM_ALONE = "it depends on the next cells along only"
-    SETTLES = "a steady flow exists with a plausible amplitude"  # name of the amplitude; values: amplitude
+    WORD_MISSING = "word-missing"  # name of the word
+    PARAMETER_UNDECLARED = "parameter-undeclared"  # name
+    PARAMETER_TWICE = "parameter-twice"  # name
+    AMPLITUDE_FINITE = "amplitude-finite"
+    OFF_WITHIN_SUPPORT = "off-within-support"  # values: off, low, high
+    SCALE_WITHIN_SUPPORT = "scale-within-support"
+    SHAPE_WITHIN_SUPPORT = "shape-within-support"  # name; values: low, high
+    FUNCTION_RUNS = "function-runs"  # name: the error
+    REPEATS = "repeats"
+    FINITE = "finite"  # water
+    OFF_IS_OFF = "off-is-off"  # name of the amplitude; water
+    ACTS = "acts"  # name of the amplitude
+    POWER = "power"  # name of the amplitude; values: power
+    TURNS = "turns"  # name of the amplitude
+    DRAG_POSITIVE = "drag-positive"  # water
+    VISCOSITY_POSITIVE = "viscosity-positive"  # water
+    PLANTS_POSITIVE = "plants-positive"  # name
+    INFLOW_POSITIVE = "inflow-positive"
+    MIRRORED = "mirrored"
+    MEMBERS_ALONE = "members-alone"
+    ROWS_ALONE = "rows-alone"
+    DOWNSTREAM_ALONE = "downstream-alone"
+    SETTLES = "settles"  # name of the amplitude; values: amplitude
 
 
 @dataclass(frozen=True)

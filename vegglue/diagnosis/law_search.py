@@ -95,7 +95,7 @@ def product_beside(
 
 
 # Quantities of terms of which a law is calibrated at most; as many as listed effects in a diagnosis. Of the first two,
-# which decide what is told, two forms are. Chosen, not measured: each costs a fit.
+# which decide what is reported, two forms are. Chosen, not measured: each costs a fit.
 MOST_QUANTITIES, SEVERAL_FORMS, FORMS_REFITTED = 8, 2, 2
 # Chance that the set of laws and other causes holds together [-].
 HELD = 0.95

@@ -1,4 +1,4 @@
-"""The next measurement: which one would tell rival explanations apart, and how much it would say per hour of work.
+"""The next measurement: which one would separate rival explanations, and how much it would gain per hour of work.
 
 Rival i, fitted to the data at hand, predicts new measurements; rival j predicts others, after it has been calibrated to
 all of them. What is left between both,
@@ -29,17 +29,16 @@ from vegglue.calibration.noise import Noise
 from vegglue.case.bed_error import bed_error_columns
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import in_experiment
-from vegglue.case.schema import Case, ModelError
+from vegglue.case.schema import Case, ModelError, Planned
 from vegglue.case.survey_error import read_bed_survey
 from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.observations import section_places, station_table
 from vegglue.wording.numbers import in_digits
 
-# Hours of field work: a vertical, a section on top of its verticals, a gauge, another discharge.
-HOURS = {"vertical": 0.3, "section": 0.5, "gauge": 0.5, "discharge": 4.0, "line": 1.0, "polygons": 2.0}
-# Standard error of a point of a new line [m], and how near to a line a new one is the same [m].
-POINT_ERROR, SAME_LINE = 0.01, 1.0
+# Standard error of a point of a new line [m], how near to a line a new one is the same [m], and hours of work by which
+# outlines of plants are taken with a total station. Chosen.
+POINT_ERROR, SAME_LINE, OUTLINES = 0.01, 1.0, 2.0
 # Places along the reach where a section is thought of, and how near to one that was measured it is that one, over the
 # distance between these places. Chosen, not measured.
 SECTIONS, AS_MEASURED = 12, 0.3
@@ -98,6 +97,8 @@ def worth_of_measurements(
     for kind in dict.fromkeys(kinds):
         there = errors[(kinds == kind) & np.isfinite(errors)]
         usual = np.median(there) if there.size else kind_of(str(kind)).usual_error
+        if wide.case.planned is not None:
+            usual = getattr(wide.case.planned.errors, str(kind), None) or usual
         errors[(kinds == kind) & ~np.isfinite(errors)] = usual
     covariance = np.diag(errors**2) + own_error @ own_error.T
     plans += surveys(wide, point)
@@ -152,6 +153,7 @@ def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
     """
     case, grid, nothing = model.case, model.site.grid, np.zeros(0, dtype=int)
     found, no_station = [], model.station.iloc[:0]
+    hours = (case.planned or Planned()).costs.survey_line
     columns = bed_error_columns(case, grid)
     if columns.any():
         own = model.station["experiment"].isin(model.site.own).to_numpy()
@@ -168,14 +170,14 @@ def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
             lower = np.linalg.cholesky(at @ at.T + POINT_ERROR**2 * np.eye(len(at)))
             less = answers @ scipy.linalg.solve_triangular(lower, at, lower=True).T
             name = f"a surveyed line of the bed at x = {x:.0f} m"
-            found.append(MeasurementPlan(name, nothing, no_station, HOURS["line"], float(x), "", less))
+            found.append(MeasurementPlan(name, nothing, no_station, hours, float(x), "", less))
     if case.model_error.edges and case.plants.patches:
         drag = cell_responses(model, point, ("friction", "drag"))
         sides = site_error_columns(model, point, ModelError(edges=case.model_error.edges), drag)
         # Corners that are levelled in leave a fifth of the error, and a 25th of its square.
         less = np.sqrt(1.0 - 0.2**2) * sides
         name = "the outlines of the plants, by total station"
-        found.append(MeasurementPlan(name, nothing, no_station, HOURS["polygons"], float(grid.x.mean()), "", less))
+        found.append(MeasurementPlan(name, nothing, no_station, OUTLINES, float(grid.x.mean()), "", less))
     return found
 
 
@@ -185,6 +187,7 @@ def _ideas(
     """Name, experiment, x, y, kind and hours of every measurement worth a thought; sections as those that were
     measured, as far as water reaches, none where no velocity was. model: with further experiments behind those at hand.
     """
+    costs = (model.case.planned or Planned()).costs
     usual, y = at_hand[-1], np.zeros(0)
     if not velocity.empty:  # where verticals stand in the section that has most of them
         counts = velocity.groupby("x")["y"].nunique()
@@ -199,20 +202,19 @@ def _ideas(
         at = f"the section at x = {round(x, 2):g} m"
         sections.append((f"{at} again ({usual})", usual, x, here, 0.0))
         others = [name for name in model.case.experiments if name not in at_hand]
-        sections += [(f"{at} {experiment}", experiment, x, here, HOURS["discharge"]) for experiment in others]
+        sections += [(f"{at} {experiment}", experiment, x, here, costs.discharge) for experiment in others]
     ideas = []
     for name, experiment, x, verticals, more in sections:  # verticals that the water covers, see `expected_depth`
         site, grid = in_experiment(model.site, experiment), model.site.grid
         depth = expected_depth(model.case, site, model.case.experiments[experiment])[np.abs(grid.x - x).argmin()]
         deep = depth[np.abs(grid.y[:, None] - verticals).argmin(axis=0)] > model.case.numerics.film_depth
         if (wet := verticals[deep]).size:
-            hours = HOURS["section"] + wet.size * HOURS["vertical"] + more
+            hours = costs.transect + wet.size * costs.vertical + more
             ideas.append((name, experiment, x, wet, STREAMWISE, hours))
     across = y if y.size else np.array(model.case.grid.y)
     middle = np.array([float(0.5 * (across[0] + across[-1]))])
     return ideas + [
-        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), middle, WATER_LEVEL, HOURS["gauge"])
-        for x in places[::2]
+        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), middle, WATER_LEVEL, costs.gauge) for x in places[::2]
     ]
 
 
@@ -222,7 +224,7 @@ def _measured_sections(velocity: pd.DataFrame, experiments: Sequence[str], near:
     """
     verticals = velocity.groupby(["experiment", "x"], sort=False)["y"].unique()
     found: list[tuple[list[str], float, Array]] = []
-    # Where as many, in the order of the case: that of the rows of a table tells nothing.
+    # Where as many, in the order of the case: that of the rows of a table means nothing.
     for (experiment, x), y in sorted(
         verticals.items(), key=lambda one: (-one[1].size, experiments.index(one[0][0]), one[0][1])
     ):

@@ -98,25 +98,20 @@ def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z:
 
 
 def _best_of_starts(search: SearchModel, trial: RefitTrial) -> MapEstimate | None:
-    """The best end of all starts, each later one followed while it promises more than those before it."""
-    best: MapEstimate | None = None
-    for start in trial.starts:
-        found = _refitted(search, trial, start, np.inf if best is None else best.objective - WORTH_FOLLOWING)
-        if found is not None and (best is None or found.objective < best.objective):
-            best = found
-    return best
-
-
-def _refitted(search: SearchModel, trial: RefitTrial, start: Array, enough: float) -> MapEstimate | None:
-    """The end of one start, or of a share of the way to it from the amplitude off."""
-    model, candidate = _with(search.model, trial), trial.candidate
+    """The best end of all starts, or of a share of the way to them from the amplitude off, each later one followed
+    while it promises more than those before it.
+    """
+    model, candidate, best = _with(search.model, trial), trial.candidate, None
     off = z_of(model.case.parameters[candidate.parameter], start_amplitude(candidate.amplitude, 0.0))
     here = np.append(search.point.z, off)
-    for share in SHARES_OF_START:
-        point = linearise_from(model, np.asarray(here + share * (start - here)), search.point)
+    for start in trial.starts:
+        enough = np.inf if best is None else best.objective - WORTH_FOLLOWING
+        ways = (np.asarray(here + share * (start - here)) for share in SHARES_OF_START)
+        point = next((one for z in ways if (one := linearise_from(model, z, search.point)) is not None), None)
         if point is not None:
-            return fit(model, search.noise, point, REFIT_STEPS, enough)
-    return None
+            found = fit(model, search.noise, point, REFIT_STEPS, enough)
+            best = found if best is None or found.objective < best.objective else best
+    return best
 
 
 def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
@@ -133,7 +128,7 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
     start = _on_own_cells(base, model, place)
     if start is None:
         return None
-    # Errors of the grid and of the model are told where the refit ended first: its flow on coarse cells is known.
+    # Errors of the grid and of the model are those where the refit ended first: its flow on coarse cells is known.
     noise = with_own_error_at(base.noise, coarse, place)
     trial = Baseline(model, noise, at_point(noise, start), coarse, place)
     return with_own_error_again(under_error_of_grid(trial), place.z)

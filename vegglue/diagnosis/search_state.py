@@ -59,7 +59,7 @@ def rivals_in(undecided: Undecided) -> tuple[Rival, ...]:
 
 @dataclass(frozen=True)
 class SearchState:
-    """prior_weights: of all that is held. flagged: readings set aside, indices among the used stations. of_shape:
+    """prior_weights: of all that is held. flagged: excluded readings, indices among the used stations. of_shape:
     ln evidence of places as they competed, less that in the model, whose covariance holds the error of their shape. p:
     of the last alarm, and the rate below which it is sounded. undecided: what competed last and led to nothing.
     implausible: values that no flow of the case can have.
@@ -129,7 +129,7 @@ class SearchState:
         return replace(self, steps=steps, prior_weights=weights)
 
 
-# Share of the squared fingerprint of a spot above which an experiment is said to point at it.
+# Share of the squared fingerprint of a spot above which an experiment is reported to point at it.
 POINTS_AT_IT = 0.1
 
 
@@ -196,7 +196,7 @@ def place_followed_further(
 
 
 def _rival_name(one: Hypothesis) -> str:
-    """Under which a rival of a place is told: an effect by its own, another by its kind."""
+    """The name of a rival of a place: an effect by its own, another by its kind."""
     return one.name if one.kind == "effect" else one.kind
 
 

@@ -9,27 +9,87 @@ from vegglue.effects.surroundings import BoundaryValues
 
 
 def discharge_error(boundary: BoundaryValues, relative_error: Array) -> dict[str, Array]:
-    """Q -> Q (1 + e)."""
+    """Q -> Q (1 + e).
+
+    Parameters
+    ----------
+    boundary : BoundaryValues
+    relative_error : (m,) [-]
+        true over reported discharge, less one.
+
+    Returns
+    -------
+    dict
+        `discharge` (inflow, m) [m3/s].
+    """
     return {"discharge": boundary.discharge * (1.0 + relative_error)}
 
 
 def inflow_skew(boundary: BoundaryValues, skew: Array) -> dict[str, Array]:
-    """q -> q (1 + a s), s = -1 .. 1 across each inflow."""
+    """q -> q (1 + a s), s = -1 .. 1 across each inflow.
+
+    Parameters
+    ----------
+    boundary : BoundaryValues
+    skew : (m,) [-]
+        relative excess a at the end of the inflow.
+
+    Returns
+    -------
+    dict
+        `spread` (inflow, cell, m) [-].
+    """
     return {"spread": boundary.spread * (1.0 + skew * boundary.position)}
 
 
 def inflow_core(boundary: BoundaryValues, excess: Array) -> dict[str, Array]:
-    """q -> q (1 + a (1 - 3 s^2) / 2), s = -1 .. 1 across each inflow."""
+    """q -> q (1 + a (1 - 3 s^2) / 2), s = -1 .. 1 across each inflow.
+
+    Parameters
+    ----------
+    boundary : BoundaryValues
+    excess : (m,) [-]
+        twice the relative excess in the middle.
+
+    Returns
+    -------
+    dict
+        `spread` (inflow, cell, m) [-].
+    """
     return {"spread": boundary.spread * (1.0 + excess * (1.0 - 3.0 * boundary.position**2) / 2.0)}
 
 
 def lateral_inflow(boundary: BoundaryValues, share: Array) -> dict[str, Array]:
-    """q_lateral -> q_lateral + r Q, Q the sum of all inflows [m3/s]."""
+    """q_lateral -> q_lateral + r Q, Q the sum of all inflows [m3/s].
+
+    Parameters
+    ----------
+    boundary : BoundaryValues
+    share : (m,) [-]
+        discharge that enters along the reach over that at the inflow.
+
+    Returns
+    -------
+    dict
+        `lateral` (m,) [m3/s].
+    """
     return {"lateral": boundary.lateral + share * boundary.discharge.sum(axis=0)}
 
 
 def outlet_level(boundary: BoundaryValues, rise: Array) -> dict[str, Array]:
-    """z_out -> z_out + d."""
+    """z_out -> z_out + d.
+
+    Parameters
+    ----------
+    boundary : BoundaryValues
+    rise : (m,) [m]
+        true level less the one reported.
+
+    Returns
+    -------
+    dict
+        `level` (m,) [m].
+    """
     return {"level": boundary.level + rise}
 
 

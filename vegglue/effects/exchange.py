@@ -14,19 +14,43 @@ from vegglue.effects.surroundings import Cells
 LEAST_RELATIVE_DEPTH = 0.2
 # Secondary currents fade out from here, in half widths from the axis: on the banks they have no room to turn.
 CURRENTS_END = 1.5
-# m2/s2, the square of 0.05 m/s, added to |U|^2: the direction of slower water says nothing of a bend.
+# m2/s2, the square of 0.05 m/s, added to |U|^2: the direction of slower water shows no bend.
 STILL_SQUARED = 0.0025
 # a [-] at which b of `helical_flow` is held: the formula is for smoother beds.
 LARGEST_ROUGHNESS = 0.5
 
 
 def viscosity(cells: Cells, added: Array) -> dict[str, Array]:
-    """nu -> nu + nu_1."""
+    """nu -> nu + nu_1.
+
+    Parameters
+    ----------
+    cells : Cells
+    added : (m,) [m2/s]
+        viscosity nu_1 added.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
+    """
     return {"viscosity": np.broadcast_to(added, cells.depth.shape)}
 
 
 def elder(cells: Cells, coefficient: Array) -> dict[str, Array]:
-    """nu -> nu + lambda h u*."""
+    """nu -> nu + lambda h u*.
+
+    Parameters
+    ----------
+    cells : Cells
+    coefficient : (m,) [-]
+        lambda, some 0.07 to 0.5.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
+    """
     return {"viscosity": coefficient * cells.depth * cells.shear_velocity}
 
 
@@ -34,6 +58,17 @@ def smagorinsky(cells: Cells, coefficient: Array) -> dict[str, Array]:
     """nu -> nu + (C_s Delta)^2 (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2), Delta the width of the filter [m].
 
     Delta is that of the case's own cells, on the coarser and finer grids of a diagnosis, too.
+
+    Parameters
+    ----------
+    cells : Cells
+    coefficient : (m,) [-]
+        coefficient C_s, some 0.1 to 0.2.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
     """
     strain = 2.0 * cells.u_x**2 + 2.0 * cells.v_y**2 + (cells.u_y + cells.v_x) ** 2
     seen = cells.geometry
@@ -41,7 +76,19 @@ def smagorinsky(cells: Cells, coefficient: Array) -> dict[str, Array]:
 
 
 def mixing_length(cells: Cells, length: Array) -> dict[str, Array]:
-    """nu -> nu + l^2 |du/dy|."""
+    """nu -> nu + l^2 |du/dy|.
+
+    Parameters
+    ----------
+    cells : Cells
+    length : (m,) [m]
+        mixing length l.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
+    """
     return {"viscosity": length**2 * np.abs(cells.u_y)}
 
 
@@ -49,30 +96,97 @@ def edge_mixing(cells: Cells, coefficient: Array, width: Array) -> dict[str, Arr
     """nu -> nu + c d^2 |du/dy| exp(-(e / d)^2), e the distance from the side of a patch [m].
 
     d |du/dy| is the difference of speed across the layer of width d.
+
+    Parameters
+    ----------
+    cells : Cells
+    coefficient : (m,) [-]
+        c, viscosity over speed difference times width.
+    width : (m,) [m]
+        width d of the layer.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
     """
     band = np.exp(-((cells.geometry.edge / width) ** 2))
     return {"viscosity": coefficient * width**2 * band * np.abs(cells.u_y)}
 
 
 def coherent_structures(cells: Cells, coefficient: Array, width: Array, mean_depth: Array) -> dict[str, Array]:
-    """nu -> nu + b^2 d^2 (h_m / h) |du/dy|, h at least h_m / 5, h_m the depth between the deep and the shallow part."""
+    """nu -> nu + b^2 d^2 (h_m / h) |du/dy|, h at least h_m / 5, h_m the depth between the deep and the shallow part.
+
+    Parameters
+    ----------
+    cells : Cells
+    coefficient : (m,) [-]
+        b, some 0.07.
+    width : (m,) [m]
+        width d of the layer.
+    mean_depth : (m,) [m]
+        depth h_m between both.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
+    """
     shallow = mean_depth / np.maximum(cells.depth, LEAST_RELATIVE_DEPTH * mean_depth)
     return {"viscosity": coefficient**2 * width**2 * shallow * np.abs(cells.u_y)}
 
 
 def wake_mixing(cells: Cells, coefficient: Array, length: Array) -> dict[str, Array]:
-    """nu -> nu + c |U| exp(-s / L) behind a patch, s the distance from its end [m]."""
+    """nu -> nu + c |U| exp(-s / L) behind a patch, s the distance from its end [m].
+
+    Parameters
+    ----------
+    cells : Cells
+    coefficient : (m,) [m]
+        c, viscosity over speed at the end of the patch.
+    length : (m,) [m]
+        length L over which they fade.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
+    """
     return {"viscosity": coefficient * np.exp(-cells.geometry.wake / length) * cells.speed}
 
 
 def secondary_current(cells: Cells, strength: Array) -> dict[str, Array]:
-    """h T_xy = K h u^2, K = k sin(pi eta) exp(-(eta/1.5)^4), eta the distance from the axis over the half width."""
+    """h T_xy = K h u^2, K = k sin(pi eta) exp(-(eta/1.5)^4), eta the distance from the axis over the half width.
+
+    Parameters
+    ----------
+    cells : Cells
+    strength : (m,) [-]
+        strength k of the cells.
+
+    Returns
+    -------
+    dict
+        `xy` (nx, ny, m) [m3/s2].
+    """
     eta = cells.geometry.offset
     return {"xy": strength * (np.sin(np.pi * eta) * np.exp(-((eta / CURRENTS_END) ** 4))) * cells.depth * cells.u**2}
 
 
 def dispersion(cells: Cells, excess: Array) -> dict[str, Array]:
-    """h T = (beta - 1) h (u^2, u v, v^2)."""
+    """h T = (beta - 1) h (u^2, u v, v^2).
+
+    Parameters
+    ----------
+    cells : Cells
+    excess : (m,) [-]
+        beta - 1, momentum coefficient less one.
+
+    Returns
+    -------
+    dict
+        `xx`, `xy`, `yy` (nx, ny, m) [m3/s2].
+    """
     carried = excess * cells.depth
     return {"xx": carried * cells.u**2, "xy": carried * cells.u * cells.v, "yy": carried * cells.v**2}
 
@@ -93,6 +207,17 @@ def helical_flow(cells: Cells, share: Array) -> dict[str, Array]:
     """h T_sn = -s b h (h / R) |U|^2, b = 5 a - 15.6 a^2 + 37.5 a^3, a = (k_bed h)^(1/2) / kappa at most 1/2.
 
     It carries fast water to the outside of the bend; s is along the flow, n across it.
+
+    Parameters
+    ----------
+    cells : Cells
+    share : (m,) [-]
+        strength s, 1 for a spiral in balance.
+
+    Returns
+    -------
+    dict
+        `xx`, `xy`, `yy` (nx, ny, m) [m3/s2].
     """
     a = np.minimum(np.sqrt(cells.bed_rate * cells.depth) / KARMAN, LARGEST_ROUGHNESS)
     carried = share * (5.0 * a - 15.6 * a**2 + 37.5 * a**3) * cells.depth * curvature(cells)

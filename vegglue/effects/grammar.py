@@ -143,7 +143,7 @@ class Law:
 
     @property
     def subject(self) -> tuple[str, str]:
-        """Names of its term and of its quantity: what a law says, whatever its form."""
+        """Names of its term and of its quantity: what it relates, whatever its form."""
         return self.term.name, self.quantity.name
 
     @property
@@ -325,7 +325,7 @@ LAWS: dict[str, Law] = {
     for terms, quantities, forms in _SENTENCES
     for law in (Law(term, quantity, form) for term in terms for quantity in quantities for form in forms)
 }
-# By what a law is multiplied: the even form of each quantity, which says whether the one changes with the other at all.
+# By what a law is multiplied: the even form of each quantity, which shows whether one changes with the other at all.
 _EVEN = {
     "depth": "ramp", "speed": "ramp", "froude": "ramp", "shear": "ramp", "along": "trend", "offset": "ramp",
     "front": "fading", "edge": "fading", "stems": "power",

@@ -1,7 +1,9 @@
 """Which effect acts where, as a value; only this module writes its text and reads it."""
 
+import csv
 import re
 from dataclasses import dataclass
+from io import StringIO
 
 _NUMBER = r"-?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 
@@ -11,7 +13,7 @@ class EffectIdentity:
     """An effect of the library and what it is limited to.
 
     The text is ``name`` or ``name[target,target]``: ``steep_bank``, ``discharge_error[high]``, ``patch_density[p5]``,
-    ``unlisted_bed[x47.29,y-0.23]``.
+    ``unlisted_bed[x47.29,y-0.23]``; as in CSV, a target that holds a comma stands in quotes, ``probe_gain["A, left"]``.
 
     Parameters
     ----------
@@ -26,9 +28,9 @@ class EffectIdentity:
 
     @classmethod
     def parse(cls, text: str) -> "EffectIdentity":
-        """The identity with this text. A text without brackets is a name; a comma in a name of a target divides it."""
+        """The identity with this text. A text without brackets is a name."""
         name, _, target = text.partition("[")
-        return cls(name, tuple(target.removesuffix("]").split(",")) if target.removesuffix("]") else ())
+        return cls(name, tuple(next(csv.reader([target.removesuffix("]")]), ())))
 
     @classmethod
     def at_place(cls, name: str, x: float, y: float) -> "EffectIdentity":
@@ -48,7 +50,9 @@ class EffectIdentity:
 
     @property
     def text(self) -> str:
-        return f"{self.name}[{','.join(self.target)}]" if self.target else self.name
+        written = StringIO()
+        csv.writer(written, lineterminator="").writerow(self.target)
+        return f"{self.name}[{written.getvalue()}]" if self.target else self.name
 
     def __str__(self) -> str:
         return self.text

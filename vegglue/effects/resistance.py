@@ -15,52 +15,168 @@ LEAST_DEPTH_OF_POWER = 0.02
 
 
 def depth_dependent_bank(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
-    """k -> k (h / h_0)^e on the banks, h at least 0.02 m."""
+    """k -> k (h / h_0)^e on the banks, h at least 0.02 m.
+
+    Parameters
+    ----------
+    cells : Cells
+    exponent : (m,) [-]
+        exponent e.
+    reference_depth : (m,) [m]
+        depth h_0 at which nothing changes.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     depth = cells.depth.clip(LEAST_DEPTH_OF_POWER)
     return {"rate": cells.rate * (depth / reference_depth) ** (exponent * cells.geometry.bank)}
 
 
 def depth_dependent_bed(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
-    """k -> k (h / h_0)^e on the floor where no plants stand, h at least 0.02 m."""
+    """k -> k (h / h_0)^e on the floor where no plants stand, h at least 0.02 m.
+
+    Parameters
+    ----------
+    cells : Cells
+    exponent : (m,) [-]
+        exponent e.
+    reference_depth : (m,) [m]
+        depth h_0 at which nothing changes.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
     return {"rate": cells.rate * (cells.depth.clip(LEAST_DEPTH_OF_POWER) / reference_depth) ** (exponent * open_floor)}
 
 
 def bank_trend(cells: Cells, trend: Array) -> dict[str, Array]:
-    """k -> k exp(a (x - x_m) / L) on the banks, x_m the middle of the grid and L its length."""
+    """k -> k exp(a (x - x_m) / L) on the banks, x_m the middle of the grid and L its length.
+
+    Parameters
+    ----------
+    cells : Cells
+    trend : (m,) [-]
+        logarithm a of k at the end over k at the beginning.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     return {"rate": cells.rate * np.exp(trend * cells.geometry.bank * cells.geometry.share_along)}
 
 
 def bank_drag_trend(cells: Cells, drag: Array, direction: Array) -> dict[str, Array]:
-    """k -> k + c (1/2 + d (x - x_m) / L) on the banks."""
+    """k -> k + c (1/2 + d (x - x_m) / L) on the banks.
+
+    Parameters
+    ----------
+    cells : Cells
+    drag : (m,) [1/m]
+        drag c that is added where there is most.
+    direction : (m,) [-]
+        d, 1 where it grows downstream, -1 upstream.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     return {"rate": cells.rate + drag * (0.5 + direction * cells.geometry.share_along) * cells.geometry.bank}
 
 
 def bed_trend(cells: Cells, trend: Array) -> dict[str, Array]:
-    """k -> k exp(a (x - x_m) / L) on the floor where no plants stand."""
+    """k -> k exp(a (x - x_m) / L) on the floor where no plants stand.
+
+    Parameters
+    ----------
+    cells : Cells
+    trend : (m,) [-]
+        logarithm a of k at the end over k at the beginning.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
     return {"rate": cells.rate * np.exp(trend * open_floor * cells.geometry.share_along)}
 
 
 def bank_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
-    """k -> k exp(+-a / 2) on the banks, + on that of larger y."""
+    """k -> k exp(+-a / 2) on the banks, + on that of larger y.
+
+    Parameters
+    ----------
+    cells : Cells
+    log_ratio : (m,) [-]
+        logarithm a of the ratio of both.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     return {"rate": cells.rate * np.exp(0.5 * log_ratio * cells.geometry.bank * np.sign(cells.geometry.offset))}
 
 
 def steep_bank(cells: Cells, share: Array) -> dict[str, Array]:
-    """k -> k (1 + a ((1 + s^2)^(1/2) - 1)), s = |dz_b/dy|."""
+    """k -> k (1 + a ((1 + s^2)^(1/2) - 1)), s = |dz_b/dy|.
+
+    Parameters
+    ----------
+    cells : Cells
+    share : (m,) [-]
+        share a of the longer perimeter that counts, 1 for all of it.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     longer = np.sqrt(1.0 + cells.geometry.side_slope**2) - 1.0
     return {"rate": cells.rate * (1.0 + share * longer)}
 
 
 def bank_vegetation(cells: Cells, drag: Array, height: Array) -> dict[str, Array]:
-    """k -> k + phi_b min(h / h_b, 1) / (2 h) on the banks."""
+    """k -> k + phi_b min(h / h_b, 1) / (2 h) on the banks.
+
+    Parameters
+    ----------
+    cells : Cells
+    drag : (m,) [-]
+        drag phi_b of the plants.
+    height : (m,) [m]
+        height h_b of the plants.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     standing = np.minimum(1.0 / height, 1.0 / cells.depth)
     return {"rate": cells.rate + 0.5 * drag * standing * cells.geometry.bank}
 
 
 def stem_blockage(cells: Cells, share: Array) -> dict[str, Array]:
-    """k -> k / (1 - s)^2 among plants: what lies between stems runs at u / (1 - s)."""
+    """k -> k / (1 - s)^2 among plants: what lies between stems runs at u / (1 - s).
+
+    Parameters
+    ----------
+    cells : Cells
+    share : (m,) [-]
+        share s of the volume that stems take up.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     return {"rate": cells.rate * (1.0 - share * cells.geometry.planted) ** -2.0}
 
 

@@ -17,23 +17,71 @@ def spot(geometry: ChannelGeometry, x: Array, y: Array, length: Array, width: Ar
 
 
 def unlisted_object(cells: Cells, drag: Array, **place: Array) -> dict[str, Array]:
-    """k -> k + c spot [1/m]; below 0 it pushes, as a jet does."""
+    """k -> k + c spot [1/m]; below 0 it pushes, as a jet does.
+
+    Parameters
+    ----------
+    cells : Cells
+    drag : (m,) [1/m]
+        drag c of the object per length of flow through it.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
     return {"rate": cells.rate + drag * spot(cells.geometry, **place)}
 
 
 def unlisted_bed(geometry: ChannelGeometry, rise: Array, **place: Array) -> dict[str, Array]:
-    """z_b -> z_b + dz spot [m]."""
+    """z_b -> z_b + dz spot [m].
+
+    Parameters
+    ----------
+    geometry : ChannelGeometry
+    rise : (m,) [m]
+        how much higher the bed lies there than surveyed.
+
+    Returns
+    -------
+    dict
+        `bed` (nx, ny, m) [m].
+    """
     return {"bed": rise * spot(geometry, **place)}
 
 
 def unlisted_inflow(geometry: ChannelGeometry, discharge: Array, **place: Array) -> dict[str, Array]:
-    """q -> q + Q spot / (pi l w) [m/s], without momentum."""
+    """q -> q + Q spot / (pi l w) [m/s], without momentum.
+
+    Parameters
+    ----------
+    geometry : ChannelGeometry
+    discharge : (m,) [m3/s]
+        discharge Q that enters there.
+
+    Returns
+    -------
+    dict
+        `inflow` (nx, ny, m) [m/s].
+    """
     area = np.pi * place["length"] * place["width"]
     return {"inflow": discharge * spot(geometry, **place) / (area * geometry.stretch)}
 
 
 def unlisted_viscosity(cells: Cells, viscosity: Array, **place: Array) -> dict[str, Array]:
-    """nu -> max(nu + n spot, 0) [m2/s]."""
+    """nu -> max(nu + n spot, 0) [m2/s].
+
+    Parameters
+    ----------
+    cells : Cells
+    viscosity : (m,) [m2/s]
+        additional viscosity n in the middle of it.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
+    """
     added = viscosity * spot(cells.geometry, **place)
     return {"viscosity": np.maximum(added, -cells.viscosity)}
 

@@ -1,4 +1,4 @@
-"""What inference and diagnosis ask of a flow model, and the engines that answer: `newton`, the
+"""What inference and diagnosis need of a flow model, and the engines that answer: `newton`, the
 command of a user (`command`, `corrected`), and `marching` for tests.
 
 May import: case, effects, flow, measurements, results.

@@ -71,8 +71,8 @@ OneTheta = Mapping[str, float]
 Changes = Mapping[str, tuple[tuple[str, int, int], ...]]
 
 
-class BadPredictionsError(ValueError):
-    """The predictions of a command are not as expected: row, what was expected and what came."""
+class FailedRunError(ValueError):
+    """A run of the command gave no predictions: why."""
 
 
 def parameters_text(case: Case, theta: Mapping[str, float]) -> str:
@@ -120,18 +120,18 @@ def read_predictions(path: Path, stations: int) -> Array:
 
     Raises
     ------
-    BadPredictionsError
+    FailedRunError
         If the file is missing, cannot be read, or lacks a finite prediction of a station.
     """
     if not path.is_file():
-        raise BadPredictionsError(f"the command ended well and left no {PREDICTIONS_FILE}")
+        raise FailedRunError(f"the command ended well and left no {PREDICTIONS_FILE}")
     try:
         lines = read_text(path, LARGEST_PREDICTIONS).splitlines()
     except InputError as error:
-        raise BadPredictionsError(f"{PREDICTIONS_FILE} cannot be read: {error}") from None
+        raise FailedRunError(f"{PREDICTIONS_FILE} cannot be read: {error}") from None
     heading = tuple(word.strip() for word in lines[0].split(",")) if lines else ()
     if heading != COLUMNS_LEFT:
-        raise BadPredictionsError(
+        raise FailedRunError(
             f"{PREDICTIONS_FILE}, row 1: expected {','.join(COLUMNS_LEFT)}, got {','.join(heading)[:40]!r}"
         )
     found = np.full(stations, np.nan)
@@ -141,27 +141,25 @@ def read_predictions(path: Path, stations: int) -> Array:
         words, number, value = line.split(","), -1, math.nan
         with suppress(ValueError, IndexError):
             number, value = int(words[0]), float(words[1])
-        problem = ""
+        at = f"{PREDICTIONS_FILE}, row {row}"
         if len(words) != len(COLUMNS_LEFT) or not math.isfinite(value):
-            problem = f"expected a station and a finite number, got {line[:40]!r}"
-        elif abs(value) > LARGEST_READING:
-            problem = f"expected a prediction of at most {LARGEST_READING:g}, got {value:g}"
-        elif not 0 <= number < stations:
-            problem = f"expected a station from 0 to {stations - 1}, got {number}"
-        elif np.isfinite(found[number]):
-            problem = f"station {number} stands there twice"
-        if problem:
-            raise BadPredictionsError(f"{PREDICTIONS_FILE}, row {row}: {problem}")
+            raise FailedRunError(f"{at}: expected a station and a finite number, got {line[:40]!r}")
+        if abs(value) > LARGEST_READING:
+            raise FailedRunError(f"{at}: expected a prediction of at most {LARGEST_READING:g}, got {value:g}")
+        if not 0 <= number < stations:
+            raise FailedRunError(f"{at}: expected a station from 0 to {stations - 1}, got {number}")
+        if np.isfinite(found[number]):
+            raise FailedRunError(f"{at}: station {number} stands there twice")
         found[number] = value
     missing = np.flatnonzero(np.isnan(found))
     if missing.size:
         more = f" and {missing.size - 1} more" if missing.size > 1 else ""
-        raise BadPredictionsError(f"{PREDICTIONS_FILE}: no prediction of station {missing[0]}{more}")
+        raise FailedRunError(f"{PREDICTIONS_FILE}: no prediction of station {missing[0]}{more}")
     return found
 
 
-def not_predicted(prediction: Array, station: pd.DataFrame) -> str:
-    """Why predictions (station,) of a run are none, '' if they are: what codes write for dry cells and failed runs."""
+def refuse_marks(prediction: Array, station: pd.DataFrame) -> None:
+    """Raise FailedRunError if predictions (station,) are what codes write for dry cells and failed runs."""
     kinds, measured = station["kind"].to_numpy(str), station["value"].to_numpy(float)
     error, used = station["standard_error"].to_numpy(float), station["used"].to_numpy(bool)
     off = np.abs(prediction - measured)
@@ -174,20 +172,17 @@ def not_predicted(prediction: Array, station: pd.DataFrame) -> str:
     # A flow may be straight: only what is measured along it, and levels and discharges, cannot be exactly 0.
     wet = np.abs(measured) > np.fmax(CLEARLY_NOT_ZERO, ERRORS_FROM_ZERO * error)
     zero = (prediction == 0.0) & used & wet & (~velocity | (kinds == STREAMWISE) | (kinds == "speed"))
-    for wrong, what in (
-        (mark, "a mark of a missing value"),
-        (beyond, "beyond any flow"),
-        (zero, "a dry cell or a failed run, as {measured:.3g} was measured"),
-    ):
-        if wrong.any():
-            first, more = int(np.argmax(wrong)), int(wrong.sum()) - 1
-            at = ", ".join(f"{name} = {station[name].iloc[first]:g}" for name in ("x", "y"))
-            others = f" ({more} more alike)" if more else ""
-            why = what.format(measured=measured[first])
-            return f"{PREDICTIONS_FILE}: station {first} ({at} m) has {prediction[first]:g}, {why}{others}"
+    wrong = mark | beyond | zero
+    if wrong.any():
+        first = int(np.argmax(mark if mark.any() else beyond if beyond.any() else zero))
+        x, y = station["x"].iloc[first], station["y"].iloc[first]
+        raise FailedRunError(
+            f"{PREDICTIONS_FILE}: station {first} (x = {x:g}, y = {y:g} m) has {prediction[first]:g}, a mark of a "
+            f"missing value, of a dry cell or of a failed run: {measured[first]:.3g} was measured; "
+            f"{int(wrong.sum())} of {prediction.size} stations"
+        )
     if prediction.size > 1 and not prediction.any() and measured[used].any():
-        return f"{PREDICTIONS_FILE}: all {prediction.size} predictions are 0, as of a failed run"
-    return ""
+        raise FailedRunError(f"{PREDICTIONS_FILE}: all {prediction.size} predictions are 0, as of a failed run")
 
 
 @dataclass(frozen=True)
@@ -233,17 +228,15 @@ def run_command_once(
         for name, text in given.items():
             (folder / name).write_text(text, encoding="utf-8")
     began = time.monotonic()
-    reason = _outcome(words, folder, timeout, stop)
-    if not reason:
-        try:
-            return CommandEnd(read_predictions(folder / PREDICTIONS_FILE, stations), "", time.monotonic() - began)
-        except BadPredictionsError as error:
-            reason = str(error)
-    return CommandEnd(None, reason, time.monotonic() - began)
+    try:
+        _run_to_its_end(words, folder, timeout, stop)
+        return CommandEnd(read_predictions(folder / PREDICTIONS_FILE, stations), "", time.monotonic() - began)
+    except FailedRunError as error:
+        return CommandEnd(None, str(error), time.monotonic() - began)
 
 
-def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) -> str:
-    """Why a command did not end well, '' when it did."""
+def _run_to_its_end(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) -> None:
+    """Start the command and wait; raise FailedRunError unless it ends well."""
     path, code = folder / LOG_FILE, None
     with path.open("wb") as log:
         try:
@@ -256,7 +249,7 @@ def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) 
                 start_new_session=True,  # so that all it has started can be ended with it
             )
         except OSError as error:
-            return f"the command cannot be started: {error.strerror} ({words[0]})"
+            raise FailedRunError(f"the command cannot be started: {error.strerror} ({words[0]})") from None
         try:
             until = time.monotonic() + timeout
             while code is None and not stop.is_set() and os.fstat(log.fileno()).st_size <= LONGEST_LOG:
@@ -265,37 +258,32 @@ def _outcome(words: tuple[str, ...], folder: Path, timeout: float, stop: Event) 
                     break
                 with suppress(subprocess.TimeoutExpired):
                     code = process.wait(min(LOOK_EVERY, left))
-        finally:
-            _end_all(process)
+        finally:  # also what it has started and left behind
+            if not hasattr(os, "killpg"):  # Windows
+                with suppress(psutil.Error):
+                    for one in psutil.Process(process.pid).children(recursive=True):
+                        one.kill()
+                process.kill()
+            else:
+                with suppress(ProcessLookupError, PermissionError):
+                    os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
     if stop.is_set():
-        return "the command was stopped"
+        raise FailedRunError("the command was stopped")
     if code is None and path.stat().st_size > LONGEST_LOG:
         path.unlink()
-        return f"the command printed more than {LONGEST_LOG / 1e9:g} GB and was stopped"
+        raise FailedRunError(f"the command printed more than {LONGEST_LOG / 1e9:g} GB and was stopped")
     if code is None:
-        return f"the command did not end within {timeout:g} s and was stopped"
+        raise FailedRunError(f"the command did not end within {timeout:g} s and was stopped")
     if not code:
-        return ""
+        return
     with path.open("rb") as file:
         file.seek(0, os.SEEK_END)
         file.seek(max(file.tell() - 4096, 0))
         lines = [line.strip() for line in file.read().decode(errors="replace").splitlines()]
     last = next((line for line in reversed(lines) if line), "")
-    output = f"said: {last[:QUOTED]}" if last else f"said nothing; see {LOG_FILE}"
-    return f"the command ended with {f'exit code {code}' if code > 0 else f'signal {-code}'}, and {output}"
-
-
-def _end_all(process: "subprocess.Popen[bytes]") -> None:
-    """End the command, if it still runs, and whatever it has started and left behind."""
-    if not hasattr(os, "killpg"):  # Windows
-        with suppress(psutil.Error):
-            for one in psutil.Process(process.pid).children(recursive=True):
-                one.kill()
-        process.kill()
-    else:
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    output = f"its last line: {last[:QUOTED]}" if last else f"no output; see {LOG_FILE}"
+    raise FailedRunError(f"the command ended with {f'exit code {code}' if code > 0 else f'signal {-code}'}, {output}")
 
 
 @dataclass(frozen=True)
@@ -341,7 +329,9 @@ def command_runs(case: Case, folder: Path) -> CommandRuns:
             "out of the config."
         )
     words = settings.words(sys.executable)
-    from_here = os.sep in words[0] and not os.path.isabs(words[0])  # but it is started in a folder of its own
+    from_here = ("/" in words[0] or os.sep in words[0]) and not os.path.isabs(
+        words[0]
+    )  # but it is started in a folder of its own
     if from_here or shutil.which(words[0]) is None:
         raise InputError(
             f"{shown_path(case.source)}: `engine.command` expected a program that can be run, got {words[0]!r}; "
@@ -384,29 +374,20 @@ def ended_runs(
     given = [{PARAMETERS_FILE: parameters_text(case, theta), STATIONS_FILE: stations} for theta in thetas]
     keys = [hashlib.sha256("\n".join([runs.digest, *one.values()]).encode()).hexdigest()[:32] for one in given]
     first: dict[str, int] = {}
+    kept: dict[int, CommandEnd] = {}
     for position, key in enumerate(keys):
-        kept = _kept(runs, key, station)
-        if kept is not None:
-            yield position, kept
-        elif key in first:  # two of the same wait for one run
-            continue
-        else:
-            first[key] = position
+        with suppress(InputError, ValueError, KeyError, TypeError, RecursionError):  # nothing kept, or damaged
+            found = json.loads(read_text(runs.folder / f"{key}.json", LARGEST_JSON))
+            prediction, seconds = np.array(found["prediction"], dtype=float), float(found["seconds"])
+            if prediction.shape == (len(station),) and np.isfinite(prediction).all():
+                refuse_marks(prediction, station)
+                kept[position] = CommandEnd(prediction, "", seconds)
+        if position not in kept:
+            first.setdefault(key, position)  # two of the same wait for one run
+    yield from kept.items()
     with closing(_new_runs(runs, {key: given[at] for key, at in first.items()}, station)) as ends:
         for key, end in ends:
             yield from ((position, end) for position, same in enumerate(keys) if same == key)
-
-
-def _kept(runs: CommandRuns, key: str, station: pd.DataFrame) -> CommandEnd | None:
-    """What is kept of a finished run; None if nothing is, or it is damaged."""
-    try:
-        found = json.loads(read_text(runs.folder / f"{key}.json", LARGEST_JSON))
-        prediction, seconds = np.array(found["prediction"], dtype=float), float(found["seconds"])
-    except (InputError, ValueError, KeyError, TypeError, RecursionError):
-        return None
-    sound = prediction.shape == (len(station),) and bool(np.isfinite(prediction).all())
-    sound = sound and not not_predicted(prediction, station)
-    return CommandEnd(prediction, "", seconds) if sound else None
 
 
 def _new_runs(
@@ -419,12 +400,14 @@ def _new_runs(
 
     def run(key: str, files: Mapping[str, str]) -> CommandEnd:
         if stop.is_set():
-            return CommandEnd(None, "the command was not started", 0.0)
+            return CommandEnd(None, "not started", 0.0)
         end = run_command_once(runs.words, runs.folder / key, files, len(station), settings.timeout, stop)
         if end.prediction is None:
             return end
-        if reason := not_predicted(end.prediction, station):
-            return CommandEnd(None, reason, end.seconds)
+        try:
+            refuse_marks(end.prediction, station)
+        except FailedRunError as error:
+            return CommandEnd(None, str(error), end.seconds)
         now = _changes(settings)
         for name, path in settings.files.items():
             if now[name] != runs.changed[name]:

@@ -63,7 +63,15 @@ class Cause:
 
 @dataclass(frozen=True)
 class CentreFlow:
-    """The flow of one experiment at cell centres, (nx, ny): depth [m], u along x and v across [m/s]."""
+    """The flow of one experiment at cell centres.
+
+    Attributes
+    ----------
+    depth
+        (nx, ny) [m]
+    u, v
+        Velocity along x and across (nx, ny) [m/s].
+    """
 
     depth: Array
     u: Array
@@ -153,8 +161,21 @@ class Model:
 
 
 def linearise(model: Model, z: Array, near: Point | None = None, wanted: Wanted = always) -> Point | None:
-    """f(z) and df/dz at z (p,); None if a flow has no steady state, or slopes are not `wanted`. near: a point to start
-    from.
+    """f(z) and df/dz.
+
+    Parameters
+    ----------
+    model : Model
+    z : (p,) [standard deviations of the prior]
+    near : Point, optional
+        A point to start from, of this model or of one on cells of twice the size.
+    wanted : callable
+        Whether the slopes of predictions (n,) are needed; no point is returned if not.
+
+    Returns
+    -------
+    Point or None
+        None if a flow has no steady state, or slopes are not wanted.
     """
     return model.engine.linearise(model, z, near, wanted)
 
@@ -166,17 +187,56 @@ def linearise_from(model: Model, z: Array, near: Point | None) -> Point | None:
 
 
 def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
-    """f (m, n) at z (m, p), NaN where no flow is found; points: some that are known."""
+    """f at many points.
+
+    Parameters
+    ----------
+    model : Model
+    points : sequence of Point
+        Some that are known, to start from.
+    z : (m, p) [standard deviations of the prior]
+
+    Returns
+    -------
+    (m, n)
+        Predictions [unit of each station], NaN if no flow is found.
+    """
     return model.engine.predict(model, points, z)
 
 
 def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
-    """df / d(amplitude - off)^power at off, (n, causes): the fingerprints of causes at a point."""
+    """df / d(amplitude - off)^power at off: the fingerprints of causes at a point.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+    causes : sequence of Cause
+
+    Returns
+    -------
+    (n, causes)
+        [unit of each station per unit of the gain]
+    """
     return model.engine.responses(model, point, causes)
 
 
 def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:
-    """df / d term (n, nx, ny) [unit of a station per that of the term] for a change of it in each cell."""
+    """df / d term for a change of it in each cell.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+    experiment : str
+    terms : sequence of str
+        Of `flow.local_changes.TERMS`.
+
+    Returns
+    -------
+    mapping of str to (n, nx, ny)
+        For the stations of the experiment [unit of each station per unit of the term].
+    """
     return model.engine.responses_to_cells(model, point, experiment, terms)
 
 
@@ -195,5 +255,16 @@ def linearise_as_coarse(model: Model, point: Point, before: Point, after: Point)
 
 
 def flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:
-    """Depth and velocities at cell centres of one experiment at a point."""
+    """Depth and velocities of one experiment at a point.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+    experiment : str
+
+    Returns
+    -------
+    CentreFlow
+    """
     return model.engine.flow_at_centres(model, point, experiment)

@@ -162,7 +162,7 @@ def beside_x(out, bend, f, m, per_x):
 
 @compiled
 def beside_y(out, bend, i, m, per_x):
-    """What `south_of` says of the rows 1 .. ny - 1 of column i, into (3, (ny - 1) m)."""
+    """The fluxes of `south_of` for the rows 1 .. ny - 1 of column i, into (3, (ny - 1) m)."""
     for j in range(out.shape[1] // m):
         per_length, lift_s, lift_n = south_of(bend, i, j + 1, per_x)
         for t in range(j * m, j * m + m):

@@ -15,7 +15,7 @@ from vegglue.arrays import Array
 # The shortest axis over the longest [-]: no parameter is left out of account. Chosen, not measured: with less a cluster
 # holds members that differ much in what changes flows little.
 SHORTEST_AXIS = 0.1
-# Weights of a spline [-], which add up to 1, that tell of known members all but at one place: chosen, not measured.
+# Weights of a spline [-], which add up to 1, by which known members count at every place but one: chosen, not measured.
 LARGEST_WEIGHT = 1e3
 
 

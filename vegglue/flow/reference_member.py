@@ -18,8 +18,8 @@ from vegglue.flow.starts import backwater
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, SOLVED_BY_NEWTON
 from vegglue.flow.wet_band import chord_in_band, overflows, rows_inside, wet_band, widen
 
-# Step [-] in the unit cube of the one-sided differences of tangents. Chosen, not measured: tangents only say where to
-# begin, and are off by the curvature over such a step.
+# Step [-] in the unit cube of the one-sided differences of tangents. Chosen, not measured: tangents decide where to
+# begin only, and are off by the curvature over such a step.
 TANGENT_STEP = 1e-4
 # The problem of members at points (m, d) of the unit cube.
 ProblemOf = Callable[[Array], Problem]
@@ -47,7 +47,7 @@ class LinearisedMember:
 @dataclass(frozen=True)
 class ReferenceMember:
     """A member whose factors serve its neighbours: its state (nx, 3, ny, 1) and, unless it had to be marched, the
-    factors in its band of rows and, if they were asked for, its tangents.
+    factors in its band of rows and, if they are wanted, its tangents.
     """
 
     state: Array

@@ -25,12 +25,7 @@ from vegglue.importers.column_names import (
 )
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.table_parser import MOST_ROWS_NAMED, ParsedTable, is_number
-from vegglue.measurements.plausibility import (
-    LARGEST_COORDINATE,
-    MARKS_OF_ANY_COLUMN,
-    MARKS_OR_VALUES,
-    is_of_nines,
-)
+from vegglue.measurements.plausibility import MARKS_OR_VALUES, is_mark_anywhere, is_of_nines
 from vegglue.wording.numbers import listed, so_many
 
 # Words of a heading that mean across; V alone means none, and may be the velocity.
@@ -247,8 +242,7 @@ def numbers_of_column(
     largest = LARGEST_OF.get(role, LARGEST_OF.get(quantity, math.inf))
     marks = [sign * mark for mark in MARKS_OR_VALUES if mark * factor > largest for sign in (1.0, -1.0)]
     values = table.numbers(path, place)
-    nines = np.array([value <= -99.0 and is_of_nines(-value) for value in values.tolist()], dtype=bool)
-    marked = np.isin(values, [*MARKS_OF_ANY_COLUMN, *missing, *marks]) | (np.abs(values) > LARGEST_COORDINATE) | nines
+    marked = np.isin(values, [*missing, *marks]) | np.array([*map(is_mark_anywhere, values.tolist())], dtype=bool)
     values = np.where(marked, np.nan, values)
     if role.endswith(("_se", "_std")) and (values < 0.0).any():
         row = int(np.argmax(values < 0.0))

@@ -15,11 +15,14 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.config import load_case, read_tree
+from vegglue.case.grid import centreline_in
+from vegglue.case.gridded_site import build_site, cells_at
 from vegglue.case.resolved_config import Tree
 from vegglue.case.site_schema import Frame
 from vegglue.case.text_files import case_name, told_apart
 from vegglue.case.zones import BANK_SLOPE
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError, path_from, shown_path
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
     MODEL_ERROR_OF_FLUME,
@@ -72,6 +75,8 @@ FEWEST_COLUMNS = 4
 FREEBOARD = 0.35
 # Bank slope of a bed without banks, whose grid ends where its floor does.
 OF_NO_BANK = 1.0
+# Key of the site file in a sheet of `vegglue plan` that names the config it is of.
+OF_SHEET = "case"
 # Relative error of a canopy height estimated by eye.
 BY_EYE = 0.12
 PARAMETERS: Tree = {"n_b": bed_prior(0.01, 0.2)}
@@ -213,6 +218,39 @@ def _refuse_standing_water(path: Path, site: FieldSite) -> None:
                     f"{flow.downstream_level_m:g} m, which makes the outlet {depth:.3g} m deep and its water move at "
                     f"{speed:.1g} m/s; subtract the level of that floor here and from all levels, or mend the unit."
                 )
+
+
+def case_of_sheet(folder: Path) -> Path | None:
+    """The config that a sheet of `vegglue plan` is of, as its site file names it; None of any other folder."""
+    path = site_file(folder)
+    tree = read_tree(path) if path.name == "site.yaml" and path.is_file() else {}
+    named = tree.get(OF_SHEET)
+    return folder / named if isinstance(named, str) else None
+
+
+def case_from_sheet(folder: Path, target: Path, config: Path) -> FolderCase:
+    """A child of the case that a sheet is of, with what was filled in as its measurements.
+
+    Errors: InputError if the config is not there, or nothing was filled in.
+    """
+    case = load_case(config)
+    given = read_tree(site_file(folder)).get("files") or {}
+    site = FieldSite.model_construct(experiments=dict.fromkeys(case.experiments), holdout={}, files=given)
+    ground = build_site(case)
+
+    def level(along: Array, across: Array) -> Array:
+        return np.asarray(ground.bed[cells_at(ground, along, across)])
+
+    place = Placement(case.frame, centreline_in(case))
+    measured = measured_files(folder, target, site, place, (), level)
+    tree: Tree = {
+        "extends": path_from(target.resolve().parent, config.resolve()),
+        "name": case_name(target.stem),
+        "observations": measured.observations,
+        "imported": measured.imported,
+        "planned": None,
+    }
+    return FolderCase(tree, texts_of_tables(target, measured.tables))
 
 
 def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -> tuple[list[PlantedPatch], list[Tree]]:

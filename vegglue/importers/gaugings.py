@@ -27,6 +27,7 @@ from vegglue.importers.file_options import FileOptions
 from vegglue.importers.library_files import read_by_library, readable_text, reading_structures, refuse_larger
 from vegglue.importers.measured_rows import MeasuredRows, on_the_tape, rows_of_table
 from vegglue.importers.table_parser import Line, ParsedTable, is_number
+from vegglue.measurements.plausibility import is_mark_anywhere
 from vegglue.wording.numbers import so_many
 
 ZIP_BEGINS = b"PK\x03\x04"
@@ -87,7 +88,9 @@ def _station(path: Path, station: Mapping[str, Any]) -> list[float]:
             return math.nan
         unit = key.partition(" (")[2].removesuffix(")")
         factor = si_factor(unit, quantity, shown_path(path)) if unit and quantity else 1.0
-        return factor * (number(value, "X", quantity) if isinstance(value, dict) else float(value))
+        if isinstance(value, dict):
+            return factor * number(value, "X", quantity)
+        return math.nan if is_mark_anywhere(float(value)) else factor * float(value)
 
     names = {key.partition(" (")[0]: value for key, value in station.items()}
     if "Location" not in names:
@@ -133,7 +136,8 @@ def read_gauging(path: Path, options: FileOptions) -> MeasuredRows:
     measured = np.ones(taken.size, dtype=bool)
     for proof in (name for name in PROOFS if name in taken.others):
         texts = [text.strip().rstrip("%") for text in taken.others[proof]]
-        measured &= np.array([not is_number(text) or float(text) > 0.0 for text in texts]) & (np.array(texts) != "")
+        known = [float(text) if is_number(text) and "," not in text else 0.0 for text in texts]
+        measured &= np.array([number > 0.0 and not is_mark_anywhere(number) for number in known], dtype=bool)
     return on_the_tape(path, _wet_verticals(replace(taken, others={}), measured), options)
 
 
@@ -184,8 +188,14 @@ def _aquacalc_table(path: Path, text: str) -> ParsedTable:
 
 
 def _table(headings: tuple[str, ...], units: tuple[str, ...], rows: list[Line], form: str) -> ParsedTable:
-    """The rows that are as wide as the heading, and begin with a number."""
-    kept = [(number, fields) for number, fields in rows if len(fields) == len(headings) and is_number(fields[0])]
+    """The rows that begin with a number, or hold half as many as the heading has fields; others end the table."""
+    there = [
+        (number, fields)
+        for number, fields in rows
+        if fields and (is_number(fields[0]) or 2 * sum(map(is_number, fields)) >= len(headings))
+    ]
+    kept = [(number, fields) for number, fields in there if len(fields) == len(headings)]
+    form += f", {so_many(len(there) - len(kept), 'row')} of another width left out" if len(there) > len(kept) else ""
     texts, numbers = tuple(fields for _, fields in kept), tuple(number for number, _ in kept)
     return ParsedTable(headings, units, texts, numbers, decimal_comma=False, form=form)
 
@@ -196,16 +206,16 @@ def _wet_verticals(taken: MeasuredRows, measured: Mask) -> MeasuredRows:
     se^2 = (share of the rule u)^2 + own^2; own: the instrument's, if it is below half of the velocity [m/s]. measured
     (rows,): which rows are measurements; edges and the like are left out.
     """
-    wet = np.isfinite(taken.numbers["u"]) & (taken.numbers["depth"] > 0.0)
-    unmeasured = int((wet & ~measured).sum())
-    taken = taken.only(wet & measured)
+    wet = np.isfinite(taken.numbers["u"]) & (taken.numbers["depth"] > 0.0) & measured
+    lost = int((~wet & (taken.numbers["depth"] != 0.0)).sum())
+    notes = [f"{so_many(lost, 'row')} without a measurement left out"] if lost else []
+    taken = taken.only(wet)
     place = taken.numbers["tape"]
     last = np.array([not np.any(place[i + 1 :] == place[i]) for i in range(taken.size)], dtype=bool)
     kept = taken.only(last)
     u = np.abs(kept.numbers["u"])
     own = kept.numbers.get("u_se", np.full(kept.size, np.nan))
+    unknown = int(np.isnan(own).sum())
+    notes += [f"{so_many(unknown, 'error')} not stated"] if 0 < unknown < kept.size else []
     sound = np.where(own < 0.5 * u, own, LEAST_ERROR)
-    errors = {"u_se": np.hypot(OF_THE_RULE * u, np.fmax(sound, LEAST_ERROR))}
-    return kept.having(
-        errors, *([f"{so_many(unmeasured, 'row')} without a measurement left out"] if unmeasured else [])
-    )
+    return kept.having({"u_se": np.hypot(OF_THE_RULE * u, np.fmax(sound, LEAST_ERROR))}, *notes)

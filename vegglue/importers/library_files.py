@@ -52,15 +52,18 @@ def refuse_larger(path: Path, size: int) -> None:
 
 
 @contextmanager
-def read_by_library(path: Path, kind: str, logger: str = "", advice: str = "save it anew") -> Iterator[None]:
+def read_by_library(
+    path: Path, kind: str, logger: str = "", advice: str = "save it anew", limit: int = LARGEST_DATA
+) -> Iterator[None]:
     """Within, a library reads a file: its warnings and its log are not shown, all its errors are one InputError.
 
-    kind: what the file should be; advice: how the message ends.
+    kind: what the file should be; advice: how the message ends; limit: of its size [bytes].
     """
     log = logging.getLogger(logger) if logger else None
     before = None if log is None else log.disabled
     try:
-        refuse_larger(path, path.stat().st_size)
+        if (size := path.stat().st_size) > limit:
+            refuse_larger(path, size)
         if log is not None:
             log.disabled = True
         with warnings.catch_warnings():

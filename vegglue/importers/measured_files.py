@@ -6,7 +6,6 @@ What is brought into another form is written into a folder beside the config, wh
 import csv
 import hashlib
 import io
-import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +16,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import unused as unused_name
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError, path_from, shown_path
 from vegglue.importers.column_names import ROLES, words_of
 from vegglue.importers.column_roles import OF_FLAGS
 from vegglue.importers.config_parts import observed
@@ -192,7 +191,7 @@ def _read(
     for path in paths:
         plain = _plain_rows(path, known) if path not in options and not place.turned else None
         if plain is not None:
-            named = Path(os.path.relpath(path, target.resolve().parent)).as_posix()
+            named = path_from(target.resolve().parent, path)
             found.observations.append(observed(KIND_OF_FILE[path.name].name, named))
             _refuse_same_stations(path, KIND_OF_FILE[path.name].name, plain, stations)
             continue

@@ -145,10 +145,11 @@ def _trusted_samples(velocity: Array, correlation: Array) -> Mask:
 
     velocity: x, y, z (n, 3) [m/s]; correlation: of the beams (n, beams) [%].
     """
-    trusted = correlation.min(axis=1) >= LEAST_CORRELATION
-    for part in velocity.T:
-        off = np.abs(part - np.median(part))
-        trusted &= off <= SPIKE * OF_THE_MEDIAN * max(float(np.median(off)), LEAST_DEVIATION)
+    known = np.isfinite(velocity).all(axis=1)
+    trusted: Mask = known & ((correlation >= LEAST_CORRELATION) & (correlation <= 100.0)).all(axis=1)
+    for part in velocity.T if known.any() else ():
+        off = np.abs(part - np.median(part[known]))
+        trusted &= off <= SPIKE * OF_THE_MEDIAN * max(float(np.median(off[known])), LEAST_DEVIATION)
     return trusted
 
 
@@ -176,11 +177,8 @@ def rows_of_profiler(path: Path, parts: dict[str, Any], options: FileOptions) ->
             turn = numbers_of_variable(config.ProbeCalibration_calibrationMatrix).reshape(-1, 4, 4)
             velocity = np.einsum("cij,ncj->nci", turn[: beams.shape[1]], beams)[..., :3]
         correlation = samples(*(f"CorBeam{beam}" for beam in range(1, 5)))
-        known: Mask = np.asarray(np.isfinite(velocity).all(axis=2))
-        trusted = np.zeros_like(known)
-        for cell in np.flatnonzero(known.any(axis=0)):
-            here = known[:, cell]
-            trusted[here, cell] = _trusted_samples(velocity[here, cell], correlation[here, cell])
+        cells = range(away.size)
+        trusted = np.stack([_trusted_samples(velocity[:, cell], correlation[:, cell]) for cell in cells], axis=1)
         seen = numbers_of_variable(getattr(data, "BottomCheck_BottomDistance", 0.0)).ravel()
         seen = seen[seen > 0.0]
         half = 0.5 * float(np.abs(np.diff(away)).min()) if away.size > 1 else 0.0

@@ -38,8 +38,8 @@ def stations_of_qrev(path: Path, parts: dict[str, Any], options: FileOptions) ->
 def _profiles(path: Path, transect: Any, first_bank: str) -> list[BoatProfile]:
     """One profile for each ensemble within a transect.
 
-    x_i = x_(i-1) + u_i dt_i east and north [m], as QRev sums it up; places count from the end of the transect at
-    `first_bank`, where the boat of the first transect started.
+    x_i = x_(i-1) + u_i dt_i east and north [m], as QRev sums it up, lost steps like their neighbours; places count from
+    the end of the transect at `first_bank`, where the boat of the first transect started.
     """
     bed, water = getattr(transect.depths, str(transect.depths.selected)), transect.wVel
     if str(water.coordSys) != "Earth":
@@ -50,15 +50,20 @@ def _profiles(path: Path, transect: Any, first_bank: str) -> list[BoatProfile]:
     inside = np.atleast_1d(transect.inTransectIdx).astype(int) - 1
     boat = getattr(transect.boatVel, str(transect.boatVel.selected))
     steps = numbers_of_variable(transect.dateTime.ensDuration_sec)
-    moved = (numbers_of_variable(one) * steps for one in (boat.uProcessed_mps, boat.vProcessed_mps))
-    places = np.column_stack([np.nancumsum(one) for one in moved])[inside]
+    moved = np.column_stack([numbers_of_variable(one) * steps for one in (boat.uProcessed_mps, boat.vProcessed_mps)])
+    known = np.isfinite(moved).all(axis=1)
+    order = np.arange(known.size)
+    if known.any():  # the boat moves on where its own velocity is lost, as it does before and after
+        moved = np.column_stack([np.interp(order, order[known], part[known]) for part in moved.T])
+    places = np.cumsum(moved, axis=0)[inside]
     places = places - (places[0] if str(transect.startEdge) == first_bank else places[-1])
+    places[~known[inside]] = np.nan
     depth = numbers_of_variable(bed.depthProcessed_m)[inside]
     below, east, north = (
         np.atleast_2d(numbers_of_variable(one))[:, inside]
         for one in (bed.depthCellDepth_m, water.uProcessed_mps, water.vProcessed_mps)
     )
-    good = np.atleast_2d(np.asarray(water.validData)[..., 0].astype(bool))[:, inside]
+    good = np.atleast_2d(np.asarray(water.validData)[..., 0] > 0)[:, inside]
     good = good & np.isfinite(east) & np.isfinite(north) & (below < depth)
     found = []
     for i, (x, y) in enumerate(places.tolist()):

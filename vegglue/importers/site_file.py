@@ -17,6 +17,7 @@ from vegglue.case.text_files import read_text, unprintable
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import UNITS, in_si
 from vegglue.importers.config_parts import VISCOSITY_FACTOR
+from vegglue.measurements.plausibility import is_mark_anywhere
 
 # Name of the file of measurements that no calibration sees, whatever its ending.
 HELD_OUT = "holdout"
@@ -44,6 +45,12 @@ def _with_unit(quantity: str) -> Callable[[Any], Any]:
     return converted
 
 
+def _measured(value: float) -> float:
+    if is_mark_anywhere(value):
+        raise ValueError("a measured value, not a mark for none")
+    return value
+
+
 def _one_or_more(experiments: dict[str, Any]) -> dict[str, Any]:
     if not experiments:
         raise ValueError("one or more, those that were measured")
@@ -53,7 +60,8 @@ def _one_or_more(experiments: dict[str, Any]) -> dict[str, Any]:
 # Bounds far beyond any stream; what lies outside is a slip of the pen or of the unit.
 PrintableName = Annotated[str, AfterValidator(_printable)]
 Length = Annotated[Number, Field(gt=0, le=1e6)]
-Level = Annotated[Number, Field(ge=-1e4, le=1e4)]
+Level = Annotated[Number, Field(ge=-1e4, le=1e4), AfterValidator(_measured)]
+Discharge = Annotated[Number, Field(gt=0, le=1e6), AfterValidator(_measured)]
 
 
 class _SitePart(BaseModel):
@@ -123,7 +131,7 @@ class _Rectangle(_SitePart):
 class MeasuredFlow(_SitePart):
     """One experiment; its numbers may go by the names without a unit, and then hold one, such as 42 l/s."""
 
-    discharge_m3_s: Annotated[Number, BeforeValidator(_with_unit("discharge")), Field(gt=0, le=1e6)]
+    discharge_m3_s: Annotated[Discharge, BeforeValidator(_with_unit("discharge"))]
     downstream_level_m: Annotated[Level, BeforeValidator(_with_unit("length"))]
 
     @model_validator(mode="before")

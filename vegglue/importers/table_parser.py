@@ -54,7 +54,10 @@ DASHES = str.maketrans(dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\u2014\ufe63
 MISSING_WORDS = (
     "", "-", "--", "---", "nan", "na", "n/a", "n.a.", "n.d.", "k.a.", "k. a.", "null", "none", "nodata", "no data",
     "missing", "inf", "-inf", "+inf", "nd", "s/d",
+    # Of the U.S. Geological Survey: ice, equipment, backwater, season, rating, maintenance, flood, discontinued, dry.
+    "ice", "eqp", "bkw", "ssn", "rat", "mnt", "fld", "dis", "dry", "zfl", "***",
 )  # fmt: skip
+OF_TYPES = re.compile(r"(\d+[sSnNdD]\t)+\d+[sSnNdD]\s*")  # below its headings: widths and types of the columns
 # What a workbook shows for a formula without a value, in any language: #DIV/0!, #N/A, #WERT!, #NOMBRE?
 OF_FORMULA = re.compile(r"#[^\W_]+(/[^\W_]+)?[!?]?")
 FORMULA_IN_FRONT = re.compile(r"\s*#(N/A|NV|[A-Z0/]+[!?])\s*[,;\t|]")  # no comment, though it begins like one
@@ -174,13 +177,16 @@ def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
         if not text.lstrip().startswith(COMMENTS) or FORMULA_IN_FRONT.match(text)
     ]
     comments = len(there) - len(lines)
+    typed = next((number for number, text in lines if OF_TYPES.fullmatch(text)), 0)
+    lines = [line for line in lines if line[0] != typed]
     separator = _separator([text for _, text in lines])
     fields = [(number, _fields(text, separator)) for number, text in lines]
     comma = separator != "," and has_decimal_comma(field for _, row in fields for field in row)
     words = [SEPARATORS[separator], *(["decimal comma"] if comma else [])]
     words += [so_many(comments, "comment line")] if comments else []
+    words += ["a row of types"] if typed else []
     quoted = all(text.lstrip().startswith('"') for _, text in lines)
-    return _without_summaries(_table(path, fields, ", ".join(words), separator, comma, quoted))
+    return _without_summaries(_table(path, fields, ", ".join(words), separator, comma, quoted, typed))
 
 
 def _separator(lines: Sequence[str]) -> str:
@@ -228,14 +234,15 @@ def _without_empty_end(fields: list[str]) -> list[str]:
 
 
 def _table(
-    path: Path, whole: list[Line], form: str, separator: str, decimal_comma: bool, quoted: bool = False
+    path: Path, whole: list[Line], form: str, separator: str, decimal_comma: bool, quoted: bool = False, typed: int = 0
 ) -> ParsedTable:
     """The longest stretch of rows of numbers, with the heading and the units above it.
 
-    quoted: whether all lines begin with a quotation mark, as names of rows in tables of R do.
+    quoted: whether all lines begin with a quotation mark, as names of rows in tables of R do; typed: number of the line
+    of types, which all rows are below, 0 for none.
     """
     lines = [(number, _without_empty_end(fields)) for number, fields in whole]
-    numeric = _rows_of_numbers(lines, separator)
+    numeric = [number > typed for number, _ in lines] if typed else _rows_of_numbers(lines, separator)
     if not any(numeric):
         raise InputError(
             f"{shown_path(path)}: expected a table of numbers, got none; check the file, or move it out of the folder "

@@ -149,7 +149,7 @@ def _ensemble(path: Path, rows: list[list[str]]) -> BoatProfile:
     cells = np.array([[float(row[column]) for column in (0, 3, 4)] for row in rows[6:]]).reshape(-1, 3)
     if not np.isfinite([depth, north, east, *cells.ravel()]).all():
         raise ValueError("a number that is none")
-    cells = cells[(cells[:, 1:] != NO_VALUE).all(axis=1)]
+    cells = cells[(cells != NO_VALUE).all(axis=1)]
     height = depth - metres * cells[:, 0]
     above = height > 0.0
     boat = [float(text) for text in (rows[1][0], *rows[2][2:4])]

@@ -27,6 +27,7 @@ from vegglue.importers.library_files import importing, read_by_library, readable
 from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, read_rows, rows_of_table
 from vegglue.importers.site_file import FileOfSite
 from vegglue.importers.table_parser import WORKBOOKS, is_number, parse_table
+from vegglue.measurements.plausibility import is_mark_anywhere
 from vegglue.wording.numbers import in_digits, listed, so_many
 
 MAP_FILES = (".geojson", ".json", ".shp")
@@ -115,6 +116,12 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
     _refuse_degrees(path, frame, [ring for ring, _ in features])
     for number, (ring, _) in enumerate(features, 1):
+        lost = next((corner for corner in ring if any(map(is_mark_anywhere, corner))), None)
+        if lost is not None:
+            raise InputError(
+                f"{shown_path(path)}: expected corners with places in polygon {number}, got one at {lost[0]:g}, "
+                f"{lost[1]:g}, which marks no value; mend or remove it."
+            )
         refuse_crossing(f"{shown_path(path)}: polygon {number}", ring)
     named = _columns_named(
         path, columns, list(dict.fromkeys(str(key) for _, properties in features for key in properties))
@@ -167,7 +174,8 @@ def planted_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str]
     found = read_polygons(path, frame, columns)
     counted = any(one.density is not None for one in found)
     for one in found:
-        if counted and not (one.density is not None and 0.0 < one.density <= MOST_STEMS):
+        sound = one.density is not None and 0.0 < one.density <= MOST_STEMS and not is_mark_anywhere(one.density)
+        if counted and not sound:
             got = "none" if one.density is None else f"{one.density:g}"
             raise InputError(
                 f"{shown_path(path)}: expected stems of polygon {one.name} above 0, up to {MOST_STEMS:g} 1/m2, got "
@@ -485,7 +493,7 @@ def read_line(path: Path, frame: Frame | None = None) -> MeasuredRows:
     if len(found) != 1:
         raise InputError(f"{shown_path(path)}: expected one line, got {len(found)}; save the centreline alone.")
     places = np.array(found[0], dtype=np.float64)
-    if places.ndim != 2 or not np.isfinite(places).all():
+    if places.ndim != 2 or any(map(is_mark_anywhere, places.ravel().tolist())):
         raise InputError(f"{shown_path(path)}: expected a line of points with numbers, got another; draw it anew.")
     x, y = places[:, :2].T
     if max(np.ptp(x), np.ptp(y)) < SPAN_OF_DEGREES and _may_be_degrees(zip(x.tolist(), y.tolist(), strict=True)):

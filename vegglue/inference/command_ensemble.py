@@ -13,13 +13,13 @@ import numpy as np
 from scipy.special import fdtrc
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import sample_of, sobol_sample
-from vegglue.case.resolved_config import simulation_hash
+from vegglue.case.parameter_space import PriorSample, sample_of, sobol_sample
 from vegglue.case.schema import Case
 from vegglue.engine.command import CommandRuns, ended_runs, own_parameters
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.status import FAILED, RUN_BY_COMMAND
 from vegglue.inference.solve_ensemble import (
+    ensemble_hash,
     left_to_do,
     make_header,
     refuse_too_many,
@@ -168,7 +168,7 @@ def refuse_useless(case: Case, ensemble: Ensemble) -> None:
         again = "" if case.engine is None else " with --force"
         raise InputError(
             f"{shown_path(case.source)}: expected members with a solution, got none of {failed.size:,}; {many:,} of "
-            f"them say: {reason or 'no steady flow'}. Mend that, or the priors, and simulate again{again}."
+            f"them: {reason or 'no steady flow'}. Mend that, or the priors, and simulate again{again}."
         )
     for doubt in doubts_of_predictions(ensemble):
         if isinstance(doubt, PredictionsUnchanged):
@@ -176,16 +176,23 @@ def refuse_useless(case: Case, ensemble: Ensemble) -> None:
 
 
 def run_ensemble(
-    case: Case, observations: Observations, path: Path, runs: CommandRuns, jobs: int, watch: Watch
+    case: Case,
+    observations: Observations,
+    path: Path,
+    runs: CommandRuns,
+    jobs: int,
+    watch: Watch,
+    given: PriorSample | None = None,
 ) -> None:
     """Run all members of the case and write them to `path`; what an earlier run of the same case has run is kept.
 
-    jobs: processes of the built-in solver, if the case has effects. Raises InputError for a case without parameters,
+    jobs: processes of the built-in solver, if the case has effects; given: members in place of those that the case
+    draws from its priors. Raises InputError for a case without parameters,
     StorageError if another run holds the folder or the disk is full (what was written stays).
     """
-    wanted = simulation_hash(case)
+    wanted = ensemble_hash(case, given)
     refuse_too_many(case, observations)
-    sample, names = sobol_sample(case), own_parameters(case)
+    sample, names = given or sobol_sample(case), own_parameters(case)
     chunks = [np.array([member]) for member in range(case.simulate.members)]  # a run costs more than to write it down
     stations, sections = len(observations.table), len(section_positions(observations))
     with ensemble_writer(path, make_header(case, wanted, observations, sample.theta, chunks, None)) as writer:

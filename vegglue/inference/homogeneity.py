@@ -11,7 +11,7 @@ Fisher's F_m,d (Fisher 1925, Statistical Methods for Research Workers); chi2 alo
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import MapEstimate, covariance, determined, fit, squared_misfit
+from vegglue.calibration.fit import covariance, determined, fit_from, squared_misfit
 from vegglue.calibration.noise import Noise, covariance_of, with_correlation
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case
-from vegglue.engine.interface import Model, Point, linearise
+from vegglue.engine.interface import Model, Point
 from vegglue.engine.newton import DIFFERENCE_STEP
 from vegglue.inference.posterior_summary import on_flat_scale
 from vegglue.parallel import parallel_map
@@ -33,8 +33,27 @@ from vegglue.results.posterior import Transfer
 # Posterior over prior variance of z [-] above which an experiment does not determine a parameter. Chosen, not measured:
 # a higher one compares more parameters, whose estimates without the prior rest on less and less data.
 UNINFORMED = 0.5
+# p-value [-], over all parameters compared (Bonferroni), below which a parameter differs between experiments. Stricter
+# than the customary 0.05, as one value for all is given up then.
+DIFFERS_BELOW = 0.01
 # Of one experiment: rows among the used stations (n,), slopes (n, p) and covariance of z (p, p).
 Estimate = tuple[NDArray[np.int64], Array, Array]
+
+
+def differing(p: Mapping[str, float]) -> frozenset[str]:
+    """Parameters that differ between experiments: p times the number compared < DIFFERS_BELOW.
+
+    Parameters
+    ----------
+    p
+        Chance that one value fits all experiments, by parameter [-]; NaN for one that is not compared.
+
+    Returns
+    -------
+    frozenset of str
+    """
+    compared = {name: chance for name, chance in p.items() if not math.isnan(chance)}
+    return frozenset(name for name, chance in compared.items() if chance * len(compared) < DIFFERS_BELOW)
 
 
 def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer | None:
@@ -62,7 +81,7 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
         return None
     noise = with_correlation(noise, noise.correlation, 1.0)
     parts = [one_experiment(model, noise, name) for name in here]
-    fits = parallel_map(partial(_alone, joint), parts)
+    fits = parallel_map(partial(fit_from, z=joint.z, near=joint), parts)
     # s^2 = sum_e chi2_e / sum_e (n_e - p_e), p_e: effective number of parameters of experiment e; and the degrees of
     # freedom that s is estimated from, infinite if it is the least, which is known.
     least, known = 1.0 if stated else 0.0, [(one, part) for one, (_, part) in zip(fits, parts, strict=True) if one]
@@ -104,11 +123,6 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
         misfit_alone=alone / scale**2,
         stations=np.array([part.rows.size for _, part in parts]),
     )
-
-
-def _alone(joint: Point, own: Model, errors: Noise) -> MapEstimate | None:
-    start = linearise(own, joint.z, joint)
-    return None if start is None else fit(own, errors, start)
 
 
 def chance_of_as_much(chi2: float, freedom: int, free: float = math.inf) -> float:

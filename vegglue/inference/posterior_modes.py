@@ -12,7 +12,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, grid_difference, with_own_error
-from vegglue.calibration.fit import MapEstimate, determined, fit
+from vegglue.calibration.fit import MapEstimate, determined, fit, fit_from
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_scale
 from vegglue.calibration.residual_screening import noise_given_all
 from vegglue.case.channel_geometry import cells_across
@@ -105,7 +105,7 @@ def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch) ->
 
     def fit_all(on: Model) -> list[MapEstimate]:
         finished = counted(watch, "fitting the best members", len(starts), "members")
-        ends = parallel_map(partial(_fit_from, on, noise), [(z,) for z in starts], finished)
+        ends = parallel_map(partial(fit_from, on, noise), [(z,) for z in starts], finished)
         return [end for end in ends if end is not None]
 
     before: list[MapEstimate] = []
@@ -140,11 +140,6 @@ def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:
         if len(chosen) < MOST_STARTS and np.linalg.norm(z[chosen] - z[member], axis=1).min() > START_DISTANCE:
             chosen.append(int(member))
     return np.asarray(z[chosen])
-
-
-def _fit_from(model: Model, noise: Noise, z: Array) -> MapEstimate | None:
-    start = linearise(model, z)
-    return None if start is None else fit(model, noise, start)
 
 
 def _refine(model: Model, coarse: Model, noise: Noise, end: MapEstimate) -> MapEstimate | None:

@@ -63,7 +63,13 @@ class UnfinishedRunMoved:
 
 
 def solve_ensemble(
-    case: Case, observations: Observations, path: Path, jobs: int, watch: Watch, site: Site | None = None
+    case: Case,
+    observations: Observations,
+    path: Path,
+    jobs: int,
+    watch: Watch,
+    site: Site | None = None,
+    given: PriorSample | None = None,
 ) -> None:
     """Solve all members of the case and write them to `path`; what an earlier run of the same case solved is kept.
 
@@ -81,6 +87,8 @@ def solve_ensemble(
         Is called after each chunk.
     site : Site, optional
         That of the case, if it is built already.
+    given : PriorSample, optional
+        Members in place of those that the case draws from its priors; as many as it has.
 
     Raises
     ------
@@ -89,13 +97,13 @@ def solve_ensemble(
     StorageError
         If another run holds the folder or the disk is full; what was written stays.
     """
-    wanted = simulation_hash(case)  # before anything else is read: what changes meanwhile makes it out of date
+    wanted = ensemble_hash(case, given)  # before anything else is read: what changes meanwhile makes it out of date
     refuse_too_many(case, observations)
     site = site or build_site(case)
     refuse_ranges_without_cells(case, site.grid)
     if problem := excess(case, site.grid):
         raise InputError(f"{shown_path(case.source)}: {problem}")
-    sample = sobol_sample(case)
+    sample = given or sobol_sample(case)
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     header = make_header(case, wanted, observations, sample.theta, chunks, window_of(case, site.grid))
     with ensemble_writer(path, header) as writer:
@@ -110,6 +118,14 @@ def solve_ensemble(
                 fields = rows.pop("fields")
                 writer.append(index, chunks[index], rows, fields)
             watch(Progress(phase, flows // len(case.experiments), header.members, "members", failed, resumed))
+
+
+def ensemble_hash(case: Case, given: PriorSample | None = None) -> str:
+    """Hash of what an ensemble depends on; of members that were given, their parameters too."""
+    own = simulation_hash(case)
+    if given is None:
+        return own
+    return hashlib.sha256(own.encode() + b"".join(values.tobytes() for values in given.theta.values())).hexdigest()
 
 
 def refuse_too_many(case: Case, observations: Observations) -> None:
@@ -175,8 +191,8 @@ def make_header(
 
 def left_to_do(writer: EnsembleWriter, case: Case, chunks: list[np.ndarray], watch: Watch) -> list[int]:
     """Chunks that an earlier run has not finished, or that are damaged since; a run that was moved is reported."""
-    if writer.set_aside is not None:
-        watch(Progress(sentence(UnfinishedRunMoved(case.name, writer.set_aside.name))))
+    if writer.moved_to is not None:
+        watch(Progress(sentence(UnfinishedRunMoved(case.name, writer.moved_to.name))))
     writer.reopen_damaged(chunks)
     return [index for index in range(len(chunks)) if index not in writer.done]
 

@@ -8,10 +8,11 @@ from itertools import combinations
 import numpy as np
 
 from vegglue.inference.glue import sizes_as_stated
+from vegglue.inference.homogeneity import DIFFERS_BELOW, differing
 from vegglue.inference.refine import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT, root_mean_square
 from vegglue.measurements.kinds import Kind, kind_of
-from vegglue.measurements.observations import SET_ASIDE
+from vegglue.measurements.observations import EXCLUDED
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Posterior, Transfer
 from vegglue.results.verdict import MisfitTooSmall, is_too_small
 
@@ -22,9 +23,6 @@ STRONG_CORRELATION = 0.7
 DOUBTED, UNBELIEVED = 0.05, 0.001
 # Outlying stations named one by one, at most: more are no single errors.
 OUTLIERS_NAMED = 5
-# p-value [-], over all parameters compared (Bonferroni), below which a parameter differs between experiments. Stricter
-# than the customary 0.05, as one value for all is given up then.
-REJECTED_BELOW = 0.01
 # p-value [-] of one parameter by itself below which one value for all is doubted: the customary 1 in 20.
 DOUBTED_BELOW = 0.05
 # Key of a reference table, before the name of a parameter: the chi2 of homogeneity that its source found.
@@ -462,7 +460,7 @@ def fit_statements(posterior: Posterior) -> Iterator[object]:
     value, band = station["value"].to_numpy(float), posterior.predicted.total_band
     outside = ((value < band[0]) | (value > band[-1])) & station["used"].to_numpy()
     yield MedianFit(sizes_of(fit.rmse), int(outside.sum()), fit.used)
-    if excluded := int((station["reason"] == SET_ASIDE).sum()):
+    if excluded := int((station["reason"] == EXCLUDED).sum()):
         yield ReadingsExcluded(excluded, len(station))
     if math.isfinite(fit.chi2) and posterior.refinement is None:
         yield BestMemberFit(fit.chi2, fit.used)
@@ -534,12 +532,6 @@ def stations_standing_out(posterior: Posterior) -> Iterator[StationsStandOut]:
         )  # fmt: skip
 
 
-def moving_parameters(transfer: Transfer) -> np.ndarray:
-    """Whether each parameter (parameter,) differs between experiments: p times the number compared < REJECTED_BELOW."""
-    compared = int(np.sum(transfer.freedom > 0))
-    return np.nan_to_num(transfer.p, nan=1.0) * max(compared, 1) < REJECTED_BELOW
-
-
 def transfer_statements(
     posterior: Posterior, others: Mapping[str, object], symbols: Mapping[str, str] | None = None
 ) -> Iterator[object]:
@@ -553,7 +545,7 @@ def transfer_statements(
     if not order:
         yield NothingToCompare()
         return
-    moves = moving_parameters(transfer)
+    moves = differing(dict(zip(posterior.parameters, transfer.p, strict=True)))
     named = [parameter_of(posterior, name, symbols) for name in posterior.parameters]
     alike = [j for j in order[1:] if transfer.p[j] >= DOUBTED_BELOW and REFERENCE_CHI2 + named[j].name not in others]
     for j in (one for one in order if one not in alike):
@@ -564,7 +556,7 @@ def transfer_statements(
             named[j], named[j].name in posterior.marginals.log10_median,
             tuple((str(name), float(value), float(error)) for name, value, error in each if np.isfinite(value)),
             float(transfer.chi2[j]), int(transfer.freedom[j]), float(transfer.p[j]),
-            float(other) if isinstance(other, int | float) else None, "differs" if moves[j] else doubted,
+            float(other) if isinstance(other, int | float) else None, "differs" if named[j].name in moves else doubted,
         )  # fmt: skip
     if alike:
         yield ParametersAlike(tuple(named[j] for j in alike), float(min(transfer.p[j] for j in alike)))
@@ -582,15 +574,13 @@ def transfer_verdict(
     posterior: Posterior, transfer: Transfer, symbols: Mapping[str, str] | None = None
 ) -> CalibrationTransfers | CalibrationDiffers:
     """Whether the calibration transfers between experiments: no parameter differs, nor do all together
-    (p < REJECTED_BELOW).
+    (p < DIFFERS_BELOW).
     """
-    moves = moving_parameters(transfer)
-    if not moves.any() and not transfer.p_all < REJECTED_BELOW:
+    moves = differing(dict(zip(posterior.parameters, transfer.p, strict=True)))
+    if not moves and not transfer.p_all < DIFFERS_BELOW:
         return CalibrationTransfers()
-    named = zip(posterior.parameters, moves, strict=True)
-    return CalibrationDiffers(
-        tuple(parameter_of(posterior, name, symbols) for name, move in named if move), transfer.scale
-    )
+    named = [parameter_of(posterior, name, symbols) for name in posterior.parameters if name in moves]
+    return CalibrationDiffers(tuple(named), transfer.scale)
 
 
 def canopy_statements(posterior: Posterior, symbols: Mapping[str, str] | None = None) -> Iterator[CanopyCorrected]:

@@ -66,10 +66,16 @@ class Section:
 
 @dataclass(frozen=True)
 class DeadProbe:
-    """A probe that reads near zero at all heights; all but `heights` in m/s.
+    """A probe that reads near zero at all heights.
 
-    largest: largest |u|; expected: mean u between its neighbours; deviation, expected_deviation: median of u_std here
-    and between its neighbours, None if unknown.
+    Attributes
+    ----------
+    heights
+        Number of points.
+    largest, expected
+        Largest |u|, and mean u between its neighbours [m/s].
+    deviation, expected_deviation
+        Median of u_std here and between its neighbours [m/s], None if unknown.
     """
 
     heights: int
@@ -82,7 +88,21 @@ class DeadProbe:
 def read_section(case: Case, observation: Observation, gauges: pd.DataFrame) -> Section:
     """Points, verticals, discharge and canopy height of the section of one observation of `kind: adv`.
 
-    gauges: stations of measured levels. Errors: InputError, naming file and row, for what cannot be used as given.
+    Parameters
+    ----------
+    case : Case
+    observation : Observation
+    gauges : DataFrame
+        Stations of measured levels.
+
+    Returns
+    -------
+    Section
+
+    Raises
+    ------
+    InputError
+        Naming file and row, for what cannot be used as given.
     """
     points = _placed(case, observation, _read_points(observation), gauges)
     # Standard error of every point: as stated, else its sampling error. The integral time scale, which no file gives,
@@ -110,12 +130,23 @@ def read_section(case: Case, observation: Observation, gauges: pd.DataFrame) -> 
 
 
 def dead_probes(edges: tuple[float, float], points: pd.DataFrame) -> dict[float, DeadProbe]:
-    """Verticals of a section whose probe is dead, by their y [m]. Nothing is dropped here.
+    """Verticals of a section whose probe is dead. Nothing is dropped here.
 
     A dead probe reads near zero at every height, without turbulence, while its neighbours do not. In slow water a
-    working probe still sees fluctuations and a rise with height. Slow water is natural in plants, so that without u_std
-    a probe there is not dead. edges: y of the water's edges, where velocity and turbulence are zero [m]; points:
-    columns y, u, u_std (NaN when unknown) and plants, in the water.
+    working probe still shows fluctuations and a rise with height. Slow water is natural in plants, so that without
+    u_std a probe there is not dead.
+
+    Parameters
+    ----------
+    edges
+        y of the water's edges, at which velocity and turbulence are zero [m].
+    points : DataFrame
+        Columns y, u, u_std (NaN if unknown) and plants, in the water.
+
+    Returns
+    -------
+    dict of float to DeadProbe
+        By y [m].
     """
     by = points.assign(speed=points["u"].abs()).groupby("y", as_index=False).agg(
         heights=("u", "size"), largest=("speed", "max"), mean=("u", "mean"), deviation=("u_std", "median"),
@@ -144,12 +175,21 @@ def dead_probes(edges: tuple[float, float], points: pd.DataFrame) -> dict[float,
 
 
 def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]:
-    """Depth average of each vertical and its standard error (rows,) [m/s], by a rule.
+    """Depth average of each vertical and its standard error, by a rule.
 
-    profiles: rows as in Observations.profiles.
-    paper: as in Berends et al. (2020), linear between points, zero at the bed and constant above the highest point;
-    profile: the mean of the fitted profile. The error of `paper` includes that of its shape below the lowest point and
-    above the highest one: d / sqrt(3), the difference d of both rules being the bound of a uniform distribution.
+    Parameters
+    ----------
+    profiles : DataFrame
+        Rows of Observations.profiles.
+    rule
+        `paper`: as in Berends et al. (2020), linear between points, zero at the bed and constant above the highest
+        point; its error includes d / sqrt(3), the difference d of both rules being the bound of a uniform distribution.
+        `profile`: the mean of the fitted profile.
+
+    Returns
+    -------
+    U, standard error
+        (rows,) [m/s]
     """
     if rule == "profile":
         return profiles["fitted"], profiles["fitted_error"]
@@ -158,11 +198,20 @@ def average_of(profiles: pd.DataFrame, rule: str) -> tuple[pd.Series, pd.Series]
 
 
 def across_averages(points: pd.DataFrame) -> pd.DataFrame:
-    """Depth average of v in each vertical and its standard error, columns value and standard_error [m/s].
+    """Depth average of v in each vertical.
 
     Linear between points, zero at the bed, constant above the highest: no law gives the spread of secondary flow. Few
     points are averaged as along the channel, so that they keep their direction.
-    points: rows of Observations.points with a column v, of verticals in the order of `Section.profiles`.
+
+    Parameters
+    ----------
+    points : DataFrame
+        Rows of Observations.points with a column v, of verticals in the order of `Section.profiles`.
+
+    Returns
+    -------
+    DataFrame
+        Columns value and standard_error [m/s].
     """
     found = []
     for _, group in points.groupby("y"):

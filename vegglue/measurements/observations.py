@@ -34,7 +34,7 @@ PROFILE_TYPES: dict[str, type] = {
     "fitted": float, "fitted_error": float, "within": float, "slope": float, "top": float, "scatter": float,
 }  # fmt: skip
 OUTSIDE = "it is outside the grid"
-SET_ASIDE = "the diagnosis set it aside"
+EXCLUDED = "the diagnosis excludes it"
 # Readings and their errors, in the SI unit of whatever kind: beyond them lies nothing that is measured in a stream, and
 # the squares of such numbers leave no digits of the others.
 SMALLEST_STATED_ERROR, LARGEST_READING = 1e-9, 1e9

@@ -37,10 +37,16 @@ class SurveyedQuantity:
 
 @dataclass(frozen=True)
 class RigidCylinder:
-    """phi [-] of a stand of rigid cylinders.
+    """phi of a stand of rigid cylinders.
 
-    draws (draws,): of phi; parts: mean contribution of stems, branches and undergrowth to phi [-]; undergrowth_density:
-    range assumed, as it was not surveyed [1/m2], None without undergrowth.
+    Attributes
+    ----------
+    draws
+        Of phi (draws,) [-].
+    parts
+        Mean contribution of stems, branches and undergrowth to phi [-].
+    undergrowth_density
+        Assumed range, as it was not surveyed [1/m2]; None without undergrowth.
     """
 
     draws: Array
@@ -63,9 +69,21 @@ class RigidCylinder:
 
 
 def read_survey(path: Path) -> dict[str, SurveyedQuantity]:
-    """Rows `quantity,mean,standard_deviation,samples` [SI] of a CSV, by quantity; one row for each of SURVEYED.
+    """Read a table of `quantity,mean,standard_deviation,samples`, one row for each of SURVEYED.
 
-    Raises InputError naming the file and row for what is missing, unknown, repeated, or not positive.
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    dict of str to SurveyedQuantity
+        By quantity [SI].
+
+    Raises
+    ------
+    InputError
+        Naming file and row, for what is missing, unknown, repeated, or not positive.
     """
     rows = read_table(path, ("quantity",), ("mean", "standard_deviation", "samples"))
     known = ", ".join(SURVEYED)
@@ -91,17 +109,27 @@ def rigid_cylinder(
     """phi = C_d m (D_s h_s + b D_b (h_p - h_s)) min(h_d / h_p, 1) + C_d m_u D_u min(h_u, h_d).
 
     m stems [1/m2] of diameter D_s and height h_s, b branches on each from there to the plant height h_p, bent rigidly
-    at the bed to the deflected height h_d (all lengths shrink by the cosine h_d / h_p; upright when
+    at the bed to the deflected height h_d (all lengths shrink by the cosine h_d / h_p; upright if
     `choice.deflected_height` is not given), and m_u stems of undergrowth of diameter D_u and height h_u, which stay
-    upright [m]; C_d = 1. No foliage.
+    upright [m]; C_d = 1. No foliage. Heights and diameters are lognormal with the surveyed means and standard
+    deviations, so that 4 +- 4 mm stays positive.
 
-    Heights and diameters are lognormal with the surveyed means and standard deviations, so that 4 +- 4 mm stays
-    positive. `choice.spread` selects the spread: `plants` that between plants, as the +- of Berends et al.
-    (2020) must be, `mean` the error of the mean over the sampled plants. The density m_u was not surveyed: it is
-    log-uniform between the two values of `choice.undergrowth_density` [1/m2], assumed by the user; without them there
-    is no undergrowth.
+    Parameters
+    ----------
+    survey
+        As of `read_survey`.
+    choice : Survey
+        Its `spread` is `plants`, that between plants, as the +- of Berends et al. (2020) must be, or `mean`, the error
+        of the mean over the sampled plants. `undergrowth_density` is the range [1/m2] of m_u, log-uniform, which was
+        not surveyed; without it there is no undergrowth.
+    draws, seed
+        How many draws, and their seed.
 
-    Source: Berends et al. (2020), section 3.2; Baptist et al. (2007), doi 10.1080/00221686.2007.9521778;
+    Returns
+    -------
+    RigidCylinder
+
+    References ---------- Berends et al. (2020), section 3.2; Baptist et al. (2007), doi 10.1080/00221686.2007.9521778;
     bending after Verschoren et al. (2016).
     """
     generator, drawn = np.random.default_rng(seed), {}

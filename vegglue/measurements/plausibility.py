@@ -95,10 +95,23 @@ class Symptom(Enum):
 class ImplausibleValues:
     """Used values of one kind of observation with one problem.
 
-    quantity: the kind in words; instrument: as in Kind; si_unit: unit of its values; symptom; unit: the unit in which
-    they would be plausible, '' if none; size: median over the values, see Symptom; count, of total used values of the
-    kind; first: value, x and y of the first [SI], y None if the kind has none; places: (experiment, section), section
-    '' for a gauge without a name and None for all values of the experiment.
+    Attributes
+    ----------
+    quantity
+        The kind in words.
+    instrument, si_unit
+        As in Kind, and the unit of its values.
+    symptom : Symptom
+    unit
+        The unit in which they would be plausible; empty for none.
+    size
+        Median over the values, see Symptom.
+    count, total
+        Number of these and of all used values of the kind.
+    first
+        Value, x and y of the first [SI]; y None if the kind has none.
+    places
+        Experiments and sections; '' for a gauge without a name, None for all values of the experiment.
     """
 
     quantity: str
@@ -126,12 +139,28 @@ class ImplausibleOutlet:
 
 @dataclass(frozen=True)
 class PlausibleFlow:
-    """Bounds for one experiment, at columns x (nx,) and rows y (ny,) of the grid [m].
+    """Bounds for one experiment on the grid.
 
-    slowest and fastest (nx,): Q / A [m/s], inf if the section may be dry; lowest and highest (nx,): water level [m];
-    smoothest and thickest (nx,): the same without what is left for gauges that are off, on smooth walls and in growth;
-    floor (nx,): lowest bed of the section [m]; discharge: least, of one inflow alone, and most, of all [m3/s];
-    depth: largest at the outlet [m]; level: at the outlet [m]; width: of the grid [m]; depths: expected (nx, ny) [m].
+    Attributes
+    ----------
+    x, y
+        Columns (nx,) and rows (ny,) [m].
+    slowest, fastest
+        Q / A (nx,) [m/s], infinite if the section may be dry.
+    lowest, highest
+        Water level (nx,) [m].
+    smoothest, thickest
+        The same without what is left for gauges that are off, on smooth walls and in growth (nx,) [m].
+    floor
+        Lowest bed of the section (nx,) [m].
+    discharge
+        Least, of one inflow alone, and most, of all [m3/s].
+    depth, level
+        Largest depth, and level at the outlet [m].
+    width
+        Of the grid [m].
+    depths
+        Expected (nx, ny) [m].
     """
 
     x: Array
@@ -164,16 +193,33 @@ def is_mark(value: float) -> bool:
     return size >= LARGEST_MEASURED or size in _SIZES or (size >= LEAST_NINES and is_of_nines(size))
 
 
+def is_mark_anywhere(value: float) -> bool:
+    """Whether a number stands for a missing value also among places, where 9 and 99 are measured."""
+    negative_nines = value <= -99.0 and is_of_nines(-value)
+    return negative_nines or value in MARKS_OF_ANY_COLUMN or not abs(value) <= LARGEST_COORDINATE
+
+
 def is_of_nines(value: float) -> bool:
     """Whether a number is written with nines alone: 9, 99.9, 9999."""
     return set(f"{value:g}") <= set("9.")
 
 
 def implausible_values(case: Case, site: Site, station: pd.DataFrame) -> list[ImplausibleOutlet | ImplausibleValues]:
-    """What no flow of the case can have among the used stations; empty if all of it is possible.
+    """What no flow of the case can have among the used stations.
 
-    |u| against U = Q / A, levels against the outlet's, the bed and the thickest growth, errors against both; see
-    `plausible_flow`. station: as Observations.table [SI].
+        |u| against U = Q / A, levels against the outlet's, the bed and the thickest growth, errors against both
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    station : DataFrame
+        As Observations.table [SI].
+
+    Returns
+    -------
+    list
+        Empty if all of it is possible; see `plausible_flow`.
     """
     used = station[station["used"]]
     outlets, wrong = _judged(case, site, used)
@@ -215,6 +261,16 @@ def plausible_flow(case: Case, site: Site, experiment: Experiment) -> PlausibleF
     Q and z_out within 95 % of their priors. A of `slowest` lies under a surface parallel to the floor, or that of the
     outlet if that is higher; A of `fastest` under the lower one that smooth walls leave, see `_smoothest`. If plants
     hold the water up, A is larger and the flow slower.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    experiment : Experiment
+
+    Returns
+    -------
+    PlausibleFlow
     """
     level = prior_range(case, experiment.level)
     parts = [prior_range(case, value) for value in experiment.discharge.values()]

@@ -50,7 +50,17 @@ SURELY_OTHERWISE = 3.0
 
 @dataclass(frozen=True)
 class CrossSection:
-    """Regular cells across the channel: centres y (cells,), bed level (cells,) and the flat water level [m]."""
+    """A section of regular cells under a flat water level.
+
+    Attributes
+    ----------
+    y
+        Middles of the cells across the channel (cells,) [m].
+    bed
+        (cells,) [m]
+    surface
+        Water level [m].
+    """
 
     y: Array
     bed: Array
@@ -79,9 +89,20 @@ class Discharge:
 class CarriedDischarge:
     """What the verticals of one section carry.
 
-    x: of the section [m]; value, and interval95 of it [m3/s]; stated: what has entered upstream, 95 % of its priors
-    [m3/s], None if that is not known; share: of the wet width that lies between the outermost verticals [-];
-    verticals: how many there are; gauged: whether the level was measured.
+    Attributes
+    ----------
+    experiment, section, x
+        Of the section; x [m].
+    value, interval95
+        Discharge [m3/s].
+    stated
+        What has entered upstream, 95 % of its priors [m3/s]; None if that is not known.
+    share
+        Of the wet width that lies between the outermost verticals [-].
+    verticals
+        Their number.
+    gauged
+        Whether the level was measured.
     """
 
     experiment: str
@@ -126,13 +147,29 @@ class DischargeMismatch:
 
 
 def grid_weights(section: CrossSection, position: Array, columns: Sequence[Column], step: float) -> list[Array]:
-    """w, for each vertical (points,) [m2], with Q = sum(w u) [m3/s]: the rule `paper`.
+    """w with Q = sum(w u): the rule `paper`.
 
-    position (columns,): y of the verticals [m]; columns: their points; step: largest height of a grid cell [m].
     Points are interpolated linearly on a regular (y, z) grid of cells at most `step` high: upward in each vertical
-    (zero at the bed, constant from the highest point to the surface), then across at each level between verticals,
-    to zero where that level meets the bed or the bank. Q = sum of velocity x cell area.
-    Source: Berends et al. (2020), section 3.1, which does not state the assumptions at the surface and at the banks.
+    (zero at the bed, constant from the highest point to the surface), then across at each level between verticals, to
+    zero where that level meets the bed or the bank. Q = sum of velocity x cell area.
+
+    Parameters
+    ----------
+    section : CrossSection
+    position
+        y of the verticals (columns,) [m].
+    columns : sequence of Column
+    step
+        Largest height of a grid cell [m].
+
+    Returns
+    -------
+    list of array
+        For each vertical (points,) [m2].
+
+    References
+    ----------
+    Berends et al. (2020), section 3.1, which does not state the assumptions at the surface and at the banks.
     """
     lowest = float(section.bed.min())
     count = int(np.ceil((section.surface - lowest) / step))
@@ -154,11 +191,25 @@ def grid_weights(section: CrossSection, position: Array, columns: Sequence[Colum
 
 
 def conveyance_weights(section: CrossSection, position: Array, depth: Array) -> Array:
-    """w (columns,) [m2] with Q = sum(w U) [m3/s]: U / sqrt(h) is linear across, constant beyond the outermost ones.
+    """w with Q = sum(w U): U / sqrt(h) is linear across, constant beyond the outermost verticals.
 
-    position and depth (columns,): y and water depth h of the verticals [m]. Between the outermost vertical and the bank
-    that is a constant Froude number, so that the velocity goes to zero with the depth.
-    Source: Le Coz et al. (2012), doi 10.1016/j.flowmeasinst.2012.05.001.
+    Between the outermost vertical and the bank that is a constant Froude number, so that the velocity goes to zero with
+    the depth.
+
+    Parameters
+    ----------
+    section : CrossSection
+    position, depth
+        y and water depth h of the verticals (columns,) [m].
+
+    Returns
+    -------
+    array
+        (columns,) [m2]
+
+    References
+    ----------
+    Le Coz et al. (2012), doi 10.1016/j.flowmeasinst.2012.05.001.
     """
     flow = section.width * section.depth**1.5
     hats = [np.interp(section.y, position, unit) for unit in np.eye(len(position))]
@@ -166,14 +217,26 @@ def conveyance_weights(section: CrossSection, position: Array, depth: Array) -> 
 
 
 def neighbour_error(position: Array, average: Array) -> float:
-    """s with s^2 = mean((U_i - sum_j w_j U_j)^2 / (1 + sum_j w_j^2)): the error of one vertical [m/s].
+    """s with s^2 = mean((U_i - sum_j w_j U_j)^2 / (1 + sum_j w_j^2)): the error of one vertical.
 
-    position (columns,): y of the verticals [m]; average U (columns,) [m/s]. The weights w predict U_i from its
-    neighbours by the cubic through two on either side, or by the straight line through one on either side when there
-    are fewer than five verticals. Smooth curvature across the channel then does not count as error; jumps, as at the
-    edge of plants, do. NaN below three verticals.
-    Source: the interpolated variance estimator of Cohn, Kiang and Mason (2013), doi
-    10.1061/(ASCE)HY.1943-7900.0000695, which takes the straight line.
+    The weights w predict U_i from its neighbours by the cubic through two on either side, or by the straight line
+    through one on either side with fewer than five verticals. Smooth curvature across the channel then does not count
+    as error; jumps, as at the edge of plants, do.
+
+    Parameters
+    ----------
+    position
+        y of the verticals (columns,) [m].
+    average
+        U (columns,) [m/s].
+
+    Returns
+    -------
+    float
+        [m/s]; NaN below three verticals.
+
+    References ---------- Cohn, Kiang and Mason (2013), doi 10.1061/(ASCE)HY.1943-7900.0000695: the interpolated
+    variance estimator, which takes the straight line.
     """
     count = len(position)
     each_side = 2 if count >= 5 else 1
@@ -189,10 +252,23 @@ def neighbour_error(position: Array, average: Array) -> float:
 
 
 def combine(value: float, sampling: float, spacing: float, rule: float) -> Discharge:
-    """standard_error^2 = max(sampling, spacing)^2 + rule^2 [m3/s]; an unknown (NaN) spacing error is left out.
+    """standard_error^2 = max(sampling, spacing)^2 + rule^2.
 
-    sampling: from the standard errors of the verticals; spacing: from how far each vertical lies from what its
-    neighbours predict, which contains the sampling error; rule: from the profile assumed where nothing was measured.
+    Parameters
+    ----------
+    value
+        Q [m3/s].
+    sampling
+        From the standard errors of the verticals [m3/s].
+    spacing
+        From how far each vertical lies from what its neighbours predict, which contains the sampling error [m3/s]; left
+        out if NaN.
+    rule
+        From the profile assumed where nothing was measured [m3/s].
+
+    Returns
+    -------
+    Discharge
     """
     return Discharge(value, float(np.hypot(np.fmax(sampling, spacing), rule)))
 
@@ -200,10 +276,21 @@ def combine(value: float, sampling: float, spacing: float, rule: float) -> Disch
 def section_discharges(
     section: CrossSection, columns: Sequence[Column], good: pd.DataFrame, error: float
 ) -> dict[str, Discharge]:
-    """Q = sum_i w_i u_i [m3/s] by both rules, from the verticals that are used.
+    """Q = sum_i w_i u_i by both rules, from the verticals that are used.
 
-    columns: their points; good: their profiles (rows of Observations.profiles); error: of one vertical, estimated
-    from its neighbours [m/s].
+    Parameters
+    ----------
+    section : CrossSection
+    columns : sequence of Column
+    good : DataFrame
+        Their profiles, rows of Observations.profiles.
+    error
+        Of one vertical, estimated from its neighbours [m/s].
+
+    Returns
+    -------
+    dict of str to Discharge
+        By rule.
     """
     position, scatter = good["y"].to_numpy(), good["scatter"].fillna(1.0)
     grid = grid_weights(section, position, columns, GRID_STEP)

@@ -31,7 +31,17 @@ TINY = 1e-300  # keeps 0 / 0 from points that all lie below the top; their slope
 
 @dataclass(frozen=True)
 class Column:
-    """One vertical: heights above the bed [m], velocities [m/s], their standard errors [m/s], water depth [m]."""
+    """The points of one vertical.
+
+    Attributes
+    ----------
+    height
+        Above the bed (points,) [m].
+    velocity, standard_error
+        (points,) [m/s]
+    depth
+        Of the water [m].
+    """
 
     height: Array
     velocity: Array
@@ -41,12 +51,20 @@ class Column:
 
 @dataclass(frozen=True)
 class ProfileFit:
-    """u(z) = within + slope ln(max(z / top, 1)), slope = u* / kappa; within and slope [m/s], top [m].
+    """u(z) = within + slope ln(max(z / top, 1)), slope = u* / kappa.
 
-    within: the uniform velocity below the top; slope: of the logarithmic part above it. Inside plants top is the canopy
-    height; without plants it is the roughness height z_0, and within is 0.
-    scatter: how many times more the points scatter about the profile than their sampling errors explain, the root of
-    the reduced chi-square, at least 1 [-]. covariance (3, 3): of (within, slope, top), times scatter^2.
+    Attributes
+    ----------
+    within
+        Uniform velocity below the top [m/s]; 0 without plants.
+    slope
+        Of the logarithmic part above it [m/s].
+    top
+        Canopy height inside plants, else the roughness height z_0 [m].
+    covariance
+        Of (within, slope, top), times scatter^2 (3, 3).
+    scatter
+        Root of the reduced chi-square, at least 1 [-]: scatter of the points over what their sampling errors explain.
     """
 
     within: float
@@ -80,9 +98,16 @@ class CanopyUnknown(Enum):
 
 @dataclass(frozen=True)
 class CanopyHeight:
-    """Deflected canopy height above the bed and its standard error [m], from how many verticals (columns).
+    """Deflected canopy height above the bed.
 
-    Both are NaN if the verticals show no canopy top, for the reason `unknown`.
+    Attributes
+    ----------
+    value, standard_error
+        [m]; NaN if the verticals show no canopy top.
+    columns
+        Number of verticals.
+    unknown
+        Why they show none, or None.
     """
 
     value: float
@@ -92,27 +117,62 @@ class CanopyHeight:
 
 
 def sampling_error(deviation: Array, duration: Array, time_scale: Array | float) -> Array:
-    """se = sqrt(2 T_I / T) s, the error of a mean over T of a record with deviation s and integral time scale T_I.
+    """se = sqrt(2 T_I / T) s, the error of a mean of a record; never above s.
 
-    deviation s [m/s], duration T [s], time_scale T_I [s] -> [m/s]; never above s.
-    Source: Lenschow, Mann and Kristensen (1994), doi 10.1175/1520-0426(1994)011<0661:HLILEW>2.0.CO;2.
+    Parameters
+    ----------
+    deviation
+        Standard deviation s [m/s].
+    duration
+        T [s]
+    time_scale
+        Integral time scale T_I [s].
+
+    Returns
+    -------
+    array
+        [m/s]
+
+    References
+    ----------
+    Lenschow, Mann and Kristensen (1994), doi 10.1175/1520-0426(1994)011<0661:HLILEW>2.0.CO;2.
     """
     return deviation * np.sqrt(np.minimum(2.0 * np.asarray(time_scale) / duration, 1.0))
 
 
 def linear_weights(height: Array, levels: Array) -> Array:
-    """w (levels, points) [-] with u(levels) = w u: linear between points, zero at the bed, constant above the highest.
+    """w with u(levels) = w u: linear between points, zero at the bed, constant above the highest.
 
-    height (points,) and levels (levels,) above the bed [m].
+    Parameters
+    ----------
+    height
+        Of the points above the bed (points,) [m].
+    levels
+        Above the bed (levels,) [m].
+
+    Returns
+    -------
+    array
+        (levels, points) [-]
     """
     nodes = np.concatenate([[0.0], height])
     return np.column_stack([np.interp(levels, nodes, np.concatenate([[0.0], unit])) for unit in np.eye(len(height))])
 
 
 def average_weights(height: Array, depth: float) -> Array:
-    """w (points,) [-] with U = sum(w u): the profile of `linear_weights`, averaged from the bed to the surface.
+    """w with U = sum(w u): the profile of `linear_weights`, averaged from the bed to the surface.
 
-    height (points,) and depth [m]. Where the highest point is above the depth, the average ends at that point.
+    Parameters
+    ----------
+    height
+        Of the points above the bed (points,) [m].
+    depth
+        [m]; the average ends at the highest point if that is above it.
+
+    Returns
+    -------
+    array
+        (points,) [-]
     """
     half = np.diff(np.concatenate([[0.0], height, [max(depth, height[-1])]])) / 2.0
     weights = half[:-1] + half[1:]
@@ -121,20 +181,45 @@ def average_weights(height: Array, depth: float) -> Array:
 
 
 def linear_average(column: Column, scatter: float = 1.0) -> tuple[float, float]:
-    """U = sum(w u) and its standard error scatter sqrt(sum((w se)^2)) [m/s], w the `average_weights`.
+    """U = sum(w u) and its standard error scatter sqrt(sum((w se)^2)), w the `average_weights`.
 
-    scatter: factor on the standard errors of the points [-], see ProfileFit.
+    Parameters
+    ----------
+    column : Column
+    scatter
+        Factor on the standard errors of the points [-], see ProfileFit.
+
+    Returns
+    -------
+    U, standard error
+        [m/s]
     """
     weights = average_weights(column.height, column.depth)
     return float(weights @ column.velocity), float(scatter * np.linalg.norm(weights * column.standard_error))
 
 
 def few_points_average(column: Column, among_plants: bool) -> tuple[float, float]:
-    """U and its standard error [m/s] of fewer than FEWEST_POINTS points, which do not resolve the profile.
+    """U of fewer than FEWEST_POINTS points, which do not resolve the profile.
 
-    Without plants U = a (L - 1 + e^-L) of the log law u = a (L + ln(z / h)), a by weighted least squares, with L =
-    USUAL_ROUGHNESS; its error that of the points and FEW_POINTS_ERROR. Among plants see `average_within_plants`.
-    Source: ISO 748:2007 for the errors; the average is the integral of the log law.
+        U = a (L - 1 + e^-L) of the log law u = a (L + ln(z / h)), L = USUAL_ROUGHNESS
+
+    a is the weighted least-squares estimate; the error is that of the points and FEW_POINTS_ERROR. Among plants see
+    `average_within_plants`. The average is the integral of the log law.
+
+    Parameters
+    ----------
+    column : Column
+    among_plants
+        Whether the vertical stands in plants.
+
+    Returns
+    -------
+    U, standard error
+        [m/s]
+
+    References
+    ----------
+    ISO 748:2007 for the errors.
     """
     if among_plants:
         return average_within_plants(column)
@@ -147,10 +232,19 @@ def few_points_average(column: Column, among_plants: bool) -> tuple[float, float
 
 
 def average_within_plants(column: Column) -> tuple[float, float]:
-    """U and its standard error [m/s] of points among plants that show no top: stems keep u even down to the bed.
+    """U of points among plants that show no top: stems keep u even down to the bed.
 
     As `linear_average`, but uniform below the lowest point; what zero at the bed would change is the bound of a uniform
     distribution.
+
+    Parameters
+    ----------
+    column : Column
+
+    Returns
+    -------
+    U, standard error
+        [m/s]
     """
     zero_at_bed, sampling = linear_average(column)
     more = 0.5 * column.height[0] / max(column.depth, column.height[-1]) * float(column.velocity[0])
@@ -160,8 +254,16 @@ def average_within_plants(column: Column) -> tuple[float, float]:
 def fit_log_law(column: Column) -> ProfileFit | None:
     """u = (u* / kappa) ln(z / z_0) above z_0, zero below: the profile of water without plants.
 
-    Weighted least squares: z_0 is the best of HEIGHTS_TRIED values, the slope of each is exact. None when there are
-    fewer than FEWEST_POINTS points, or the velocity does not rise with height.
+    Weighted least squares: z_0 is the best of HEIGHTS_TRIED values, the slope of each is exact.
+
+    Parameters
+    ----------
+    column : Column
+
+    Returns
+    -------
+    ProfileFit or None
+        None with fewer than FEWEST_POINTS points, or if the velocity does not rise with height.
     """
     tops = np.geomspace(SMOOTHEST_BED * column.depth, 0.9 * column.height[-1], HEIGHTS_TRIED)
     return _fit(column, tops, within_free=False)
@@ -170,9 +272,20 @@ def fit_log_law(column: Column) -> ProfileFit | None:
 def fit_two_layers(column: Column) -> ProfileFit | None:
     """u = u_v below the canopy height k, u_v + (u* / kappa) ln(z / k) above it: the profile inside plants.
 
-    Weighted least squares: k is the best of HEIGHTS_TRIED values, u_v and the slope of each are exact. None when there
-    are fewer than FEWEST_POINTS points, or the velocity does not rise above a canopy.
-    Source: the profile behind the resistance formula of Baptist et al. (2007), doi 10.1080/00221686.2007.9521778.
+    Weighted least squares: k is the best of HEIGHTS_TRIED values, u_v and the slope of each are exact.
+
+    Parameters
+    ----------
+    column : Column
+
+    Returns
+    -------
+    ProfileFit or None
+        None with fewer than FEWEST_POINTS points, or if the velocity does not rise above a canopy.
+
+    References
+    ----------
+    Baptist et al. (2007), doi 10.1080/00221686.2007.9521778: the profile behind their resistance formula.
     """
     if len(column.height) < FEWEST_POINTS:
         return None
@@ -180,11 +293,20 @@ def fit_two_layers(column: Column) -> ProfileFit | None:
 
 
 def fit_canopy_height(columns: Sequence[Column]) -> CanopyHeight:
-    """k = argmin of sum(chi2(k)) over the verticals: the one canopy height [m] shared by all verticals of a stand.
+    """k = argmin of sum(chi2(k)) over the verticals: the canopy height shared by all verticals of a stand.
 
     Each vertical has the profile of `fit_two_layers`, with u_v and u* of its own. Standard error: half the width of the
-    range where chi2(k) <= chi2_min + s^2, with s^2 the reduced chi-square, at least 1, so that scatter between stems
-    and verticals counts. NaN with a reason when the fit is no better than a uniform velocity in each vertical.
+    range in which chi2(k) <= chi2_min + s^2, with s^2 the reduced chi-square, at least 1, so that scatter between stems
+    and verticals counts.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+
+    Returns
+    -------
+    CanopyHeight
+        NaN with a reason if the fit is no better than a uniform velocity in each vertical.
     """
     columns = [column for column in columns if len(column.height) >= FEWEST_POINTS]
     if not columns:

@@ -4,12 +4,12 @@
 """
 
 import math
-import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
+from vegglue.errors import shell_line
 from vegglue.inference.statements import UNBELIEVED, parameters_at_bounds
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT
 from vegglue.measurements.section_discharge import DischargeMismatch, discharge_mismatches, mismatched_discharges
@@ -156,7 +156,7 @@ def answer_of(run: Run) -> CaseAnswer:
 
 def quoted_config(run: Run) -> str:
     """Name of the config, quoted for a shell."""
-    return shlex.quote(run.case.source.name)
+    return shell_line([run.case.source.name])
 
 
 def headline_lines(run: Run) -> list[object]:

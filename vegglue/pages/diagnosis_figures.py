@@ -28,7 +28,7 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.wording.numbers import fixed, section_in_words, unit_math
 from vegglue.wording.sentences import phrase, sentence
 
-# How each status is drawn: marker, face, edge. Form and fill tell them apart without colour.
+# How each status is drawn: marker, face, edge. Form and fill differ, without colour.
 MARKS: dict[str, tuple[str, str, str]] = {
     "accepted": ("o", "measured", "measured"),
     "rival": ("D", "measured", "measured"),
@@ -41,7 +41,7 @@ MARKS: dict[str, tuple[str, str, str]] = {
 TOP = -1.5
 # Panels side by side: with five, the ticks of each still have room.
 FINGERPRINT_COLUMNS = 5
-# One for each experiment, told apart without colour.
+# One for each experiment, distinct without colour.
 LINE_STYLES = ("solid", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 
 
@@ -104,7 +104,7 @@ def paint_candidates(scores: Axes, visible: Axes, suspects: pd.DataFrame, thresh
 @styled
 def draw_alike(names: Sequence[str], cosine: Array) -> Figure:
     """Cosines between the traces of effects after calibration: squares by size, full where alike, hollow where opposed;
-    framed are groups that these data cannot tell apart.
+    framed are groups that these data cannot separate.
     """
     side = 1.9 + 0.26 * len(names)
     figure, axes = canvas(max(WIDTH, side + 0.4), max(side, 2.2))

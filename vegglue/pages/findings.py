@@ -1,11 +1,11 @@
 """What a run states beside its verdict, as values; those that limit the use of the result come first."""
 
-import shlex
 from dataclasses import dataclass
 
 import numpy as np
 
 from vegglue.case.channel_geometry import discharges_upstream_of
+from vegglue.errors import shell_line
 from vegglue.flow.status import FAILED, STATUS_WORDS, members_with
 from vegglue.inference.command_ensemble import doubts_of_predictions
 from vegglue.inference.statements import (
@@ -26,13 +26,13 @@ from vegglue.results.posterior import Posterior
 FAILED_TOLERATED = 0.01
 # Standard errors [-] between measured and prescribed discharge, beyond which chance explains it 1 time in 20.
 DISCHARGE_DOUBTED = 2.0
-# Largest |Q - Q_in| over all that enters [-] of a sound member: a hundredth of what a flow meter can tell.
+# Largest |Q - Q_in| over all that enters [-] of a sound member: a hundredth of what a flow meter can resolve.
 MASS_LIMIT = 1e-4
 
 
 @dataclass(frozen=True)
 class CylinderCompared:
-    """Drag of rigid cylinders of the surveyed size, and how many times as much the flow asks for; None: not known."""
+    """Drag of rigid cylinders of the surveyed size, and how many times as much the flow needs; None: not known."""
 
     parameter: NamedParameter
     mean: float
@@ -143,8 +143,8 @@ def findings(run: Run) -> list[tuple[object, bool]]:
         found.append((compared, compared.compared == "exceeds"))
     for _, row in observations.table[~observations.table["used"]].iterrows():
         found.append((StationNotUsed(str(row["experiment"]), row["x"], row["y"], str(row["reason"])), False))
-    if run.set_aside_since:
-        found.append((ReadingsExcludedSince(run.set_aside_since, shlex.quote(case.source.name)), True))
+    if run.excluded_since:
+        found.append((ReadingsExcludedSince(run.excluded_since, shell_line([case.source.name])), True))
     for (experiment, section), rules in observations.discharge.items():
         x, measured = section_place(observations.table, experiment, section), rules["profile"]
         given = discharges_upstream_of(case, case.experiments[experiment], x)

@@ -160,7 +160,7 @@ def first_crossing(y: Array, values: Array, level: float) -> Array:
 
 
 PlanWindow = tuple[float, float, float, float]
-# Parts of equal discharge [-] between drawn streamlines; captions say a tenth.
+# Parts of equal discharge [-] between drawn streamlines; captions state a tenth.
 STREAM_TUBES = 10
 # Heights of the maps and of the profile of the whole channel, and what lies between them [px].
 STRETCHED, PROFILE, GAP, HEAD, BELOW = 96.0, 150.0, 34.0, 24.0, 44.0

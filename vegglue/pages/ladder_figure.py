@@ -12,6 +12,7 @@ from matplotlib.ticker import LogFormatter
 
 from vegglue.arrays import Array
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
+from vegglue.inference.homogeneity import differing
 from vegglue.pages.style import COLOUR, SMALL, WIDTH, canvas, label, save, styled
 from vegglue.results.model_comparison import ModelComparison, ModelScore
 from vegglue.wording.numbers import fixed, short
@@ -25,8 +26,6 @@ LINES = {
     "in_sample": ("o:", "in sample", "muted", 1.2),
     "noise_floor": ("_--", "floor", "ink", 0.9),
 }
-# p-value [-] of one value in all experiments, below which a parameter is drawn as one that differs: 1 in 20.
-MOVES_BELOW = 0.05
 # Panels of parameters side by side; ratio [-] of largest to smallest value, 1.5 decades, from which an axis is
 # logarithmic: on a linear one the smallest could not be read.
 LADDER_COLUMNS, LOGARITHMIC_FROM = 5, 30.0
@@ -113,14 +112,13 @@ def _paint_errors(
         axes.plot([right + 0.05, right + 0.3], [value, lowest], color=COLOUR["rule"], linewidth=0.7)
     axes.set(ylim=(0, 1.12 * top), xlim=(0.6, len(models) + 0.9), ylabel=phrase("label", "rmse"))
     letters = max(int(LETTERS_PER_INCH * width / (len(models) + 1)), 12)
-    axes.set_xticks(place, [_of_model(k, *model, letters) for k, model in enumerate(models, 1)])
+    ticks = []
+    for k, (name, added, parameters) in enumerate(models, 1):
+        lines = [f"{k}  {name}" if k == 1 or not added else f"{k}", *(f"+ {one}" for one in added)]
+        broken = [part for line in lines for part in _broken(line, letters)]
+        ticks.append("\n".join([*broken, f"{parameters} parameters"]))
+    axes.set_xticks(place, ticks)
     axes.tick_params(axis="x", length=0, labelsize=SMALL + 0.5)
-
-
-def _of_model(k: int, name: str, added: Sequence[str], parameters: int, letters: int) -> str:
-    lines = [f"{k}  {name}" if k == 1 or not added else f"{k}", *(f"+ {one}" for one in added)]
-    broken = [part for line in lines for part in _broken(line, letters)]
-    return "\n".join([*broken, f"{parameters} parameters"])
 
 
 def _broken(name: str, letters: int) -> list[str]:
@@ -132,9 +130,8 @@ def _paint_parameter(axes: Axes, scores: Sequence[ModelScore], name: str) -> Non
     known = [(k + 1, score) for k, score in enumerate(scores) if name in score.values]
     for place, score in known:
         middle, low, high = score.values[name]
-        moves = score.homogeneity.get(name, 1.0) < MOVES_BELOW
         axes.vlines(place, low, high, color=COLOUR["model"], linewidth=1.1)
-        face = COLOUR["paper" if moves else "model"]
+        face = COLOUR["paper" if name in differing(score.homogeneity) else "model"]
         axes.plot(place, middle, "o", markersize=5, color=COLOUR["model"], markerfacecolor=face, zorder=4)
     values = np.array([score.values[name] for _, score in known])
     if (values > 0).all() and values.max() > LOGARITHMIC_FROM * values.min():

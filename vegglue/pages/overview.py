@@ -39,7 +39,7 @@ ALONE = 0.1
 
 @dataclass(frozen=True)
 class DrawnInterval:
-    """A value and the range it is given; both ends are the value where nobody said. others: not a posterior of ours."""
+    """A value and the range it is given; both ends are the value if it has none. others: not a posterior of ours."""
 
     low: float
     centre: float
@@ -101,6 +101,12 @@ class LoopOfOverview:
     title: str
     page: str
     top: CaseAnswer
+
+    @property
+    def tour(self) -> bool:
+        """Whether there is a before and an after to be shown in three clicks."""
+        fall = self.top.error_fall
+        return self.top.falls and bool(self.top.sections.added) and fall is not None and math.isfinite(fall.before)
 
 
 @dataclass(frozen=True)

@@ -260,7 +260,7 @@ def draw_weights(weights: Array) -> Figure:
     return figure
 
 
-# Pairs of parameters drawn together, the most correlated first: one row; strong correlations are told in words.
+# Pairs of parameters drawn together, the most correlated first: one row; strong correlations are stated in words.
 PAIRS_DRAWN = 3
 # Letters beside a mark, with which the axes of a marginal keep nine tenths of their width.
 LONGEST_LABEL = 24

@@ -50,7 +50,7 @@ class LoopResults:
 class Run:
     """Everything a report may show. ensemble: None where the posterior needed none; flow: the flow of the median
     parameters, by experiment; cylinder: if surveyed; diagnosis: if there is one of this case; loop: what else is known
-    of what it lacks; set_aside_since: readings of the posterior that the diagnosis has set aside after it was made.
+    of what it lacks; excluded_since: readings of the posterior that the diagnosis excludes since it was made.
     """
 
     folder: Path
@@ -63,7 +63,7 @@ class Run:
     cylinder: RigidCylinder | None
     diagnosis: Diagnosis | None
     loop: LoopResults = LoopResults()
-    set_aside_since: int = 0
+    excluded_since: int = 0
 
     @property
     def behind(self) -> Diagnosis | None:
@@ -95,7 +95,7 @@ def accepted_causes(found: Diagnosis) -> str:
 
 
 def is_synthetic(case: Case) -> bool:
-    """Whether a record was computed: an observation says so, or the case knows what it was made with."""
+    """Whether a record was computed: an observation states it, or the case knows what it was made with."""
     made_with = case.reference is not None and bool(case.reference.made_with)
     return made_with or any(observation.synthetic for observation in case.observations)
 
@@ -110,7 +110,7 @@ def published_picture(run: Run, figure: Figure | str, name: str, caption: str, *
 
 def file_name(text: str) -> str:
     """A text as the name of a file, of a length that every disk takes: a user names experiments and sections. With a
-    checksum where letters are lost that may be all that tells it from another.
+    checksum where letters are lost that may be all by which it differs from another.
     """
     plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", text)
     if text.isascii() and len(plain) <= LONGEST_FILE_NAME:

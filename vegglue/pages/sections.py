@@ -59,7 +59,7 @@ class PanelGround:
 @dataclass(frozen=True)
 class SectionPanel:
     """One section of one experiment; (station,) each, ordered by y. error: 95 % of the standard error, NaN unknown;
-    aside: set aside or not used; before: None where nothing was added; band: 95 % of the posterior, if any; core and
+    aside: excluded or not used; before: None where nothing was added; band: 95 % of the posterior, if any; core and
     total: 50 %, and 95 % with the residual error, where they are to be seen [SI].
     """
 
@@ -179,7 +179,7 @@ def draw_panel(panel: SectionPanel, values: tuple[float, float], unit: str, note
 
 # What makes two rows of two tables one station.
 STATION_KEY = ["experiment", "kind", "section", "x", "y"]
-CENTIMETRES = 2  # decimals of places [m]: no tape tells more, and places turned from a map have more
+CENTIMETRES = 2  # decimals of places [m]: no tape shows more, and places turned from a map have more
 # Edges of the bands of a posterior: 95 %, 50 %, and 95 % with the residual error.
 EDGES = ["low", "high", "low50", "high50", "total_low", "total_high"]
 # What HTML would take for markup, as JSON writes it too.
@@ -198,7 +198,7 @@ class ExperimentPanels:
 @dataclass(frozen=True)
 class SectionPanels:
     """All sections, the experiment that was missed most first. added: what stands between before and after, '' for
-    nothing; banded, any_aside: whether a posterior and stations that were set aside are shown; data: numbers of all
+    nothing; banded, any_aside: whether a posterior and excluded stations are shown; data: numbers of all
     stations as JSON that is safe in a page.
     """
 

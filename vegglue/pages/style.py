@@ -24,7 +24,7 @@ from matplotlib.patheffects import withStroke
 from vegglue.whole_files import MAKE_ROOM, write_file
 
 Drawing = ParamSpec("Drawing")
-# name: (light, dark). Blue for the model, vermilion for measurements: told apart in every common colour blindness.
+# name: (light, dark). Blue for the model, vermilion for measurements: distinct in every common colour blindness.
 PALETTE = {
     "paper": ("#fefefe", "#15181c"),
     "ink": ("#1d2126", "#e9ebee"),
@@ -55,7 +55,7 @@ def _settings() -> dict[str, Any]:
     return {
         "font.family": face,
         "font.size": 9,
-        # A name, title or section may hold any sign: it is no formula. Those that are say so, see `formula_labels`.
+        # A name, title or section may hold any sign: it is no formula. Those that are stand in `formula_labels`.
         "text.parse_math": False,
         "mathtext.fontset": "custom",
         "mathtext.rm": face[0],
@@ -87,7 +87,7 @@ def _settings() -> dict[str, Any]:
         "savefig.facecolor": COLOUR["paper"],
         "savefig.dpi": 200,
         "figure.dpi": 200,
-        "svg.fonttype": "path",  # glyphs as outlines: the same on every machine, no font asked of the reader
+        "svg.fonttype": "path",  # glyphs as outlines: the same on every machine, no font needed by the reader
         "svg.hashsalt": "vegglue",  # the same picture, the same file
     }
 
@@ -96,7 +96,7 @@ def _settings() -> dict[str, Any]:
 def _styled_context() -> Iterator[None]:
     """Nothing of a `matplotlibrc` counts: one in the folder of a stranger could have texts set by LaTeX.
 
-    Signs that no font here has are drawn as boxes, which says enough: matplotlib would complain of each in a line.
+    Signs that no font here has are drawn as boxes, which is enough: matplotlib would complain of each in a line.
     """
     with matplotlib.rc_context(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+ .*missing from")

@@ -19,7 +19,7 @@ Scale = Callable[[Any], Array]  # values to places [px]
 CLOSE_TO_THE_EDGE = 10.0
 # Width of a letter over its size [-]: the mean of names and numbers in bold Helvetica, so that plain ones have room.
 LETTER_WIDTH = 0.58
-# Fewer numbers on an axis tell no scale.
+# Fewer numbers on an axis show no scale.
 FEWEST_TICKS = 2
 FACE = "system-ui, 'Liberation Sans', Helvetica, Arial, sans-serif"
 

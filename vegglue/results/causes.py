@@ -22,13 +22,28 @@ NEEDS_MORE = 3.3
 
 @dataclass(frozen=True)
 class LocalAnomaly:
-    """Where [m] something unlisted changes a term of the equations: middle x, y, half length, half width of the spot,
-    and standard errors of x and y over all spots that could be it; x_spread, y_spread: the same where traces are taken
-    to be nature's own, over which `extend` spreads it.
+    """A place where something unlisted changes a term of the equations.
 
-    effect: that stands for it in the library; amplitude [unit] with its 95 % interval; score of its fingerprint
-    [standard errors]; experiments that point at it. odds: how much likelier it is than the best hypothesis of each
-    other kind, by its name. plausible: a plausible size there [unit].
+    Attributes
+    ----------
+    x, y, length, width
+        Middle, half length and half width of the spot [m].
+    term, effect
+        The term, and the effect that stands for the place in the library.
+    amplitude, interval95, unit
+        Size with its 95 % interval.
+    score
+        Of its fingerprint [standard errors].
+    experiments
+        Those that point at it.
+    odds
+        Over the best hypothesis of each other kind, by its name [-].
+    plausible
+        A plausible size there [unit].
+    x_error, y_error
+        Standard errors over all spots that could be it [m].
+    x_spread, y_spread
+        The same if traces are nature's own, over which `extend` spreads it [m].
     """
 
     x: float
@@ -65,8 +80,16 @@ class LocalAnomaly:
 
 @dataclass(frozen=True)
 class PlaceMap:
-    """Scores [standard errors] of a spot of one term at x, y [m], (spot,) each, in the model as it was: of the term of
-    the first place that was found, else of drag. Spots of one length stand together, in the order of x.
+    """Scores of a spot of one term everywhere, in the model as it was.
+
+    Attributes
+    ----------
+    term
+        Of the first place that was found, else drag.
+    x, y
+        Middles of spots (spot,) [m]; those of one length stand together, in the order of x.
+    score
+        (spot,) [standard errors]
     """
 
     term: str
@@ -77,11 +100,22 @@ class PlaceMap:
 
 @dataclass(frozen=True)
 class FaultyInstrument:
-    """An instrument found to be off, whose readings were set aside: a reading, a position, a probe or a gauge.
+    """An instrument found to be off, whose readings are excluded.
 
-    x, y: where it stood [m], NaN where it stood at several; stations: rows of its readings; offset: what it shows too
-    much, with the 95 % interval [unit of its kind]; log_factor: ln of the Bayes factor against none [-]; factor: what
-    it shows over what is there [-], NaN where that explains its readings no better than an offset.
+    Attributes
+    ----------
+    kind
+        A reading, a position, a probe or a gauge.
+    x, y
+        Where it stood [m], NaN if at several places.
+    stations
+        Rows of its readings.
+    offset, interval95, unit
+        Excess of its readings with the 95 % interval [unit of its kind].
+    log_factor
+        ln of the Bayes factor against none [-].
+    factor
+        Reading over true value [-], NaN if that explains the readings no better than an offset.
     """
 
     kind: str
@@ -97,9 +131,19 @@ class FaultyInstrument:
 
 @dataclass(frozen=True)
 class FieldFound:
-    """A smooth field of a term that would close the misfit: its standard deviation [unit of the term], half length and
-    half width of its bumps [m], ln of its Bayes factor against none [-], and where it stands out most: value there, its
-    standard error, x and y [m].
+    """A smooth field of a term that would close the misfit.
+
+    Attributes
+    ----------
+    term
+    size
+        Standard deviation [unit of the term].
+    length, width
+        Half length and half width of its Gaussian basis functions [m].
+    log_factor
+        ln of its Bayes factor against none [-].
+    value, error, x, y
+        Value and standard error [unit of the term] at the place [m] of highest significance.
     """
 
     term: str
@@ -115,8 +159,14 @@ class FieldFound:
 
 @dataclass(frozen=True)
 class FieldMapKept:
-    """The smooth field of a term over the grid it was computed on: value and standard error (nx, ny) [unit of the
-    term], at cell centres x (nx,), y (ny,) [m].
+    """The smooth field of a term over the grid on which it was computed.
+
+    Attributes
+    ----------
+    x, y
+        Cell centres, (nx,) and (ny,) [m].
+    value, error
+        Value and standard error (nx, ny) [unit of the term].
     """
 
     x: Array
@@ -127,9 +177,20 @@ class FieldMapKept:
 
 @dataclass(frozen=True)
 class CandidateLaw:
-    """A law of the grammar, to first order: its name in the library, the term it changes and the quantity it depends on
-    in words, its equation, reference r (None: none), a plausible strength a and the one found [-], and its chance among
-    all that was compared [-].
+    """A law of the grammar, to first order.
+
+    Attributes
+    ----------
+    name, title, equation
+        Of the law in the library.
+    term, quantity
+        What it changes and with what, in words.
+    reference
+        r [unit of the quantity]; None for a law that has none.
+    scale, strength
+        A plausible strength a, and the one found [-].
+    chance
+        Probability among all that was compared [-].
     """
 
     name: str
@@ -150,9 +211,18 @@ class CandidateLaw:
 
 @dataclass(frozen=True)
 class CandidateLaws:
-    """Laws that stand out in what is left, whatever was accepted. p: chance that errors alone make laws stand out as
-    much; tried: how many; chance: of all of them together among all that was compared [-]; laws: the likeliest first,
-    those that hold 95 % of it.
+    """Laws that are significant in what is left, whatever was accepted.
+
+    Attributes
+    ----------
+    p
+        Chance that errors alone make laws as significant [-].
+    tried
+        Their number.
+    chance
+        Probability of all together among all that was compared [-].
+    laws
+        Those that hold 95 % of it, the most probable first.
     """
 
     p: float
@@ -174,8 +244,16 @@ class CandidateLaws:
 
 @dataclass(frozen=True)
 class ModelErrorUsed:
-    """The model's own error: relative error of friction [-] and error of the bed [m] as allowed, and the share of both
-    that the last residual asks for most [-], with the ln of its likelihood ratio against what is allowed.
+    """The model's own error.
+
+    Attributes
+    ----------
+    friction, bed
+        Relative error of friction [-] and error of the bed [m] as allowed.
+    needed
+        The share of both that is most likely for the last residual [-].
+    log_ratio
+        ln of its likelihood ratio against what is allowed [-].
     """
 
     friction: float
@@ -185,11 +263,11 @@ class ModelErrorUsed:
 
     @property
     def asks_for_more(self) -> bool:
-        """Whether more than is allowed is asked for, beyond doubt: two readings may ask for nine times as much."""
+        """Whether more than is allowed is needed, beyond doubt: two readings may need nine times as much."""
         return self.needed > 1.0 and self.log_ratio > NEEDS_MORE
 
 
-# |cosine| [-] above which an effect is said to look like a change of a parameter: that change then mimics two thirds of
+# |cosine| [-] above which an effect is reported to resemble one of a parameter: that change then mimics two thirds of
 # its trace (cos^2 = 0.64).
 LOOKS_LIKE_FROM = 0.8
 # A smallest size from which on no data show an effect, see `Detectability`.
@@ -200,10 +278,18 @@ NEVER = 1e100
 class AmplitudeEstimate:
     """How large an effect is, in the unit of its amplitude.
 
-    value, interval95: from its own refit when there was one (refitted), else to first order, its prior taken into
-    account in both. off, scale: where the amplitude does nothing, and how far from there is plausible; support: within
-    which it must lie. objective: the least sum of squares with the effect, |W (y - f)|^2 + |z|^2 [-], predicted where
-    it was not refitted.
+    Attributes
+    ----------
+    value, interval95
+        From its own refit if `refitted`, else to first order; with its prior.
+    unit
+    off, scale
+        Value at which the effect is off, and a plausible distance from it.
+    refitted
+    objective
+        Least |W (y - f)|^2 + |z|^2 with the effect [-], predicted if it was not refitted.
+    support
+        Range within which the amplitude must lie.
     """
 
     value: float
@@ -223,9 +309,15 @@ class AmplitudeEstimate:
 
 @dataclass(frozen=True)
 class ScoreTest:
-    """Score T of an effect [standard errors], and the chance that errors alone make any effect score as high [-].
+    """Score of an effect, and how often errors alone reach it.
 
-    p_family: counted among bootstrap draws, never below one over their number; see `calibration/score_test`.
+    Attributes
+    ----------
+    score
+        T [standard errors].
+    p_family
+        Chance that errors alone make any effect score as high [-], counted among bootstrap draws and never below one
+        over their number; see `calibration/score_test`.
     """
 
     score: float
@@ -236,9 +328,16 @@ class ScoreTest:
 class Detectability:
     """Whether these data could show an effect.
 
-    visibility: share of its fingerprint that calibration cannot mimic [-]. smallest: distance of the amplitude from off
-    that is detected 19 times of 20; testable: that is less than twice a plausible one, and within its support.
-    confounder: the parameter whose slope is most like the fingerprint; cosine: between both [-].
+    Attributes
+    ----------
+    visibility
+        Share of its fingerprint that calibration cannot mimic [-].
+    smallest
+        Distance of the amplitude from off that is detected 19 times of 20 [unit of the amplitude].
+    testable
+        Whether that is less than twice a plausible one, and within its support.
+    confounder, cosine
+        The parameter whose slope is most like the fingerprint, and the cosine between both [-].
     """
 
     visibility: float
@@ -260,7 +359,17 @@ class Detectability:
 
 @dataclass(frozen=True)
 class CandidateEffect:
-    """One effect as the data see it, in the last model in which it was tested; shapes: at which it scores best."""
+    """One effect in the light of the data, in the last model in which it was tested.
+
+    Attributes
+    ----------
+    name, title
+    shapes
+        Shapes by name at which it scores best.
+    amplitude : AmplitudeEstimate
+    test : ScoreTest
+    detectability : Detectability
+    """
 
     name: str
     title: str
@@ -277,10 +386,19 @@ def effects_among(candidate_effects: Sequence[CandidateEffect]) -> int:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another explanation with its probability [-].
+    """Another explanation with its probability.
 
-    kind: effect, a term at a place, or the kind of an instrument; x, y [m]: of a place or an instrument, and amplitude
-    [unit of the term]: of what is at a place; NaN otherwise.
+    Attributes
+    ----------
+    name
+    kind
+        `effect`, a term at a place, or the kind of an instrument.
+    probability
+        [-]
+    x, y
+        Of a place or an instrument [m], NaN otherwise.
+    amplitude
+        Of what is at a place [unit of the term], NaN otherwise.
     """
 
     name: str
@@ -293,12 +411,24 @@ class Rival:
 
 @dataclass(frozen=True)
 class Step:
-    """One round of the search: what was accepted, what it may be instead, chi2 before and after.
+    """One round of the search.
 
-    rivals: the effects that together hold 95 % of the chances, the accepted one among them; chances: of each, were it
-    one of all that were tried, of every kind; others: of the best of each other kind, by its name, where it is not
-    negligible; places: those of them that are something at a place. p_family: chance that errors alone sound the alarm
-    as loudly [-], counted, see `score_test.alarm_p`.
+    Attributes
+    ----------
+    accepted
+        Name of the effect that was accepted.
+    rivals, chances
+        The effects that together hold 95 % of the probability, and the probability of each among all of every kind [-].
+    groups
+        Rivals that the data cannot separate.
+    chi2_before, chi2_after
+        [-]
+    p_family
+        Chance that errors alone sound the alarm as loudly [-], counted, see `score_test.alarm_p`.
+    others
+        Probability of the best of each other kind by its name, unless negligible [-].
+    places
+        Those of the others that are something at a place.
     """
 
     accepted: str
@@ -318,7 +448,7 @@ class Step:
 
     @property
     def likelier_place(self) -> str:
-        """The place that is likelier than every group of effects that the data cannot tell apart; '' without."""
+        """The place that is likelier than every group of effects that the data cannot separate; '' without."""
         best = max(self.places, key=self.others.__getitem__, default="")
         groups = [sum(self.chance[name] for name in group) for group in self.groups]
         return best if best and self.others[best] > max(groups) else ""

@@ -24,14 +24,24 @@ from vegglue.results.causes import (
     Step,
 )
 from vegglue.results.verdict import ChiSquare, EstimatedErrors, Verdict
-from vegglue.wording.numbers import in_short, interval_in_short
+from vegglue.wording.numbers import in_short, in_short_html, interval_in_short
 from vegglue.wording.sentences import phrase, tagged
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """chi2 = |W (y - f)|^2 of the first and of the last model [-]; freedom: degrees of the last; p: chance of a chi2 as
-    large under errors alone; zones: mean misfit of the first by experiment, section and zone, in errors of the last.
+    """chi2 = |W (y - f)|^2 of the first and of the last model.
+
+    Attributes
+    ----------
+    chi2_first, chi2
+        [-]
+    freedom
+        Degrees of freedom of the last.
+    p
+        Chance of a chi2 as large under errors alone [-].
+    zones
+        Mean misfit of the first model by experiment, section and zone [errors of the last].
     """
 
     chi2_first: float
@@ -61,8 +71,16 @@ class Misfit:
 
 @dataclass(frozen=True)
 class FirstScreening:
-    """Score tests of the first model. threshold: score that errors alone reach at the false-alarm rate of effects;
-    scores: by name [standard errors]; cosine (c, c): between the fingerprints of the strongest effects `compared` (c,).
+    """Score tests of the first model.
+
+    Attributes
+    ----------
+    threshold
+        Score that errors alone reach at the false-alarm rate of effects [standard errors].
+    scores
+        By name [standard errors].
+    compared, cosine
+        The strongest effects (c,), and the cosines between their fingerprints (c, c) [-].
     """
 
     threshold: float
@@ -73,7 +91,15 @@ class FirstScreening:
 
 @dataclass(frozen=True)
 class ParameterEstimates:
-    """Calibrated parameters by name: of the first model, and of the last one with their 95 % intervals."""
+    """Calibrated parameters by name.
+
+    Attributes
+    ----------
+    first
+        Of the first model.
+    last
+        Of the last model: value and 95 % interval.
+    """
 
     first: dict[str, float]
     last: dict[str, tuple[float, float, float]]
@@ -81,8 +107,16 @@ class ParameterEstimates:
 
 @dataclass(frozen=True)
 class Predictions:
-    """The table of stations, what the first and the last model predict there, and the standard errors of what was
-    measured, NaN where it was not used; (station,) each [m/s or m].
+    """Predictions at the stations.
+
+    Attributes
+    ----------
+    station : DataFrame
+        The table of stations.
+    first, last
+        Of the first and of the last model (station,) [unit of the kind].
+    error
+        Standard errors of the readings (station,), NaN if not used.
     """
 
     station: pd.DataFrame
@@ -98,8 +132,31 @@ class Predictions:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything a diagnosis found in the case `name`, by which version; field_map: of the field, if there is one;
-    bed_map: what measurements change a surveyed bed by [m]; laws: if they are significant.
+    """All results of a diagnosis of the case `name`.
+
+    Attributes
+    ----------
+    name, version
+        Of the case and of vegglue.
+    verdict : Verdict
+    candidate_effects : tuple of CandidateEffect
+    steps : tuple of Step
+        Rounds of the search.
+    misfit : Misfit
+    errors : EstimatedErrors
+    first_screening : FirstScreening
+    parameters : ParameterEstimates
+    predictions : Predictions
+    place_map : PlaceMap
+    places : tuple of LocalAnomaly
+    instruments : tuple of FaultyInstrument
+    field, field_map
+        A field, if one is significant.
+    model_error : ModelErrorUsed or None
+    bed_map : FieldMapKept or None
+        What measurements change a surveyed bed by [m].
+    laws : CandidateLaws or None
+        Laws, if they are significant.
     """
 
     name: str
@@ -136,17 +193,17 @@ class Diagnosis:
 
     @property
     def groups(self) -> list[list[str]]:
-        """Of effects that the data cannot tell apart, over all steps."""
+        """Of effects that the data cannot separate, over all steps."""
         return [list(group) for step in self.steps for group in step.groups]
 
     @property
     def law_stands_out(self) -> bool:
-        """Whether a law is worth a search: of a verdict that cannot tell, only if it names one."""
+        """Whether a law is worth a search: of a verdict "cannot-tell", only if it names one."""
         return self.laws is not None and (self.verdict.kind != "cannot-tell" or self.verdict.tells_laws)
 
     @property
     def changed(self) -> bool:
-        """Whether anything was taken into the model or set aside."""
+        """Whether anything was taken into the model or excluded."""
         return bool(self.steps or self.places or self.instruments)
 
     def first_score(self, one: CandidateEffect) -> float:
@@ -179,6 +236,9 @@ class Diagnosis:
             ],
         )
 
+    def _repr_html_(self) -> str:
+        return in_short_html(repr(self))
+
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """One object with every number that is printed."""
@@ -199,7 +259,11 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "chi2": {"first": misfit.chi2_first, "last": misfit.chi2, "freedom": misfit.freedom, "p": misfit.p},
         "threshold": diagnosis.first_screening.threshold,
         "noise": {"correlation": errors.correlation, "scale": errors.scale, "grid_error": errors.grid_error},
-        "flagged": [_reading(diagnosis, row) for row in errors.flagged],
+        "flagged": [
+            {name: str(row[name]) for name in ("experiment", "kind", "section")}
+            | {name: float(row[name]) for name in ("x", "y", "value")}
+            for _, row in diagnosis.predictions.station.iloc[list(errors.flagged)].iterrows()
+        ],
         "parameters": diagnosis.parameters.last,
         "first_parameters": diagnosis.parameters.first,
         "places": [asdict(one) for one in diagnosis.places],
@@ -235,9 +299,3 @@ def candidate_effect_json(one: CandidateEffect) -> dict[str, Any]:
         "scale": amplitude.scale,
         "support": amplitude.support,
     }
-
-
-def _reading(diagnosis: Diagnosis, row: int) -> dict[str, Any]:
-    station = diagnosis.predictions.station.iloc[row]
-    place = {name: str(station[name]) for name in ("experiment", "kind", "section")}
-    return place | {name: float(station[name]) for name in ("x", "y", "value")}

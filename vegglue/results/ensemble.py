@@ -30,7 +30,7 @@ from vegglue.results.layout import (
     stored_fields,
     table_group,
 )
-from vegglue.wording.numbers import in_short, so_many
+from vegglue.wording.numbers import in_short, in_short_html, so_many
 
 VALUE_UNIT = ", ".join(f"{kind.unit} for {kind.words}" for kind in KINDS.values())
 STATION_UNITS = dict.fromkeys(("x", "y", "depth"), "m") | dict.fromkeys(("value", "standard_error"), VALUE_UNIT)
@@ -100,6 +100,9 @@ class Ensemble:
                 f"seed {self.seed}, vegglue {self.version}",
             ],
         )
+
+    def _repr_html_(self) -> str:
+        return in_short_html(repr(self))
 
 
 ROWS = stored_fields(Ensemble)  # what is stored of each member

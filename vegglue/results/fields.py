@@ -20,7 +20,17 @@ COMPRESSED_AT_ONCE = 2**20  # [bytes]
 
 @dataclass(frozen=True)
 class FieldWindow:
-    """Columns of the grid around a range along x [m]; centres of their cells x (columns,) and y (ny,) [m]."""
+    """Columns of the grid around a range along x.
+
+    Attributes
+    ----------
+    range
+        From where to where [m].
+    columns
+        Of the grid.
+    x, y
+        Cell centres (columns,) and (ny,) [m].
+    """
 
     range: tuple[float, float]
     columns: slice
@@ -30,7 +40,20 @@ class FieldWindow:
 
 @dataclass(frozen=True)
 class Fields:
-    """Level and depth-averaged velocities at cell centres; NaN where a cell is dry throughout or a member failed."""
+    """Level and depth-averaged velocities at cell centres; NaN in a dry cell or a failed member.
+
+    Attributes
+    ----------
+    level, u, v
+        (member, experiment, x, y) [m], [m/s]
+    experiments
+        Names.
+    x, y
+        Cell centres [m].
+    range
+        Along x [m].
+    config_hash
+    """
 
     level: Annotated[Single, Stored(DIMS, "m")]
     u: Annotated[Single, Stored(DIMS, "m/s")]
@@ -46,7 +69,7 @@ QUANTITIES = tuple(stored_fields(Fields))  # in the order in which sensor.read_s
 
 
 def window_of(case: Case, grid: Grid) -> FieldWindow | None:
-    """The cells whose centres surround the range the case asks for, None when it asks for none."""
+    """The cells whose centres surround the range that the case keeps, None if it keeps none."""
     if case.simulate.fields is None:
         return None
     low, high = case.simulate.fields.x

@@ -177,7 +177,7 @@ def refuse_in_use(path: Path) -> None:
         except BlockingIOError as error:
             raise StorageError(f"{path} is in use by another program; close it there.") from error
         except OSError:
-            pass  # a file system without locks cannot tell
+            pass  # a file system without locks
 
 
 def stored_attribute(path: Path, attribute: str) -> str | None:

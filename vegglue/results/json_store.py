@@ -55,7 +55,7 @@ def write_questions(folder: Path, questions: Sequence[Question], config_hash: st
 
 
 def questions_that_fit(folder: Path, config_hash: str) -> tuple[Question, ...] | None:
-    """The questions kept there for exactly this config; None where nobody asked, empty where nothing is left to ask."""
+    """The questions kept there for exactly this config; None if none were asked, empty if nothing is left to ask."""
     return _read_if_it_fits(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, questions_from)
 
 

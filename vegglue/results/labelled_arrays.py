@@ -3,12 +3,17 @@
 Both are an extra. Files are read whole and closed, so that a command may write them anew while a notebook is open.
 """
 
+import re
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from vegglue.errors import InputError
+from vegglue.flow.status import STATUS_WORDS
 from vegglue.results.hdf5 import open_hdf5
 
 if TYPE_CHECKING:
@@ -19,7 +24,7 @@ ENGINE = "h5netcdf"
 
 
 def read_labelled(path: Path, *groups: str) -> "xarray.Dataset":
-    """Groups of a result file as one dataset, whose attributes say what they were made from: config, config_hash,
+    """Groups of a result file as one dataset, whose attributes name what they were made from: config, config_hash,
     seed, version. Errors: InputError without xarray, StorageError for a broken file.
     """
     xarray = extra_library("xarray")
@@ -44,6 +49,54 @@ def read_inference_data(path: Path) -> "arviz.InferenceData | xarray.DataTree":
             return tree.load()
     with arviz.rc_context({"data.load": "eager"}):
         return arviz.from_netcdf(path, engine=ENGINE)
+
+
+# What CF calls our units, none of which has a power that is no whole number; and its standard names of variables and
+# coordinates, by name and unit.
+CF_UNITS = {"-": "1"}
+CF_STANDARD_NAMES = {
+    ("member", ""): "realization",
+    ("x", "m"): "projection_x_coordinate",
+    ("y", "m"): "projection_y_coordinate",
+    ("level", "m"): "water_surface_height_above_reference_datum",
+    ("section_flow", "m3/s"): "water_volume_transport_in_river_channel",
+    ("status", ""): "status_flag",
+}
+CF_CONVENTIONS = "CF-1.11"
+
+
+def as_tree(parts: "Mapping[str, xarray.Dataset]") -> "xarray.DataTree":
+    """Results as one tree of groups, with the names and units of the CF conventions.
+
+    Each variable has a `long_name`, `units` that UDUNITS reads, and a `standard_name` if CF has one. A unit that CF
+    does not know, or that differs between stations, stands in its `comment`.
+    """
+    groups = {name: _with_cf_names(part) for name, part in parts.items()}
+    tree = extra_library("xarray").DataTree.from_dict(groups)
+    tree.attrs["Conventions"] = CF_CONVENTIONS
+    return tree
+
+
+def _with_cf_names(part: "xarray.Dataset") -> "xarray.Dataset":
+    named = part.copy()
+    for name, variable in named.variables.items():
+        attributes = dict(variable.attrs)
+        unit = str(attributes.pop("units", ""))
+        if " for " in unit or unit.startswith("that of") or "^(" in unit:
+            attributes["comment"] = f"units: {unit}"
+        elif unit and variable.dtype.kind in "fiu":
+            attributes["units"] = CF_UNITS.get(unit, unit)
+        attributes["long_name"] = str(name).replace("_", " ")
+        bare = "" if unit == "-" else unit
+        if standard := CF_STANDARD_NAMES.get((str(name), bare)):
+            attributes["standard_name"] = standard
+        if name == "status":
+            attributes |= {
+                "flag_values": np.array(list(STATUS_WORDS), np.int8),
+                "flag_meanings": " ".join(re.sub(r"\W+", "_", words) for words in STATUS_WORDS.values()),
+            }
+        variable.attrs = attributes
+    return named
 
 
 def extra_library(name: str, extra: str = "arviz", asking: str = "vegglue.load", instead: str = "") -> Any:

@@ -9,12 +9,21 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.measurements.kinds import KINDS
 from vegglue.plain_json import number_kept
+from vegglue.wording.numbers import in_short, in_short_html, so_many
 
 
 @dataclass(frozen=True)
 class InSample:
-    """Errors at what the calibration has seen: root mean square by kind [its unit], NaN for what was not measured; chi2
-    of independent errors [-] over so many stations, and the root mean square error of measuring a velocity [m/s].
+    """Errors at what the calibration used.
+
+    Attributes
+    ----------
+    rmse
+        Root mean square error by kind [its unit], NaN if not measured.
+    chi2, stations
+        Of independent errors [-], over so many stations.
+    noise_floor
+        Root mean square measurement error of a velocity [m/s].
     """
 
     rmse: dict[str, float]
@@ -31,9 +40,16 @@ class InSample:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Errors of each used station (n,) when its section, or its experiment, is left out of the calibration; NaN where
-    nothing could be left out. velocity: which are velocities along x, or in whatever direction where none is [m/s];
-    clusters: the experiment and the section of each.
+    """Errors of each used station when its section, or its experiment, is left out of the calibration.
+
+    Attributes
+    ----------
+    sections, experiments
+        (n,) [unit of the kind], NaN if nothing could be left out.
+    velocity
+        Which are velocities along x, or of any direction if there is none along x (n,).
+    clusters
+        Experiment and section of each.
     """
 
     sections: Array
@@ -44,8 +60,14 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class PredictiveScores:
-    """How well held-out velocities are predicted with their spread: mean log predictive density by sections, and the
-    share within the 50 % and the 95 % band [-]; NaN where nothing could be left out.
+    """How well held-out velocities are predicted with their spread; NaN if nothing could be left out.
+
+    Attributes
+    ----------
+    log_score
+        Mean log predictive density by sections [-].
+    inside50, inside95
+        Share within the 50 % and the 95 % band [-].
     """
 
     log_score: float
@@ -55,9 +77,21 @@ class PredictiveScores:
 
 @dataclass(frozen=True)
 class ModelScore:
-    """One model of the ladder. values: parameters with their 95 % intervals; homogeneity: chance that a parameter is
-    the same in all experiments, by name; validation: root mean square error of velocities that no calibration has seen
-    [m/s], NaN without them.
+    """The errors of one model of a comparison.
+
+    Attributes
+    ----------
+    name, title, effects
+        Of the case.
+    values
+        Parameters with their 95 % intervals.
+    in_sample : InSample
+    held_out : HeldOut
+    predictive : PredictiveScores
+    homogeneity
+        Chance that a parameter is the same in all experiments, by name [-].
+    validation
+        Root mean square error of velocities that no calibration used [m/s], NaN without them.
     """
 
     name: str
@@ -106,10 +140,20 @@ ERRORS = ("in_sample", "held_out_sections", "held_out_experiments", "unseen", "n
 
 @dataclass(frozen=True)
 class ComparedModel:
-    """One model: its case and config hash, the effects it has and the model before has not, how many parameters.
+    """One model of a stored comparison.
 
-    Root mean square errors of velocities along x [m/s], NaN where there are none: of what the model was calibrated to,
-    of sections and of experiments left out in turn, of what no calibration has seen; and the error of measuring.
+    Attributes
+    ----------
+    name, config, config_hash
+        Of the case.
+    added
+        Effects that the model before has not.
+    parameters
+        Their number.
+    in_sample, held_out_sections, held_out_experiments, unseen
+        Root mean square errors of velocities along x [m/s], NaN if there are none.
+    noise_floor
+        Measurement error [m/s].
     """
 
     name: str
@@ -126,9 +170,19 @@ class ComparedModel:
 
 @dataclass(frozen=True)
 class ModelComparison:
-    """Models side by side; left_out: measurements that none of them uses; reason: why it ends where it does, in words;
-    verdict: digest of the verdict that named what was added. Both are '' where nobody searched. unclear: names
-    of what was added whose fall of held-out errors cannot be told from none.
+    """Models side by side.
+
+    Attributes
+    ----------
+    steps : tuple of ComparedModel
+    left_out
+        Number of readings excluded for all.
+    reason
+        Why it ends; empty unless models were searched.
+    verdict
+        Digest of the verdict that named what was added; empty unless models were searched.
+    unclear
+        Names of what was added although the fall of held-out errors may be chance.
     """
 
     steps: tuple[ComparedModel, ...]
@@ -136,6 +190,30 @@ class ModelComparison:
     reason: str
     verdict: str = ""
     unclear: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return in_short(
+            f"Comparison of {so_many(len(self.steps), 'model')}",
+            [
+                f"{one.name}: RMSE {one.in_sample:.3g} m/s, sections left out {one.held_out_sections:.3g} m/s"
+                for one in self.steps
+            ],
+        )
+
+    def _repr_html_(self) -> str:
+        headings = ("model", "parameters", "RMSE [m/s]", "sections left out", "experiments left out", "validation")
+        rows = [
+            (
+                one.name,
+                f"{one.parameters}",
+                *(
+                    "" if np.isnan(error) else f"{error:.3g}"
+                    for error in (one.in_sample, one.held_out_sections, one.held_out_experiments, one.unseen)
+                ),
+            )
+            for one in self.steps
+        ]
+        return in_short_html(repr(self).split("\n")[0], headings, rows)
 
 
 def comparison_from(tree: Mapping[str, Any]) -> ModelComparison:

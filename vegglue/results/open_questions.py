@@ -1,4 +1,4 @@
-"""What is still to be told apart, and the measurements that could, as `vegglue next` reports and stores it.
+"""What is still to be separated, and the measurements that could, as `vegglue next` reports and stores it.
 
 The words stand in wording/templates/questions.j2.
 """
@@ -22,14 +22,14 @@ ADDS = 1.1
 
 @dataclass(frozen=True)
 class RivalEffects:
-    """Effects, laws or places to be told from each other."""
+    """Effects, laws or places to separate from each other."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class OneOfRivals:
-    """One of several rivals to be told from all others."""
+    """One of several rivals to separate from all others."""
 
     name: str
     others: tuple[str, ...]
@@ -37,7 +37,7 @@ class OneOfRivals:
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """An effect to be told from a change of the parameter that leaves its trace."""
+    """An effect to separate from a change of the parameter that leaves its trace."""
 
     name: str
     parameter: str
@@ -45,7 +45,7 @@ class HiddenEffect:
 
 @dataclass(frozen=True)
 class HiddenLaw:
-    """A law to be told from what calibration makes of it."""
+    """A law to separate from what calibration absorbs."""
 
     name: str
 
@@ -56,8 +56,18 @@ SUBJECTS: Mapping[str, type] = {tag_of(one): one for one in get_args(Subject)}
 
 @dataclass(frozen=True)
 class ProposedMeasurement:
-    """A measurement in words, the experiment it is made in, its place x [m], stations and hours of field work, and the
-    squared standard errors D^2 that lie between the nearest rivals now and with it [-].
+    """A measurement that could separate rivals.
+
+    Attributes
+    ----------
+    name
+        In words.
+    experiment, x, stations
+        In which experiment, at which place [m], and how many.
+    hours
+        Field work [h].
+    now, then
+        Squared standard errors D^2 between the nearest rivals, now and with it [-].
     """
 
     name: str
@@ -76,8 +86,16 @@ class ProposedMeasurement:
 
 @dataclass(frozen=True)
 class Question:
-    """What is to be told apart, and the measurements that could, by what they add in an hour; seen_from: D^2 from which
-    on a diagnosis sees it 19 times of 20 [-], infinite if that is no matter of size.
+    """What to separate, and the measurements that could.
+
+    Attributes
+    ----------
+    about
+        The rivals.
+    measurements : tuple of ProposedMeasurement
+        By what they add in an hour.
+    seen_from
+        D^2 from which a diagnosis detects it 19 times of 20 [-]; infinite if that depends on no size.
     """
 
     about: Subject
@@ -86,7 +104,7 @@ class Question:
 
     @property
     def tells_apart(self) -> str:
-        """What is to be told apart, in words."""
+        """What is to be separated, in words."""
         return sentence(self.about)
 
     @property
@@ -96,7 +114,7 @@ class Question:
 
     @property
     def useful(self) -> tuple[ProposedMeasurement, ...]:
-        """Those that would tell it apart by themselves, the few that are worth a thought; none if it is answered."""
+        """Those that would separate it by themselves, the few best ones; none if it is answered."""
         if self.answered:
             return ()
         enough = (one for one in self.measurements if one.then >= SEPARATES and one.then > ADDS * one.now)

@@ -13,7 +13,7 @@ import pandas as pd
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.ensemble import VALUE_UNIT
 from vegglue.results.layout import IN_WORDS, WHOLE_NUMBERS, YES_OR_NO, Stored
-from vegglue.wording.numbers import in_short, interval_in_short, so_many
+from vegglue.wording.numbers import in_short, in_short_html, interval_in_short, so_many
 
 OWN_UNIT = "that of the parameter, see `unit`"
 
@@ -212,9 +212,9 @@ class CorrectedCanopy:
 
 @dataclass(frozen=True)
 class Transfer:
-    """Each experiment calibrated alone: what its data say of each parameter, and whether that is one value for all.
+    """Each experiment calibrated alone: its estimate of each parameter, and whether that is one value for all.
 
-    Values and errors on the scale on which the prior is flat (log10 of a log-uniform one); NaN where the data say
+    Values and errors on the scale on which the prior is flat (log10 of a log-uniform one); NaN where the data constrain
     little. chi2 of homogeneity with its freedom and chance; misfits chi2 in the joint fit and alone.
     """
 
@@ -273,3 +273,19 @@ class Posterior:
                 f"root mean square errors of the median at {so_many(self.fit.used, 'station')}: {errors}",
             ],
         )
+
+    def _repr_html_(self) -> str:
+        marginals, unit = self.marginals, self.sample.unit
+        ends = [LEVELS.index(0.025), LEVELS.index(0.975)]
+        rows = [
+            (
+                name,
+                f"{marginals.median[name]:.3g}",
+                "{:.3g} to {:.3g}".format(*marginals.quantiles[name][ends]),
+                unit[name],
+            )
+            for name in self.parameters
+        ]
+        heading, *lines = repr(self).split("\n")
+        others = [line for line in lines if not line.strip().startswith(tuple(f"{name}: " for name in self.parameters))]
+        return in_short_html("\n".join([heading, *others]), ("parameter", "median", "95 % range", "unit"), rows)

@@ -14,7 +14,7 @@ import os
 import socket
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -57,7 +57,11 @@ def hold_lock(folder: Path) -> Iterator[None]:
         try:
             lock(handle)
         except BlockingIOError as error:
-            raise StorageError(f"{folder} is in use by {_holder(path)}; wait for it to end, or stop it.") from error
+            holder = "another process"
+            with suppress(OSError, ValueError, KeyError):
+                mark = json.loads(path.read_text(encoding="utf-8"))
+                holder = f"process {mark['pid']} on {mark['host']} since {mark['since']}"
+            raise StorageError(f"{folder} is in use by {holder}; wait for it to end, or stop it.") from error
         except OSError as error:
             raise StorageError(f"{path}: cannot be locked ({error.strerror}); use a local folder.") from error
         since = datetime.now(UTC).isoformat(timespec="seconds")
@@ -69,21 +73,13 @@ def hold_lock(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
-def _holder(path: Path) -> str:
-    try:
-        mark = json.loads(path.read_text(encoding="utf-8"))
-        return f"process {mark['pid']} on {mark['host']} since {mark['since']}"
-    except (OSError, ValueError, KeyError):
-        return "another process"
-
-
 FIELDS_PART = "fields.part"
 
 
 @dataclass(frozen=True)
 class UnfinishedFields:
     """Where the fields of a run wait: an array of `shape` (member, ...) in single precision, behind a mark
-    that says which run it is.
+    that names the run.
     """
 
     path: Path
@@ -162,7 +158,7 @@ class EnsembleWriter:
 
     file: h5py.File
     path: Path
-    set_aside: Path | None  # where an unfinished run of another config was moved to
+    moved_to: Path | None  # where an unfinished run of another config was moved to
     unfinished: UnfinishedFields | None  # fields, if any are kept
 
     @property
@@ -235,10 +231,10 @@ def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
     part, unfinished = part_file(path), unfinished_fields(path.parent, header)
     with hold_lock(path.parent):
         kept = _kept_rows(part, header) if unfinished is None or is_reserved(unfinished) else None
-        set_aside = None
+        moved_to = None
         if kept is None and (part.exists() or part.is_symlink()):
             with failed_writes_told(part, f"remove {part} and run the same command again"):
-                set_aside = part.replace(part.with_name(part.name + ".old"))
+                moved_to = part.replace(part.with_name(part.name + ".old"))
         # All room a run needs, the fields first: a part of an ensemble without its fields cannot be.
         if unfinished is not None and kept is None:
             with failed_writes_told(unfinished.path, WRITTEN_STAYS):
@@ -252,7 +248,7 @@ def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
             groups[name] = replace(groups[name], variables=own)
         write_to_grow(part, groups, _attributes(header))
         with open_hdf5(part, "r+") as file:
-            writer = EnsembleWriter(file, part, set_aside, unfinished)
+            writer = EnsembleWriter(file, part, moved_to, unfinished)
             yield writer
             complete = len(writer.done) == header.chunks
             # Locks of some network disks do not reach other machines.

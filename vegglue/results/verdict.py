@@ -251,7 +251,7 @@ class EffectsTested:
     testable: int
 
 
-# What the model still asks for with all that was accepted.
+# What the model still lacks with all that was accepted.
 
 
 @dataclass(frozen=True)
@@ -447,6 +447,25 @@ Note = (
 )
 
 
+Conclusion = Literal[
+    "measurements_to_correct",
+    "law_beside_instrument",
+    "law_in_doubt",
+    "law",
+    "law_possible",
+    "field",
+    "several_possible",
+    "too_many_possible",
+    "named",
+    "best_explanation",
+    "instrument",
+    "nothing_missing",
+    "misfit_unexplained",
+    "few_testable",
+    "silence_in_doubt",
+]
+
+
 @dataclass(frozen=True)
 class Verdict:
     """The verdict: its kind, what was found, and why no more is known.
@@ -475,7 +494,7 @@ class Verdict:
     may_explain
         Sections that carry another discharge than stated, for which what was found may be the reason.
     remaining
-        What the model with all that was accepted still asks for.
+        What the model with all that was accepted still lacks.
     notes
         What else should be known, the most important first.
     not_excluded
@@ -510,6 +529,41 @@ class Verdict:
         return any(isinstance(one, get_args(OfTheData)) for one in self.reasons)
 
     @property
+    def carries_other_discharges(self) -> bool:
+        """Whether what is wrong with the measurements is the discharge that sections carry."""
+        return bool(self.reasons) and isinstance(self.reasons[0], DischargeMismatch)
+
+    @property
+    def conclusion(self) -> Conclusion:
+        """What the first sentence states; each conclusion has a template of its own."""
+        reason = self.reasons[0] if self.reasons else None
+        if self.doubts_the_data:
+            return "measurements_to_correct"
+        if self.laws is not None:
+            if self.kind == "instrument":
+                return "law_beside_instrument"
+            if reason is not None:
+                return "law_in_doubt"
+            return "law" if self.kind == "none-of-these" else "law_possible"
+        if self.field is not None:
+            return "field"
+        if self.undecided:
+            return "several_possible"
+        if isinstance(reason, TooManyGroups):
+            return "too_many_possible"
+        if self.kind in ("identified", "one-of", "none-of-these"):
+            return "named"
+        if self.places or self.effects:
+            return "best_explanation"
+        if self.instruments:
+            return "instrument"
+        if self.kind == "nothing-missing":
+            return "nothing_missing"
+        if isinstance(reason, MisfitUnexplained):
+            return "misfit_unexplained"
+        return "few_testable" if isinstance(reason, FewTestable) else "silence_in_doubt"
+
+    @property
     def tells_laws(self) -> bool:
         """Whether the verdict names laws."""
         return self.laws is not None
@@ -531,7 +585,7 @@ class Verdict:
 
     @property
     def left_over(self) -> str:
-        """What the model still asks for, in words; '' for nothing."""
+        """What the model still lacks, in words; '' for nothing."""
         return " ".join(sentences(self.remaining))
 
 

@@ -5,4 +5,5 @@ from pathlib import Path
 
 _TEXTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 HELP: dict[str, str] = _TEXTS["help"]
+DEMO: dict[str, str] = _TEXTS["demo"]
 LAST_WORDS: dict[str, str] = _TEXTS["endings"]

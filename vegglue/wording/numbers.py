@@ -37,6 +37,22 @@ def in_short(heading: str, lines: Iterable[str]) -> str:
     return "\n".join([heading, *(f"  {line}" for line in lines if line)])
 
 
+def in_short_html(text: str, headings: Sequence[str] = (), rows: Sequence[Sequence[str]] = ()) -> str:
+    """The text of `in_short` and a table as HTML of a notebook: all escaped, without script or style of its own."""
+    heading, *lines = [html.escape(line.strip()) for line in text.split("\n")]
+    parts = [f"<p><b>{heading}</b></p>"]
+    if lines:
+        parts.append(f"<ul>{''.join(f'<li>{line}</li>' for line in lines)}</ul>")
+    if rows:
+        cells = [
+            "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row)
+            for tag, row in [("th", headings), *(("td", row) for row in rows)]
+        ]
+        body = "".join(f"<tr>{row}</tr>" for row in cells[1:])
+        parts.append(f"<table><thead><tr>{cells[0]}</tr></thead><tbody>{body}</tbody></table>")
+    return f"<div>{''.join(parts)}</div>"
+
+
 def so_many(number: int, one: str, many: str = "") -> str:
     """`1 station`, `1,024 stations`; many: if it is not the one with an s."""
     return f"{number:,} {one if number == 1 else many or one + 's'}"
@@ -92,7 +108,7 @@ def interval_in_short(name: str, value: float, low: float, high: float, unit: st
 
 
 def telling_digits(low: float, high: float) -> int:
-    """Significant digits of both ends of a range: three, more if these would not tell one end from the other."""
+    """Significant digits of both ends of a range: three, more if these would be the same for both ends."""
     apart, largest = high - low, max(abs(low), abs(high))
     if not (math.isfinite(apart) and apart > 0.0):
         return 3

@@ -134,6 +134,7 @@ def _listed(parts: Iterable[Any]) -> Written:
 WRITTEN_BY: dict[str, Callable[..., Any]] = {
     "digits": lambda value, figures=3: Written(in_digits(value, figures), short(value, figures)),
     "fixed": lambda value, places: Written(f"{round(value, places) + 0.0:.{places}f}", fixed(value, places)),
+    "general": lambda value, figures: f"{value:.{figures}g}",
     "quantity": with_unit,
     "unit": lambda unit: with_unit_only(unit),
     "percent": lambda share: Written(
@@ -184,6 +185,11 @@ def page_document(template: str, **values: Any) -> str:
     environment = _environment(page=True, folder="page")
     shared = {name: (Path(__file__).parent / "page" / file).read_text(encoding="utf-8") for name, file in INLINED}
     return environment.get_template(template).render(**shared, **values)
+
+
+def file_text(template: str, values: Mapping[str, Any]) -> str:
+    """The text of a file that a user is given, by its template in `files/`."""
+    return _environment(page=False, folder="files").get_template(template).render(values) + "\n"
 
 
 @cache

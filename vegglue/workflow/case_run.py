@@ -50,6 +50,7 @@ SAME_FIT = 1.0
 OF_THE_MODEL_ALONE = {
     "source", "name", "title", "eddy_viscosity", "effects", "exclude", "effect_file", "engine", "parameters",
     "imported", "numerics", "simulate", "infer", "model_error", "validation", "reference", "canopy_correction",
+    "planned",
 }  # fmt: skip
 
 

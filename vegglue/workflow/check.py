@@ -50,12 +50,26 @@ class CheckedCase:
 
 @one_thread()
 def check(case: Case | CaseRun, *, runs: Path | str = "runs") -> CheckedCase:
-    """Read everything the case names, say what is odd, and draw the channel in runs/<name>/channel.png; try the command
-    of its `engine`, if it has one.
+    """Read everything that a case names, and report what is odd about it.
 
-    Errors: InputError for a file that cannot be read, or a command that fails.
+    The channel is drawn in runs/<name>/channel.png; the command of `engine`, if there is one, runs once.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    runs : Path or str
+        Folder that holds the folders of runs.
+
+    Returns
+    -------
+    CheckedCase
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, or the command fails.
     """
-    from vegglue.pages.channel import save_channel_figure  # late: every command says what is odd, one draws
+    from vegglue.pages.channel import save_channel_figure  # late: every command reports what is odd, one draws
 
     run = case_run(case, runs)
     case, observations, site = run.case, run.observations, run.site

@@ -20,7 +20,7 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.json_store import comparison_that_fits, model_score_that_fits, write_comparison, write_model_score
 from vegglue.results.model_comparison import ComparedModel, ModelComparison, ModelScore
-from vegglue.wording.numbers import in_short, so_many
+from vegglue.wording.numbers import in_short, in_short_html, so_many
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run, excluded_in_all
 
 # On which errors hang that are set side by side, of each station.
@@ -30,7 +30,7 @@ ALIKE_IN_ALL = [*MEASUREMENT, "standard_error", "used"]
 @dataclass(frozen=True)
 class Comparison:
     """One score for each model, in the order they were given, and the measurements that none of them uses, since a
-    diagnosis has set them aside.
+    diagnosis excludes them.
     """
 
     model_scores: tuple[ModelScore, ...]
@@ -40,18 +40,41 @@ class Comparison:
         heading = f"Comparison of {so_many(len(self.model_scores), 'model')}, root mean square errors of velocity [m/s]"
         return in_short(heading, [*map(model_score_in_short, self.model_scores), exclusion_in_words(self.left_out)])
 
+    def _repr_html_(self) -> str:
+        return in_short_html(repr(self))
+
 
 @one_thread()
 def compare(
     cases: Sequence[Case | CaseRun], *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent
 ) -> Comparison:
-    """Set models side by side, the baseline first; drawn in ladder.png in the folder of the last one, and kept in
-    comparison.json in the folder of each, unless one model is there twice, or a ladder is kept there that begins with
-    another model.
+    """Compare models by their errors at what they were calibrated to, at held-out and at validation data.
 
-    Stations that the diagnosis of any of them has set aside are left out of all. What a model misses is kept in
-    model_score.json, and not computed again for exactly the same. Errors: InputError when models have
-    other measurements, or one name and differ, when one finds no flow, or a station has no standard error.
+    Readings that the diagnosis of any of them excludes are excluded for all. The comparison is drawn in ladder.png of
+    the last run, and kept in comparison.json of each, unless one model is there twice, or a comparison is kept there
+    that begins with another model. Errors of a model are kept in model_score.json, and read there for exactly the same
+    case.
+
+    Parameters
+    ----------
+    cases : sequence of Case or CaseRun
+        The baseline first.
+    runs : Path or str
+        Folder that holds the folders of runs.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        If models have other measurements, or one name and differ, if one finds no flow, or if a station has no standard
+        error.
     """
     several = [case_run(case, runs, jobs, watch) for case in cases]
     hashes = [run.config_hash for run in several]  # before anything is read, see CaseRun.config_hash
@@ -72,8 +95,8 @@ def compare(
 
 
 def tells_more(kept: ModelComparison | None, ladder: ModelComparison) -> bool:
-    """Whether a ladder that is kept begins with a model that is not in this one, or says of the same models why it
-    ends there: the page would lose where it began, which readings were set aside there, or that reason.
+    """Whether a ladder that is kept begins with a model that is not in this one, or states for the same models why it
+    ends there: the page would lose where it began, which readings are excluded there, or that reason.
     """
     if kept is None:
         return False
@@ -119,17 +142,17 @@ def model_score_of(run: CaseRun, aside: pd.DataFrame) -> ModelScore:
     kept = kept_model_score(run, aside)
     if kept is None:
         kept = model_score(calibrated(run, aside), run.validation_model)
-        write_model_score(run.folder, kept, rows_set_aside(aside), run.config_hash)
+        write_model_score(run.folder, kept, excluded_rows(aside), run.config_hash)
     return kept
 
 
 def kept_model_score(run: CaseRun, aside: pd.DataFrame) -> ModelScore | None:
     """What an earlier command found for exactly this case and these exclusions, under its present title."""
-    kept = model_score_that_fits(run.folder, rows_set_aside(aside), run.config_hash)
+    kept = model_score_that_fits(run.folder, excluded_rows(aside), run.config_hash)
     return None if kept is None else replace(kept, title=run.case.title)
 
 
-def rows_set_aside(aside: pd.DataFrame) -> list[tuple[str | float, ...]]:
+def excluded_rows(aside: pd.DataFrame) -> list[tuple[str | float, ...]]:
     """Excluded measurements, in one order whichever diagnosis named them first."""
     return sorted(aside.itertuples(index=False, name=None))
 

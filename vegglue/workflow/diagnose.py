@@ -19,11 +19,29 @@ from vegglue.workflow.command_model import with_command_compared
 
 @one_thread()
 def diagnose(case: Case | CaseRun, *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent) -> Diagnosis:
-    """Say where the model fails, which effect is missing, and how sure that is; kept in runs/<name>/diagnosis.h5 and
-    drawn in diagnosis.png.
+    """Report where a model fails, which effect is missing, and how probable each is.
 
-    A diagnosis of exactly this case is read instead. Errors: InputError when the model finds no flow, or a station has
-    no standard error.
+    The diagnosis is kept in runs/<name>/diagnosis.h5 and drawn in diagnosis.png. One of exactly this case is read
+    instead.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    runs : Path or str
+        Folder that holds the folders of runs.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    InputError
+        If the model finds no flow, or a station has no standard error.
     """
     run = case_run(case, runs, jobs, watch)
     wanted, path = run.config_hash, run.folder / "diagnosis.h5"
@@ -46,7 +64,7 @@ def diagnose(case: Case | CaseRun, *, runs: Path | str = "runs", jobs: int = -1,
 @one_thread()
 def draw_fingerprint_of(case: Case, effect: Effect, *, runs: Path | str = "runs", watch: Watch = silent) -> Path:
     """Draw what an effect of plausible size would change at the stations of the calibrated case, before calibration
-    takes its part; in runs/<name>/fingerprint_<effect>.png, which is returned. What its diagnosis has set aside does
+    takes its part; in runs/<name>/fingerprint_<effect>.png, which is returned. What its diagnosis excludes does
     not count.
     """
     run = case_run(case, runs, watch=watch)

@@ -24,8 +24,17 @@ from vegglue.workflow.command_model import refuse_command
 
 @dataclass(frozen=True)
 class DiscoveredCase:
-    """What was found, and where a law is written: its effect file and the child config, None where none is; aside: what
-    was left out since a diagnosis set it aside, in a sentence, '' when nothing was.
+    """What a search for laws found, and where it is written.
+
+    Attributes
+    ----------
+    found : Discovery
+    effect_file : Path or None
+        File of the law; None if none is written.
+    child : Case or None
+        The config that has the law.
+    aside : str
+        Which readings the diagnosis excludes, as a sentence; empty for none.
     """
 
     found: Discovery
@@ -50,14 +59,38 @@ def discover(
     watch: Watch = silent,
     force: bool = False,
 ) -> DiscoveredCase:
-    """Say which law explains what the calibrated model misses; the best becomes an effect file and a child config.
+    """Search for a law, in no list, that explains what the calibrated model misses.
 
-    Measurements that the diagnosis kept in `runs` has set aside are left out.
+        term -> term exp(a g(q, r))
 
-    without: listed effects that do not compete; to: the config to write, beside the parent if not given, its effect
-    file beside it; force: replace files there that vegglue did not write, too. Nothing is written where no law is
-    found, or it only restates a listed effect. Errors: InputError for an unknown effect, when the model finds no flow,
-    a station has no standard error, or a file would be replaced.
+    The best law becomes an effect file and a child config; none is written if no law is found, or if it restates a
+    listed effect. Readings that the diagnosis excludes are excluded.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    without : sequence of str
+        Listed effects that do not compete.
+    runs : Path or str
+        Folder that holds the folders of runs.
+    to : Path or str, optional
+        The config to write, with the effect file beside it; beside the parent if not given.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+    force : bool
+        Whether to replace files that were edited by hand or not written by vegglue.
+
+    Returns
+    -------
+    DiscoveredCase
+
+    Raises
+    ------
+    InputError
+        For an unknown effect, if the model finds no flow, if a station has no standard error, or if a file would be
+        replaced.
     """
     run = case_run(case, runs, jobs, watch, force)
     case = run.case

@@ -1,4 +1,6 @@
-"""case -> files for others: the flow and the stations as CSV, GeoTIFF and netCDF, on the map where there is a frame."""
+"""case -> files for others: the flow and the stations as CSV, GeoTIFF and netCDF, on the map where there is a frame;
+or the case and its ensembles as PEST++ and SPOTPY read them.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,33 +11,51 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.grid import build_grid
-from vegglue.case.parameter_space import refuse_without_parameters, theta_at
-from vegglue.case.resolved_config import case_hash, resolved_yaml
+from vegglue.case.parameter_space import refuse_without_parameters, sobol_sample, theta_at
+from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
-from vegglue.case.text_files import names_in_files
+from vegglue.case.text_files import LONGEST_IN_FILES, names_in_files
 from vegglue.diagnosis.comparison import without_stations
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import with_compilation
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError, shown_command, shown_path
 from vegglue.flow.sensor import FlowFields
 from vegglue.inference.solve_ensemble import solve_flow
 from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent
+from vegglue.results.calibration_files import (
+    log_likelihood,
+    pest_names,
+    solved_rows,
+    write_evaluation,
+    write_pest,
+    write_spotpy,
+)
+from vegglue.results.ensemble import Ensemble
 from vegglue.results.field_exports import quantities, write_field_table, write_geotiff, write_mesh, write_station_table
 from vegglue.results.labelled_arrays import extra_library
-from vegglue.results.result_files import read_posterior, stored_hash
+from vegglue.results.posterior import Posterior
+from vegglue.results.result_files import read_ensemble, read_posterior, stored_hash
 from vegglue.version import VERSION
 from vegglue.whole_files import folder_within
 from vegglue.workflow.case_run import CaseRun, as_solved, case_run, excluded_in, kept_best_fit, median_flow
 
 Form = Literal["csv", "geotiff", "netcdf"]
+Program = Literal["pest", "spotpy"]
 # Libraries that each form needs, all of the extra `field`.
 LIBRARIES_OF_FORM: dict[Form, tuple[str, ...]] = {"csv": (), "geotiff": ("tifffile",), "netcdf": ("xarray", "h5netcdf")}
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written, and of which parameters the flow is, in words."""
+    """What was written.
+
+    Attributes
+    ----------
+    files : tuple of Path
+    parameters : str
+        Of which parameters the flow is.
+    """
 
     files: tuple[Path, ...]
     parameters: str
@@ -43,18 +63,45 @@ class Exported:
 
 @one_thread()
 def export(
-    case: Case | CaseRun, *, runs: Path | str = "runs", forms: Sequence[Form] = get_args(Form), watch: Watch = silent
+    case: Case | CaseRun,
+    *,
+    runs: Path | str = "runs",
+    forms: Sequence[Form] = get_args(Form),
+    to: Program | None = None,
+    watch: Watch = silent,
 ) -> Exported:
     """Write the flow of a case at cell centres, and its stations, into runs/<name>/export/.
 
-    The flow is that of the posterior's medians, else of the best fit that a diagnosis found, else of the middle of
-    the priors. csv: stations.csv and flow-<experiment>.csv; geotiff: one file for each quantity and experiment, none on
-    a grid along a centreline; netcdf: flow.nc, a UGRID mesh. With a `frame` in the case all have their place on the
-    map, and velocities are turned to it.
-    Errors: InputError when no flow is found, nothing is left to write, or a library is missing; StorageError.
+    The flow is that of the medians of the posterior, else of the best fit of the diagnosis, else of the middle of the
+    priors. With a `frame` in the case, places and velocities are those of the map.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    runs : Path or str
+        Folder that holds the folders of runs.
+    forms : sequence of str
+        `csv` writes stations.csv and flow-<experiment>.csv; `geotiff` one file for each quantity and experiment, none
+        on a grid along a centreline; `netcdf` flow.nc, a UGRID mesh.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    Exported
+
+    Raises
+    ------
+    InputError
+        If no flow is found, nothing is left to write, or a library is missing.
+    StorageError
+        If a file cannot be written.
     """
     run = case_run(case, runs, watch=watch)
     case = run.case
+    if to is not None:
+        refuse_without_parameters(case)
+        return export_to_pest(run) if to == "pest" else export_to_spotpy(run)
     if list(forms) == ["geotiff"] and build_grid(case).centreline is not None:
         raise InputError(
             f"{shown_path(case.source)}: expected cells in straight rows for a GeoTIFF, got a grid along a centreline; "
@@ -90,6 +137,77 @@ def export(
             files.append(into / "flow.nc")
             write_mesh(files[-1], flows, grid, case.frame, about)
     return Exported(tuple(files), words)
+
+
+def members_to_export(run: CaseRun) -> tuple[Ensemble | None, Posterior | None]:
+    """The ensemble and the posterior that fit the case; None for one that is not there or is of another state."""
+    case, folder = as_solved(run.case, run.folder), run.folder
+    ensemble, posterior = folder / "ensemble.h5", folder / "posterior.h5"
+    found = read_ensemble(ensemble) if stored_hash(ensemble) == simulation_hash(case) else None
+    wanted = case_hash(case)
+    return found, read_posterior(posterior, wanted) if stored_hash(posterior) == wanted else None
+
+
+def export_to_pest(run: CaseRun) -> Exported:
+    """Control file, template, instructions and ensembles for PEST++; its model is `simulate` with its parameters."""
+    case, (ensemble, posterior) = run.case, members_to_export(run)
+    table = without_stations(run.observations.table, excluded_in(run))
+    valued = table["value"].notna().to_numpy()
+    members: dict[str, tuple[dict[str, Array], Array | None]] = {}
+    if ensemble is None:
+        members["prior"] = sobol_sample(case).theta, None
+    else:
+        solved = solved_rows(ensemble)
+        theta = {name: values[solved] for name, values in ensemble.parameters.items()}
+        members["prior"] = theta, ensemble.prediction[solved][:, valued]
+    if posterior is not None:
+        drawn = posterior.predicted.draws.ravel()
+        theta = {name: values[drawn] for name, values in posterior.sample.theta.items()}
+        members["posterior"] = theta, posterior.sample.prediction[drawn][:, valued]
+    trust = ["--trust"] if case.engine is not None or case.effect_file is not None else []
+    words = ["vegglue", "simulate", str(case.source.resolve()), "--parameters", "parameters.csv", "--runs", "model"]
+    command = " ".join(f'"{one}"' if " " in one else one for one in [*words, "--quiet", *trust])
+    predictions = f"model/{case.name}/given/parameters/predictions.csv"
+    into = folder_within(run.folder, "export/pest")
+    files = write_pest(into, case, table[valued], command, predictions, members)
+    return Exported(tuple(files), " and ".join(f"the {name}" for name in members))
+
+
+def export_to_spotpy(run: CaseRun) -> Exported:
+    """A database of the ensemble, one of the posterior's draws, and the measurements that both are compared with."""
+    case, (ensemble, posterior) = run.case, members_to_export(run)
+    if ensemble is None and posterior is None:
+        raise InputError(
+            f"{shown_path(case.source)}: expected an ensemble or a posterior of this case, found none; run "
+            f"{shown_command('simulate', case.source)} or {shown_command('infer', case.source)} first."
+        )
+    table, names = (
+        without_stations(run.observations.table, excluded_in(run)),
+        pest_names(case.parameters, LONGEST_IN_FILES),
+    )
+    valued = table["value"].notna().to_numpy()
+    table, into = table[valued], folder_within(run.folder, "export/spotpy")
+    files, words = [into / "evaluation.csv"], list[str]()
+    write_evaluation(files[0], table)
+    if ensemble is not None:
+        solved = solved_rows(ensemble)
+        theta, prediction = {name: ensemble.parameters[name][solved] for name in names}, ensemble.prediction[solved]
+        files.append(into / "ensemble.csv")
+        like = log_likelihood(table, prediction[:, valued])
+        write_spotpy(files[-1], names, theta, prediction[:, valued], like, np.ones(len(solved)))
+        words.append("the prior")
+    if posterior is not None:
+        chains, draws = posterior.predicted.draws.shape
+        drawn = posterior.predicted.draws.ravel()
+        theta, prediction = (
+            {name: posterior.sample.theta[name][drawn] for name in names},
+            posterior.sample.prediction[drawn],
+        )
+        files.append(into / "posterior.csv")
+        like = log_likelihood(table, prediction[:, valued])
+        write_spotpy(files[-1], names, theta, prediction[:, valued], like, np.repeat(np.arange(1, chains + 1), draws))
+        words.append("the posterior")
+    return Exported(tuple(files), " and ".join(words))
 
 
 def flow_to_export(run: CaseRun) -> tuple[dict[str, FlowFields], Array | None, str]:

@@ -2,9 +2,10 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -34,7 +35,7 @@ from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import comparison_that_fits, write_model_score
 from vegglue.results.result_files import diagnosis_that_fits
-from vegglue.wording.numbers import in_digits, in_short
+from vegglue.wording.numbers import in_short
 from vegglue.wording.sentences import sentence, tagged
 from vegglue.workflow.case_run import (
     CaseRun,
@@ -44,17 +45,8 @@ from vegglue.workflow.case_run import (
     case_run,
     keep_best_fit,
 )
-from vegglue.workflow.compare import Comparison, comparison_of, keep_comparison, kept_model_score, rows_set_aside
+from vegglue.workflow.compare import Comparison, comparison_of, excluded_rows, keep_comparison, kept_model_score
 from vegglue.workflow.diagnose import diagnose
-
-# Why nothing is added where the diagnosis names neither an effect nor a place, by its verdict.
-NOTHING_TO_ADD = {
-    "nothing-missing": "the diagnosis finds nothing missing",
-    "instrument": "only readings are off, which every model leaves out",
-    "none-of-these": "what is missing differs from place to place, and is no effect of the library",
-    "cannot-tell": "the diagnosis cannot tell what is missing",
-}
-LAW_TO_DISCOVER = "what stands out is a law that is in no list; `vegglue discover` adds one"
 
 
 def extend(
@@ -66,13 +58,32 @@ def extend(
     force: bool = False,
     runs: Path | str = "runs",
 ) -> Case:
-    """Write a config that extends the case by effects, each with a prior for its amplitude, and read it.
+    """Write a config that extends a case by effects, each with a prior for its amplitude, and read it.
 
-    A place that the diagnosis of the case found in the folder of runs is spread there as `extend_stepwise` spreads it.
+    A place that the diagnosis of the case found is spread as `extend_stepwise` spreads it.
 
-    add: one name or several, such as `streamlining` or `discharge_error[high]`; shapes: values of their shapes by name;
-    to: the config to write, beside the parent if not given; force: replace a file there that vegglue did not write,
-    too. Errors: InputError for an unknown effect, place or shape, or a file that would be replaced.
+    Parameters
+    ----------
+    case : Case
+    add : str or sequence of str
+        Names such as `streamlining` or `discharge_error[high]`.
+    shapes : mapping of str to float, optional
+        Shapes of these effects by name.
+    to : Path or str, optional
+        The config to write; beside the parent if not given.
+    force : bool
+        Whether to replace files that were edited by hand or not written by vegglue.
+    runs : Path or str
+        Folder that holds the folders of runs.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        For an unknown effect, place or shape, or if a file would be replaced.
     """
     names = [add] if isinstance(add, str) else list(dict.fromkeys(add))
     if not names:
@@ -89,9 +100,20 @@ def extend(
 
 @dataclass(frozen=True)
 class StepwiseExtension:
-    """How a case was extended: the cases from the first to the last, their errors, the sentence of the verdict, and
-    what was added or not, and why; unclear: names of what was added whose fall of held-out errors cannot be told from
-    none.
+    """How a case was extended.
+
+    Attributes
+    ----------
+    cases : tuple of Case
+        From the parent to the last child.
+    comparison : Comparison
+        Their errors.
+    sentence : str
+        The verdict.
+    reason : str
+        What was added or not, and why.
+    unclear : tuple of str
+        Names of what was added although the fall of held-out errors may be chance.
     """
 
     cases: tuple[Case, ...]
@@ -114,11 +136,31 @@ def extend_stepwise(
     watch: Watch = silent,
     force: bool = False,
 ) -> StepwiseExtension:
-    """Add the effects and the places that the diagnosis found, one or together, while errors of held-out measurements
-    and the misfit with all others fall; see `stepwise_choice`. The ladder is kept in comparison.json of each case, and
-    read there where the case, its diagnosis and its children are as they were.
+    """Add the effects and places that the diagnosis found while held-out errors and the misfit fall.
 
-    force: replace a child that was written or edited by hand, too. Errors: InputError when there is one.
+    They are added one by one, or together; see `stepwise_choice`. The comparison is kept in comparison.json of each
+    case, and read there if the case, its diagnosis and its children are unchanged.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    runs : Path or str
+        Folder that holds the folders of runs.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+    force : bool
+        Whether to replace a child that was edited by hand.
+
+    Returns
+    -------
+    StepwiseExtension
+
+    Raises
+    ------
+    InputError
+        If a child was edited by hand, or a file of the case changes meanwhile.
     """
     run = case_run(case, runs, jobs, watch, force)
     wanted = run.config_hash
@@ -133,7 +175,7 @@ def extend_stepwise(
         source = shown_path(run.case.source)
         raise InputError(f"{source}: a file that it names changed while it was extended; run `vegglue extend` again.")
     for one, errors in zip(several, extension.comparison.model_scores, strict=True):
-        write_model_score(one.folder, errors, rows_set_aside(extension.comparison.left_out), one.config_hash)
+        write_model_score(one.folder, errors, excluded_rows(extension.comparison.left_out), one.config_hash)
     ladder = comparison_of(extension.comparison, several, extension.reason, verdict_digest(found))
     keep_comparison(replace(ladder, unclear=extension.unclear), several)
     return extension
@@ -169,7 +211,7 @@ def extended(run: CaseRun, found: Diagnosis) -> StepwiseExtension:
     ladder = Comparison(tuple(in_threads(model_score, list(zip(bases, unseen, strict=True)))), aside)
     cases = tuple(one.case for one in several)
     return StepwiseExtension(
-        cases, ladder, found.verdict.sentence, in_words(case, found, choice), tuple(choice.unclear)
+        cases, ladder, found.verdict.sentence, sentence(extension_reason(case, found, choice)), tuple(choice.unclear)
     )
 
 
@@ -206,30 +248,40 @@ def kept_extension(run: CaseRun, found: Diagnosis) -> StepwiseExtension | None:
     return StepwiseExtension(cases, compared, found.verdict.sentence, kept.reason, kept.unclear)
 
 
-def in_words(case: Case, found: Diagnosis, choice: Choice) -> str:
-    """What was added, or why nothing is, and why each of the others is not."""
-    kept = choice.stages[-1]
-    if not kept and not choice.refused:
-        why = NOTHING_TO_ADD.get(found.verdict.kind, "all that was found is at work already")
-        return f"Nothing is added: {LAW_TO_DISCOVER if found.law_stands_out else why}."
-    first = f"Added: {' and '.join(kept)}." if kept else "Nothing is added."
-    spread = [(candidate_at(case, place).name, place) for place in places_tried(found)]
-    said = [
-        f"{name} is spread over where it may lie: half length {in_digits(one.length, 2)} m, half width "
-        f"{in_digits(one.width, 2)} m."
-        for name, one in spread
-        if name in kept
-    ]
-    said += [_unclear_in_words(name, sentence(fall)) for name, fall in choice.unclear.items()]
-    return " ".join([first, *said, *(f"{name} was not kept: {sentence(why)}." for name, why in choice.refused.items())])
+@dataclass(frozen=True)
+class ExtensionReason:
+    """What was added, or why nothing was, and why each of the others was not.
+
+    Parameters
+    ----------
+    added
+        Names of what was added, in order.
+    nothing
+        Why nothing was tried: the kind of the verdict, `law` if `discover` would add one, `at-work` if all is in the
+        model; empty if something was tried.
+    spread
+        Name, half length and half width [m] of each added place, over which it is spread.
+    unclear
+        Falls of held-out errors that may be chance, by the name of what was added.
+    refused
+        Why each of the others was not kept, by name.
+    """
+
+    added: tuple[str, ...]
+    nothing: str = ""
+    spread: tuple[tuple[str, float, float], ...] = ()
+    unclear: Mapping[str, Any] = field(default_factory=dict)
+    refused: Mapping[str, Any] = field(default_factory=dict)
 
 
-def _unclear_in_words(name: str, fall: str) -> str:
-    """What is kept although errors at what was held out do not show that it helps."""
-    return (
-        f"That held-out errors fall with {name} cannot be told from chance ({fall}, in (mm/s)^2 of their squares): it "
-        "is kept because the diagnosis names it, and they do not clearly rise."
-    )
+def extension_reason(case: Case, found: Diagnosis, choice: Choice) -> ExtensionReason:
+    """The outcome of a choice among what a diagnosis found."""
+    added = choice.stages[-1]
+    if not added and not choice.refused:
+        return ExtensionReason((), "law" if found.law_stands_out else found.verdict.kind)
+    places = [(candidate_at(case, place).name, place) for place in places_tried(found)]
+    spread = tuple((name, place.length, place.width) for name, place in places if name in added)
+    return ExtensionReason(added, "", spread, choice.unclear, choice.refused)
 
 
 def named_candidates(

@@ -1,4 +1,4 @@
-"""Synthetic measurements with a hidden effect: the truth on finer cells, and an effect as visible as asked.
+"""Synthetic measurements with a hidden effect: the truth on finer cells, and an effect of the wanted visibility.
 
     y = f_fine(z, a) + e,    |(I - P_J) W (f(z, a) - f(z, off))| = snr
 
@@ -31,7 +31,7 @@ from vegglue.measurements.kinds import velocity_rows
 from vegglue.workflow import unlisted_objects
 
 UNLISTED, BAD_PROBE, NOTHING_HIDDEN, ANY = "unlisted:", "bad_probe", "nothing", "?"
-# An effect that must be larger than this many plausible sizes to be as visible as asked is not hidden.
+# An effect that must be larger than this many plausible sizes to be as visible as wanted is not hidden.
 LARGEST_SIZE = 4.0
 # Steps and exactness [-] of finding the size.
 SIZING_STEPS, SIZE_TOLERANCE = 6, 0.02
@@ -79,7 +79,7 @@ class Answer:
 
 
 class VisibilityError(InputError):
-    """At no plausible size would an effect be as visible as asked."""
+    """At no plausible size is an effect as visible as wanted."""
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,18 @@ class TwinBase:
 def chosen_effect(
     base: TwinBase, errors: Noise, name: str, size: float | None, snr: float, random: np.random.Generator
 ) -> tuple[Candidate, Hidden]:
-    """The candidate that `name` asks for, at its size; what `?` or chance decides is drawn until it can be seen."""
+    """The candidate of this `name`, at its size; what `?` or chance decides is drawn until it can be seen."""
+    everything = candidates_of(base.model.case, base.model.station)
     for _ in range(DRAWN if name == ANY or name.startswith(UNLISTED) else 1):
-        candidate = _any(base.model, random) if name == ANY else candidate_of(base.model, name)
+        candidate = everything[int(random.integers(len(everything)))] if name == ANY else candidate_of(base.model, name)
+        amplitude = candidate.amplitude
         listed = not name.startswith(UNLISTED)
         shapes = _shapes(base.model, candidate, listed, random)
         label = candidate.name if listed else UNLISTED + candidate.effect.name
         if size is not None:
-            _refuse_beyond_support(candidate, size)
+            if not amplitude.low <= size <= amplitude.high:
+                bounds = f"{amplitude.low:g} to {amplitude.high:g} {amplitude.unit}".removesuffix(" -")
+                raise InputError(f"--hide {candidate.name}: expected a size within {bounds}, got {size:g}.")
             one = Hidden(label, size, shapes, 0.0)
             return candidate, replace(one, signal=_signal(base, errors, candidate, one))
         found = _sized(base, errors, candidate, Hidden(label, 0.0, shapes, 0.0), snr, random)
@@ -116,14 +120,6 @@ def chosen_effect(
         f"--hide {name}: at no plausible size would it be as visible as --snr {snr:g} in these data; ask for less, or "
         f"give its size, --hide {name}=SIZE."
     )
-
-
-def _refuse_beyond_support(candidate: Candidate, size: float) -> None:
-    """Errors: InputError for a size that the effect cannot have."""
-    amplitude = candidate.amplitude
-    if not amplitude.low <= size <= amplitude.high:
-        bounds = f"{amplitude.low:g} to {amplitude.high:g} {amplitude.unit}".removesuffix(" -")
-        raise InputError(f"--hide {candidate.name}: expected a size within {bounds}, got {size:g}; give another.")
 
 
 def candidate_of(model: Model, name: str) -> Candidate:
@@ -180,13 +176,8 @@ def with_unlisted_objects(case: Case, hidden: Hidden) -> Case:
     return case if hidden.listed else case.model_copy(update={"effect_file": Path(unlisted_objects.__file__)})
 
 
-def _any(model: Model, random: np.random.Generator) -> Candidate:
-    everything = candidates_of(model.case, model.station)
-    return everything[int(random.integers(len(everything)))]
-
-
 def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.Generator) -> dict[str, float]:
-    """Between the values that a search tries, not on them, but for those that say where a candidate acts; something
+    """Between the values that a search tries, not on them, but for those of the place of a candidate; something
     in no list stands anywhere on the floor.
     """
     if listed:
@@ -208,11 +199,14 @@ def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.
 def _sized(
     base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hidden, snr: float, random: np.random.Generator
 ) -> Hidden | None:
-    """The effect at the size that is as visible as asked, on the true flow and not to first order."""
+    """The effect at the size that is as visible as wanted, on the true flow and not to first order."""
     amplitude = candidate.effect.amplitude
     sides = [sign for sign, end in ((1.0, amplitude.high), (-1.0, amplitude.low)) if sign * (end - amplitude.off) > 0]
     sign, most = float(random.choice(sides)), LARGEST_SIZE * amplitude.scale
-    size = _first_size(base, errors, candidate, hidden, snr)
+    # (snr / |S_perp|)^(1/power), to first order.
+    case = with_unlisted_objects(base.model.case, hidden)
+    trace = responses(replace(base.model, case=case), base.here, [cause_of(case, candidate, hidden.shapes)])
+    size = amplitude.size(snr / max(visible_length(base, errors, trace[:, 0]), 1e-300))
     if size > 2.0 * most:
         return None
     for _ in range(SIZING_STEPS):
@@ -226,15 +220,6 @@ def _sized(
             return None
         size *= min((snr / signal) ** (1.0 / amplitude.power), 3.0)
     return replace(one, signal=signal) if abs(signal / snr - 1.0) < 5.0 * SIZE_TOLERANCE else None
-
-
-def _first_size(base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hidden, snr: float) -> float:
-    """(snr / |S_perp|)^(1/power), to first order."""
-    amplitude = candidate.effect.amplitude
-    case = with_unlisted_objects(base.model.case, hidden)
-    changed = cause_of(case, candidate, hidden.shapes)
-    trace = responses(replace(base.model, case=case), base.here, [changed])
-    return amplitude.size(snr / max(visible_length(base, errors, trace[:, 0]), 1e-300))
 
 
 def _signal(base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hidden) -> float:
@@ -308,7 +293,7 @@ def measured_twin(
     """Stations with the values measured in a truth that hides `wanted`, and the answer.
 
     wanted: `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `?` for any effect, `nothing`. Errors: InputError for
-    what is unknown, or cannot be made as visible as asked.
+    what is unknown, or cannot be made as visible as wanted.
     """
     random = np.random.default_rng((seed, 2))
     correlation, scale = errors_named(noise)

@@ -29,7 +29,7 @@ from vegglue.importers.confluence import (
     mat_folder,
     tables_of_mat,
 )
-from vegglue.importers.field_folder import case_from_folder
+from vegglue.importers.field_folder import case_from_folder, case_from_sheet, case_of_sheet
 from vegglue.importers.site_file import assumptions_of_site, site_file
 from vegglue.measurements.observations import read_observations
 from vegglue.wording.sentences import sentence
@@ -39,12 +39,26 @@ NO_ROOM = "free some room in the folder for temporary files"
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
-    """Make a case of a folder of measurements: site.json or site.yaml and tables, or a published set.
+    """Make a case of a folder of measurements: site.yaml or site.json and tables, or a published set.
 
-    to: the config to write; configs/<folder>.yaml or <folder>.yaml if not given. The confluence set of R.B. Canelas
-    makes a second config, <to>-flat.yaml, with a plane instead of the surveyed bed. force: replace files that were
-    edited or not made here, too. Errors: InputError for what is missing or cannot be read, or would be replaced; then
-    nothing was written.
+    The confluence set of R.B. Canelas makes a second config, <to>-flat.yaml, with a plane instead of the surveyed bed.
+
+    Parameters
+    ----------
+    folder : Path or str
+    to : Path or str, optional
+        The config to write; configs/<folder>.yaml or <folder>.yaml if not given.
+    force : bool
+        Whether to replace files that were edited by hand or not written by vegglue.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        For what is missing or cannot be read, or if a file would be replaced; then nothing was written.
     """
     folder = Path(folder)
     name = f"{folder.resolve().name}.yaml"
@@ -52,7 +66,8 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
     if holds_confluence(folder) or mat_folder(folder) is not None:
         tree, texts, flat = confluence_case(folder, target)
     else:
-        made = case_from_folder(folder, target)
+        planned = case_of_sheet(folder) if folder.is_dir() else None
+        made = case_from_folder(folder, target) if planned is None else case_from_sheet(folder, target, planned)
         tree, texts, flat = made.tree, dict(made.texts), None
     refuse_unreadable_import(tree, texts, target, folder)
     made_by = f"# Made by `vegglue import` from {folder.name}.\n"
@@ -67,15 +82,17 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
 
 
 def assumptions_of(folder: Path | str) -> list[str]:
-    """What `import` assumes of a folder because nobody said it, and what it does not read."""
+    """What `import` assumes of a folder because it is not stated, and what it does not read."""
     folder = Path(folder)
+    if case_of_sheet(folder) is not None:  # of a case that is there
+        return []
     if site_file(folder).is_file():
         return assumptions_of_site(folder)
     return list(NOT_STATED) if holds_confluence(folder) or mat_folder(folder) is not None else []
 
 
 def without_errors(case: Case) -> list[str]:
-    """Which measurements state no standard error, and who refuses them; nothing where all do."""
+    """Which measurements state no standard error, and which commands refuse them; nothing if all do."""
     return list(map(sentence, refused_for_errors(case, read_observations(case).table)))
 
 
@@ -134,6 +151,6 @@ def with_full_paths(tree: Any, home: Path, made: Mapping[Path, str]) -> Any:
     full = {
         key: os.path.realpath(home / value)
         for key, value in tree.items()
-        if key in PATHS and isinstance(value, str) and Path(value) not in made
+        if key in (*PATHS, "extends") and isinstance(value, str) and Path(value) not in made
     }
     return {key: with_full_paths(value, home, made) for key, value in tree.items()} | full

@@ -36,17 +36,39 @@ def infer(
     jobs: int = -1,
     watch: Watch = silent,
 ) -> Posterior:
-    """Infer the parameters from the measurements, p(theta | y) ~ p(y | theta) p(theta); kept in
-    runs/<name>/posterior.h5, and the flow of their medians in flow.h5.
+    """Infer the parameters of a case from its measurements.
 
-    Measurements that its diagnosis has set aside are left out, see `excluded_in`; the posterior says so.
+        p(theta | y) ~ p(y | theta) p(theta)
 
-    ensemble: the one of this case, whose size counts then; read from the folder if not given. Where none is there,
-    `refine` begins with points of the prior. method: `refine` or `glue` instead of the case's. members: size of the
-    ensemble instead of the case's.
+    The posterior is kept in runs/<name>/posterior.h5, the flow of its medians in flow.h5. Readings that the diagnosis
+    excludes are excluded.
 
-    Errors: InputError when there is none and it is needed, or it is of another state of the case, or the likelihood
-    cannot be refined.
+    Parameters
+    ----------
+    case : Case or CaseRun
+    ensemble : Ensemble, optional
+        That of this case; read from the folder if not given. If there is none, `refine` begins with points of the
+        prior.
+    runs : Path or str
+        Folder that holds the folders of runs.
+    method : str, optional
+        `refine` or `glue`, instead of the case's.
+    members : int, optional
+        Size of the ensemble, instead of the case's.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    Posterior
+
+    Raises
+    ------
+    InputError
+        If an ensemble is needed and there is none, if it is of another state of the case, or if the likelihood cannot
+        be refined.
     """
     run = case_run(case, runs, jobs, watch)
     aside = excluded_in(run)
@@ -56,7 +78,7 @@ def infer(
     if not observations.table["used"].any():
         raise InputError(
             f"{sized.name}: expected a station in use, got none: nothing can be inferred; "
-            f"{shown_command('check', sized.source)} says why."
+            f"{shown_command('check', sized.source)} reports why."
         )
     chosen = chosen_method(sized, method)
     ensemble = own_ensemble(run, ensemble, members is not None or needs_ensemble(sized, chosen))
@@ -109,7 +131,7 @@ def needs_ensemble(case: Case, method: Method) -> bool:
 
 
 def chosen_method(case: Case, asked: Method | None) -> Method:
-    """What is asked for, else what the case says; an informal likelihood is always weighed. Errors: InputError."""
+    """The wanted method, else that of the case; an informal likelihood is always weighed. Errors: InputError."""
     if asked not in (None, *get_args(Method)):
         raise InputError(f"--method: expected {' or '.join(get_args(Method))}, got {asked!r}.")
     if refinable(case):

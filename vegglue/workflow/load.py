@@ -3,15 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pandas as pd
 
 from vegglue.errors import InputError, shown_command
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.labelled_arrays import read_inference_data, read_labelled
+from vegglue.results.labelled_arrays import as_tree, read_inference_data, read_labelled
 from vegglue.results.result_files import read_diagnosis
-from vegglue.wording.numbers import in_short, so_many
+from vegglue.wording.numbers import in_short, in_short_html, so_many
 
 if TYPE_CHECKING:
     import arviz
@@ -23,14 +23,24 @@ Read = TypeVar("Read")
 
 @dataclass(frozen=True)
 class LoadedRun:
-    """What lies in the folder of a run; None where a step was not done.
+    """All results in the folder of a run; None for a step that was not done.
 
-    ensemble: all members: their parameters, prediction (member, station), status, reason, mass_error and so on.
-    fields: level, u and v (member, experiment, x, y), where the case keeps them. members: of the posterior, with
-    theta (parameter, member), weights and what follows from them. posterior: draws of equal weight for ArviZ, with the
-    groups prior, log_likelihood, posterior_predictive and others; a DataTree with ArviZ 1.0 and later. stations: one
-    row for each measurement. Attributes of a dataset say from which config, seed and version it is; its variables
-    have `units`.
+    Each dataset has the config, seed and version as attributes, and `units` of its variables.
+
+    Attributes
+    ----------
+    folder : Path
+    ensemble : xarray.Dataset or None
+        All members: parameters, prediction (member, station), status, reason, mass_error.
+    fields : xarray.Dataset or None
+        level [m], u and v [m/s], each (member, experiment, x, y), if the case keeps fields.
+    members : xarray.Dataset or None
+        Of the posterior: theta (parameter, member), weights and what follows from them.
+    posterior : arviz.InferenceData or xarray.DataTree or None
+        Draws of equal weight, with the groups prior, log_likelihood, posterior_predictive and others.
+    diagnosis : Diagnosis or None
+    stations : DataFrame or None
+        One row for each measurement.
     """
 
     folder: Path
@@ -40,6 +50,23 @@ class LoadedRun:
     posterior: "arviz.InferenceData | xarray.DataTree | None"
     diagnosis: Diagnosis | None
     stations: pd.DataFrame | None
+
+    @property
+    def tree(self) -> "xarray.DataTree":
+        """All of it as one DataTree with the names and units of the CF conventions: the groups ensemble, fields,
+        members, stations and, of the draws of equal weight, posterior, prior and so on.
+        """
+        parts = {name: getattr(self, name) for name in ("ensemble", "fields", "members")}
+        if self.stations is not None:
+            parts["stations"] = self.stations.to_xarray()
+        if self.posterior is not None:
+            groups = self.posterior.groups
+            names = groups() if callable(groups) else [name.strip("/") for name in groups]
+            parts |= {name: self.posterior[name] for name in names if name and name not in parts}
+        return as_tree({name: dataset_of(part) for name, part in parts.items() if part is not None})
+
+    def _repr_html_(self) -> str:
+        return in_short_html(repr(self))
 
     def __repr__(self) -> str:
         sized = {name: getattr(self, name) for name in ("ensemble", "fields", "members")}
@@ -58,10 +85,28 @@ class LoadedRun:
         return in_short(f"Run in {self.folder}", lines)
 
 
+def dataset_of(part: Any) -> "xarray.Dataset":
+    """A dataset as it is, or that of a node of a tree."""
+    return part.to_dataset() if hasattr(part, "to_dataset") else part
+
+
 def load(folder: Path | str) -> LoadedRun:
     """Read all results in the folder of a run, such as runs/brook.
 
-    Errors: InputError when there are none, or xarray or ArviZ is not installed; StorageError for a broken file.
+    Parameters
+    ----------
+    folder : Path or str
+
+    Returns
+    -------
+    LoadedRun
+
+    Raises
+    ------
+    InputError
+        If there are none, or if xarray or ArviZ is not installed.
+    StorageError
+        If a file is damaged.
     """
     folder = Path(folder)
     there = {name for name in FILES if (folder / name).exists()}

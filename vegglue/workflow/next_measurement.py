@@ -1,4 +1,4 @@
-"""case -> what to measure next: which section, gauge or discharge would tell apart what the data at hand cannot."""
+"""case -> what to measure next: which section, gauge or discharge would separate what the data at hand cannot."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -8,9 +8,10 @@ import numpy as np
 
 from vegglue.calibration.baseline import Baseline, baseline, for_prediction
 from vegglue.calibration.candidates import Candidate
+from vegglue.calibration.detection import detected_length
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
-from vegglue.diagnosis.candidate_effects import POWER_QUANTILE
+from vegglue.diagnosis.candidate_effects import DETECTED
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
 from vegglue.diagnosis.comparison import excluded_by
 from vegglue.diagnosis.next_measurement import Explanation, MeasurementWorth, worth_of_measurements
@@ -19,7 +20,7 @@ from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.causes import CandidateEffect, CandidateLaw, CandidateLaws, Step
+from vegglue.results.causes import CandidateEffect, CandidateLaw, CandidateLaws
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.json_store import questions_that_fit, write_questions
 from vegglue.results.open_questions import (
@@ -36,7 +37,7 @@ from vegglue.workflow.diagnose import diagnose
 
 # Effects hidden behind calibration that measurements are proposed for.
 HIDDEN = 4
-# Rivals from which on each is also asked for by itself: of two, one is told from the other as the other from it.
+# Rivals from which on each is also a question by itself: of two, one is separated from the other as the other from it.
 FEWEST_PARTED = 3
 # Laws that one question is about at most: of more, two that are alike decide what no measurement answers.
 MOST_LAWS = 3
@@ -51,17 +52,39 @@ def next_measurement(
     jobs: int = -1,
     watch: Watch = silent,
 ) -> list[Question]:
-    """What to measure next, ranked by gain per hour of field work; empty when nothing is left to be told apart.
+    """Rank what could be measured next by what it gains for an hour of field work.
 
-    between: names of effects or laws, else those that the diagnosis could not tell apart, step by step, and a place
-    that is likelier than they are; where a law stands out, the laws that could be it; where it found nothing, the
-    strongest of those it could not test, each by itself at a plausible size. Only questions nobody chose are kept, in
-    questions.json, and read there for exactly this case. Errors: InputError for a name that is not in the diagnosis.
+    Questions that follow from the diagnosis are kept in questions.json, and read there for exactly this case.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    between : sequence of str
+        Effects or laws to separate. If empty: what the diagnosis could not separate, step by step, and a place that is
+        more probable; the laws that it could be, if a law stands out; or the strongest effects that it could not test,
+        each at a plausible size, if it found nothing.
+    runs : Path or str
+        Folder that holds the folders of runs.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    list of Question
+        Empty if nothing is left to separate.
+
+    Raises
+    ------
+    InputError
+        For a name that is not in the diagnosis.
     """
     run = case_run(case, runs, jobs, watch)
     case, wanted = run.case, run.config_hash
     found = diagnose(run)
-    kept = None if between else questions_that_fit(run.folder, wanted)
+    # Hours and errors that are planned are in no hash: with them questions are weighed again.
+    kept = None if between or case.planned is not None else questions_that_fit(run.folder, wanted)
     if kept is not None:
         return [*kept]
     by_name = [one.name for one in found.candidate_effects]
@@ -69,7 +92,7 @@ def next_measurement(
     unknown = [name for name in between if name not in possible]
     if unknown:
         raise InputError(f"--between: `{unknown[0]}` is not among the effects of the diagnosis: {', '.join(possible)}.")
-    asked = _asked(case, found, list(dict.fromkeys(between))) if between else _questions(case, found)
+    asked = _asked(case, found, list(dict.fromkeys(between))) if between else what_is_open(case, found)
     questions: list[Question] = []
     if asked:
         with at_most(run.jobs):
@@ -77,18 +100,19 @@ def next_measurement(
             base = with_places(calibrated(run, excluded_by(found)), found)
             run.watch(Progress("weighing what could be measured"))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
-        answered = zip(asked, worths, strict=True)
-        questions = [one for (about, rivals), worth in answered for one in _answers(about, rivals, worth)]
-        seen = _seen_from(found)
-        questions = [replace(one, seen_from=seen) if isinstance(one.about, HiddenEffect) else one for one in questions]
+        # D^2 of an effect that passes the alarm over all effects 19 times of 20.
+        seen = _detected_length(found) ** 2
+        for (about, rivals), worth in zip(asked, worths, strict=True):
+            answers = questions_about(about, rivals, worth)
+            questions += [replace(one, seen_from=seen) if isinstance(about, HiddenEffect) else one for one in answers]
     if not between:
         write_questions(run.folder, questions, wanted)
     return questions
 
 
-def _seen_from(found: Diagnosis) -> float:
-    """D^2 of an effect that passes the alarm over all effects 19 times of 20 [-]."""
-    return (found.first_screening.threshold + POWER_QUANTILE) ** 2
+def _detected_length(found: Diagnosis) -> float:
+    """Length of a trace that passes the alarm over all effects 19 times of 20 [standard errors]."""
+    return float(detected_length(np.array(found.first_screening.threshold), DETECTED))
 
 
 def with_places(base: Baseline, found: Diagnosis) -> Baseline:
@@ -104,9 +128,11 @@ def with_places(base: Baseline, found: Diagnosis) -> Baseline:
     return for_prediction(baseline(replace(base.model, case=child), known))
 
 
-def _answers(about: Subject, rivals: Sequence[Explanation], worths: Sequence[MeasurementWorth]) -> list[Question]:
-    """A question with what could be measured for it. Where nothing answers it and there are more than two rivals, those
-    that something tells from all others follow.
+def questions_about(
+    about: Subject, rivals: Sequence[Explanation], worths: Sequence[MeasurementWorth]
+) -> list[Question]:
+    """A question with what could be measured for it. If nothing answers it and there are more than two rivals, those
+    that something separates from all others follow.
     """
     whole = Question(about, _ranked(_proposed(one, one.now.min(), one.then.min()) for one in worths))
     if whole.useful or len(rivals) < FEWEST_PARTED:
@@ -131,37 +157,40 @@ def _proposed(one: MeasurementWorth, now: float, then: float) -> ProposedMeasure
     return ProposedMeasurement(plan.name, plan.experiment, plan.x, plan.rows.size, plan.hours, float(now), float(then))
 
 
-def _questions(case: Case, found: Diagnosis) -> list[tuple[Subject, list[Explanation]]]:
+def what_is_open(case: Case, found: Diagnosis) -> list[tuple[Subject, list[Explanation]]]:
     """What the diagnosis leaves open, and the rivals of each question; nothing of data that it doubts."""
     if found.verdict.doubts_the_data:
         return []
+    questions: list[tuple[Subject, list[Explanation]]] = []
+    for step in (one for one in found.steps if len(one.rivals) > 1 or one.likelier_place):
+        names, rivals = [*step.rivals], rivals_of(case, found, step.rivals)
+        if step.likelier_place:
+            place = step.places[step.likelier_place]
+            unlisted = candidate_at(case, place)
+            names.append(unlisted.name)
+            rivals.append((unlisted, place.shapes, unlisted.effect.amplitude.gain(place.amplitude)))
+        questions.append((RivalEffects(tuple(names)), rivals))
     if found.steps:
-        return [
-            _between_rivals(case, found, step) for step in found.steps if len(step.rivals) > 1 or step.likelier_place
-        ]
+        return questions
     laws = laws_to_tell_apart(found.laws)
     if len(laws) > 1:
         return _asked(case, found, laws)
+
+    def raw_trace(one: CandidateEffect) -> float:
+        """Length of the trace of a plausible amplitude before projection [standard errors]."""
+        amplitude = candidate_named(case, found.predictions.station, one.name).effect.amplitude
+        gain = amplitude.gain(amplitude.off + one.detectability.smallest)
+        return _detected_length(found) * amplitude.plausible_gain / gain / max(one.detectability.visibility, 1e-6)
+
     # What calibration hides best, of all that would leave a trace without it.
     seen = found.verdict.significant_effects
     hidden = [one for one in found.candidate_effects if not one.detectability.testable and one.name not in seen]
-    strongest = sorted(hidden, key=lambda one: -_raw_trace(case, found, one))[:HIDDEN]
+    strongest = sorted(hidden, key=lambda one: -raw_trace(one))[:HIDDEN]
     return [question for one in strongest for question in _asked(case, found, [one.name])]
 
 
-def _between_rivals(case: Case, found: Diagnosis, step: Step) -> tuple[Subject, list[Explanation]]:
-    """The question of a step: to tell its effects from each other, and from a place that is likelier than they are."""
-    names, rivals = [*step.rivals], rivals_of(case, found, step.rivals)
-    if step.likelier_place:
-        place = step.places[step.likelier_place]
-        unlisted = candidate_at(case, place)
-        names.append(unlisted.name)
-        rivals.append((unlisted, place.shapes, unlisted.effect.amplitude.gain(place.amplitude)))
-    return RivalEffects(tuple(names)), rivals
-
-
 def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[Subject, list[Explanation]]]:
-    """One question: to tell effects from each other, or one of a plausible size from what calibration makes of it."""
+    """One question: to separate effects, or one of a plausible size from what calibration absorbs."""
     if len(names) > 1:
         return [(RivalEffects(tuple(names)), rivals_of(case, found, names))]
     if names[0] in _laws_by_name(found):
@@ -182,15 +211,6 @@ def laws_to_tell_apart(laws: CandidateLaws | None) -> list[str]:
 
 def _laws_by_name(found: Diagnosis) -> dict[str, CandidateLaw]:
     return {} if found.laws is None else {one.name: one for one in found.laws.laws}
-
-
-def _raw_trace(case: Case, found: Diagnosis, candidate_effect: CandidateEffect) -> float:
-    """Length of the trace of a plausible amplitude before projection, in standard errors."""
-    amplitude = candidate_named(case, found.predictions.station, candidate_effect.name).effect.amplitude
-    detectability = candidate_effect.detectability
-    gain = amplitude.gain(amplitude.off + detectability.smallest)
-    length = found.first_screening.threshold + POWER_QUANTILE
-    return length * amplitude.plausible_gain / gain / max(detectability.visibility, 1e-6)
 
 
 def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Explanation]:

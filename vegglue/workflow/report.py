@@ -26,12 +26,31 @@ from vegglue.workflow.case_run import CaseRun, as_solved, case_run, excluded_in,
 def report(
     case: Case | CaseRun, *, runs: Path | str = "runs", members: int | None = None, watch: Watch = silent
 ) -> Path:
-    """Write runs/<name>/report.html and figures/ from the posterior, its ensemble if it has one and, where they fit,
-    the diagnosis, the comparison and the questions kept there; returns the page. members: size of the ensemble, if not
-    given that of the one there is.
+    """Write the page of a run, runs/<name>/report.html, and its figures.
 
-    Errors: InputError when there is no posterior of this case, or its ensemble is gone or of another state of it;
-    StorageError when a file cannot be written.
+    It shows the posterior, its ensemble if there is one, and the diagnosis, comparison and questions that fit it.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    runs : Path or str
+        Folder that holds the folders of runs.
+    members : int, optional
+        Size of the ensemble; that of the one that is there if not given.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    InputError
+        If there is no posterior of this case, or if its ensemble is missing or of another state of the case.
+    StorageError
+        If a file cannot be written.
     """
     run = case_run(case, runs, watch=watch)
     sized = run.of(as_solved(run.case, run.folder)) if members is None else run.sized(members)
@@ -45,13 +64,32 @@ def report(
 def overview(
     cases: Sequence[Case | CaseRun], *, runs: Path | str = "runs", trust: bool = False, watch: Watch = silent
 ) -> Path:
-    """Write runs/overview.html about runs that have a posterior, in the order given; returns the page.
+    """Write runs/overview.html about several runs that have a posterior.
 
-    In place of a case that `run` took round the loop stands its last child, which has the posterior. trust: whether the
-    file of a law that the child names may be run.
+    The last child stands for a case that `run` extended, as it has the posterior.
 
-    Errors: InputError where an ensemble or a posterior of a case is missing or out of date; StorageError when a file
-    cannot be written.
+    Parameters
+    ----------
+    cases : sequence of Case or CaseRun
+        In the order of the page.
+    runs : Path or str
+        Folder that holds the folders of runs.
+    trust : bool
+        Whether the file of a law that a child names may be run.
+    watch : callable
+        Gets a `Progress` at each step.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    InputError
+        If an ensemble or a posterior is missing or out of date.
+    StorageError
+        If a file cannot be written.
     """
     known = []
     for run in (case_run(case, runs, watch=watch) for case in cases):

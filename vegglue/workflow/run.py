@@ -22,10 +22,6 @@ from vegglue.workflow.simulate import is_up_to_date, refuse_to_shrink, simulate
 Show = Callable[[Case, Any], None]
 
 
-def _unseen(case: Case, result: Any) -> None:
-    """Shows nothing."""
-
-
 def run(
     case: Case | CaseRun,
     *,
@@ -33,18 +29,41 @@ def run(
     members: int | None = None,
     jobs: int = -1,
     watch: Watch = silent,
-    show: Show = _unseen,
+    show: Show = silent,
     force: bool = False,
 ) -> StepwiseExtension:
-    """Diagnose, add what is missing, watch the error fall, diagnose again and say what to measure next; then
-    posterior and report of the last child, or of the case if there is none, and an ensemble where `members` are asked
-    for, one is there, or the posterior needs it. What is up to date is not made again. Where
-    none of the known effects explains the misfit, and it is not at a place, a law is searched that does, and kept where
-    errors fall with it. members: size of the ensemble instead of the case's; force: replace a child that was edited by
-    hand and a larger ensemble, too.
+    """Diagnose a case, add what is missing while errors fall, diagnose again; then infer, report and plan.
 
-    show is given each result as it comes, with its case: Diagnosis, StepwiseExtension, DiscoveredCase and Comparison,
-    list of Question, Ensemble, Posterior, the Path of a page, or a sentence.
+    Posterior and report are of the last child, or of the case if there is none. If no listed effect and no place
+    explains the misfit, a law is searched, and kept if errors fall with it. What is up to date is not made again.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+    runs : Path or str
+        Folder that holds the folders of runs.
+    members : int, optional
+        Size of the ensemble, which is solved if it is given, if one is there, or if the posterior needs it.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+    show : callable
+        Gets each result as it comes, with its case: Diagnosis, StepwiseExtension, DiscoveredCase and Comparison, list
+        of Question, Ensemble, Posterior, the Path of a page, or a sentence.
+    force : bool
+        Whether to replace a child that was edited by hand, and a larger ensemble.
+
+    Returns
+    -------
+    StepwiseExtension
+
+    Raises
+    ------
+    InputError
+        If the model finds no flow, a station has no standard error, or a child was edited by hand.
+    StorageError
+        If a file cannot be written.
     """
     whole = case_run(case, runs, jobs, watch, force)
     refuse_to_shrink(whole.sized(members))

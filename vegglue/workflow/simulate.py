@@ -4,18 +4,22 @@ import os
 import shutil
 from pathlib import Path
 
+from vegglue.case.parameter_space import sample_of
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
+from vegglue.case.text_files import names_in_files, write_text
 from vegglue.engine.command import command_runs
 from vegglue.errors import InputError, StorageError
 from vegglue.flow.status import FAILED
 from vegglue.inference.command_ensemble import run_ensemble
-from vegglue.inference.solve_ensemble import solve_ensemble
+from vegglue.inference.solve_ensemble import ensemble_hash, solve_ensemble
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
+from vegglue.results.calibration_files import ensemble_table, observation_names, read_parameters, solved_rows
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.result_files import read_ensemble, stored_hash
 from vegglue.results.resume import remove_left_over_fields
+from vegglue.whole_files import MAKE_ROOM
 from vegglue.workflow.case_run import CaseRun, case_run, other_size
 
 
@@ -28,19 +32,45 @@ def simulate(
     jobs: int = -1,
     watch: Watch = silent,
     force: bool = False,
+    parameters: Path | str | None = None,
 ) -> Ensemble:
-    """Solve every member of the ensemble, kept in runs/<name>/ensemble.h5 (and fields.h5 if the case keeps fields); or
-    run the command of the case's `engine` for each.
+    """Solve all members of the ensemble of a case, or run the command of its `engine` for each.
 
-    An ensemble of exactly this case is read instead, also that of a run beside it whose case differs only in what an
-    ensemble does not depend on; one that was stopped goes on where it was. members: size of the ensemble instead of the
-    case's; jobs: processes, -1 for one on every core, and results do not depend on it; watch is told how far it is;
-    force: replace a larger ensemble of the case, too, and run members again for which the command of an engine failed.
-    Predictions are (member, station), in m/s for velocities and m for levels.
+    They are kept in runs/<name>/ensemble.h5, and in fields.h5 if the case keeps fields. An ensemble of exactly this
+    case is read instead, also that of a run beside it whose case differs only in what an ensemble does not depend on; a
+    stopped one is continued.
 
-    Errors: InputError for a case without parameters, fields beyond their budget, or a larger ensemble there;
-    StorageError when another run holds the folder or the disk is full.
+    Parameters
+    ----------
+    case : Case or CaseRun
+    runs : Path or str
+        Folder that holds the folders of runs.
+    members : int, optional
+        Size of the ensemble, instead of the case's.
+    jobs : int
+        Processes, -1 for one on each core. Results do not depend on it.
+    watch : callable
+        Gets a `Progress` at each step.
+    force : bool
+        Whether to replace a larger ensemble of the case, and to run members again for which the command failed.
+    parameters : Path or str, optional
+        CSV with one row for each member, such as draws of another program (see `read_parameters`). These members are
+        kept in runs/<name>/given/<file>/, with their predictions also as predictions.csv.
+
+    Returns
+    -------
+    Ensemble
+        With predictions (member, station) [m/s for velocities, m for levels, m3/s for discharges].
+
+    Raises
+    ------
+    InputError
+        For a case without parameters, for fields beyond their budget, or if there is a larger ensemble.
+    StorageError
+        If another run holds the folder, or if the disk is full.
     """
+    if parameters is not None:
+        return simulate_given(case_run(case, runs, jobs, watch, force), Path(parameters))
     run = case_run(case, runs, jobs, watch, force).sized(members)
     path = run.folder / "ensemble.h5"
     refuse_to_shrink(run)
@@ -55,6 +85,33 @@ def simulate(
                 run_ensemble(run.case, run.observations, path, commands, run.jobs, run.watch)
     remove_left_over_fields(path)
     return read_ensemble(path)
+
+
+def simulate_given(run: CaseRun, file: Path) -> Ensemble:
+    """Solve the members of a CSV. Raises InputError for one that does not fit the case."""
+    theta = read_parameters(file, run.case)
+    run, given = run.sized(len(next(iter(theta.values())))), sample_of(run.case, theta)
+    path = given_folder(run, file) / "ensemble.h5"
+    if stored_hash(path) != ensemble_hash(run.case, given):
+        if run.case.engine is None:
+            solve_ensemble(run.case, run.observations, path, run.jobs, run.watch, run.site, given)
+        else:
+            with at_most(run.jobs):
+                commands = command_runs(run.case, run.folder)
+                run_ensemble(run.case, run.observations, path, commands, run.jobs, run.watch, given)
+    remove_left_over_fields(path)
+    found = read_ensemble(path)
+    valued = found.station["value"].notna().to_numpy()
+    columns = observation_names(found.station[valued])
+    solved = solved_rows(found)
+    table = ensemble_table(dict(zip(columns, found.prediction[solved][:, valued].T, strict=True)), solved)
+    write_text(path.with_name("predictions.csv"), table, MAKE_ROOM)
+    return found
+
+
+def given_folder(run: CaseRun, file: Path) -> Path:
+    """Where the members of a CSV of parameters are kept."""
+    return run.folder / "given" / names_in_files([file.stem])[file.stem]
 
 
 def is_simulated(run: CaseRun) -> bool:

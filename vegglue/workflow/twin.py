@@ -2,7 +2,6 @@
 
 import base64
 import json
-import os
 import re
 import zlib
 from collections.abc import Sequence
@@ -20,8 +19,8 @@ from vegglue.case.resolved_config import as_yaml, case_hash, write_made
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, case_name, read_text
 from vegglue.effects.grammar import LAWS
-from vegglue.errors import InputError, shown_command, shown_path
-from vegglue.measurements.kinds import KINDS, Kind, kind_of
+from vegglue.errors import InputError, path_from, shown_command, shown_path
+from vegglue.measurements.kinds import KINDS, kind_of
 from vegglue.parallel import one_thread
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import diagnosis_that_fits
@@ -32,7 +31,7 @@ from vegglue.workflow.hidden_effect import BAD_PROBE, Answer, Hidden, measured_t
 
 
 def sealed_answer(answer: Answer) -> str:
-    """The answer as text that nobody reads at a glance."""
+    """The answer as text that is not read at a glance."""
     packed = base64.b64encode(zlib.compress(json.dumps(asdict(answer)).encode())).decode()
     return "\n".join(["# Sealed by `vegglue twin`; `vegglue reveal` opens it.", *re.findall(r".{1,76}", packed), ""])
 
@@ -58,17 +57,26 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
     Errors: InputError when such files are there; StorageError when the folder cannot be written.
     """
     name = case_name(folder.resolve().name, "twin")
-    used = _on_the_map(case, station[station["used"]])
+    used, line = station[station["used"]], centreline_in(case)
+    if line is not None:  # files of stations have points on the map
+        at_point = np.array([kind_of(kind).at_point for kind in used["kind"]])
+        x, y = on_map(line, used["x"].to_numpy(float), used["y"].to_numpy(float))
+        used = used.assign(x=used["x"].where(~at_point, x), y=used["y"].where(~at_point, y))
     kinds = [kind for kind in KINDS.values() if (used["kind"] == kind.name).any()]
     tree = {
-        "extends": Path(os.path.relpath(case.source, folder.resolve())).as_posix(),
+        "extends": path_from(folder.resolve(), case.source),
         "name": name,
         "title": f"Twin of {case.name}, something may be hidden (synthetic)",
         "observations": [{"kind": kind.name, "file": kind.file, "synthetic": True} for kind in kinds],
         **{key: None for key in ("validation", "reference") if getattr(case, key) is not None},
     }
     note = f"# Made by `vegglue twin` from {case.name}; the answer is sealed in {SEAL}.\n"
-    texts = {kind.file: _stations(used, kind) for kind in kinds}
+    texts = {}
+    for kind in kinds:
+        names = {"value": kind.column, "standard_error": kind.error_column}
+        columns = ["experiment", *(["section"] if kind.velocity else []), "x", "y", *names.values()]
+        table = used[used["kind"] == kind.name].rename(columns=names)[columns]
+        texts[kind.file] = str(table.to_csv(index=False, float_format="%.5f"))
     target = folder / f"{name}.yaml"
     if target.resolve() == case.source:
         raise InputError(f"--to {shown_path(folder)}: holds the config that the twin is made of; give another folder.")
@@ -88,25 +96,8 @@ def in_rows_of_twin(answer: Answer, station: pd.DataFrame) -> Answer:
     return replace(answer, hidden=tuple(hidden))
 
 
-def _on_the_map(case: Case, station: pd.DataFrame) -> pd.DataFrame:
-    """Points of the grid on the map, as files of stations have them; as they are without a centreline."""
-    line, at_point = centreline_in(case), [kind_of(name).at_point for name in station["kind"]]
-    if line is None:
-        return station
-    x, y = on_map(line, station["x"].to_numpy(float), station["y"].to_numpy(float))
-    return station.assign(x=station["x"].where(~np.array(at_point), x), y=station["y"].where(~np.array(at_point), y))
-
-
-def _stations(used: pd.DataFrame, kind: Kind) -> str:
-    """The stations of a kind as a table."""
-    names = {"value": kind.column, "standard_error": kind.error_column}
-    named = used[used["kind"] == kind.name].rename(columns=names)
-    columns = ["experiment", *(["section"] if kind.velocity else []), "x", "y", *names.values()]
-    return str(named[columns].to_csv(index=False, float_format="%.5f"))
-
-
 def config_in(folder: Path) -> Path:
-    """The config that `write_twin` left there, beside its children maybe. Errors: InputError when it cannot be told."""
+    """The config that `write_twin` left there, beside its children maybe. Errors: InputError if it is not clear."""
     own = folder / f"{case_name(folder.resolve().name, 'twin')}.yaml"
     found = [own] if own.is_file() else sorted(folder.glob("*.yaml"))
     if len(found) != 1:
@@ -125,12 +116,33 @@ def make_twin(
     seed: int = 1,
     force: bool = False,
 ) -> Case:
-    """Make measurements at the stations of a case from a truth that hides something; config, tables and the sealed
-    answer are written into a folder.
+    """Make synthetic measurements at the stations of a case, from a truth that hides something.
 
-    hide: `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `nothing`, or `?` for any; snr: how visible an effect
-    without a size is made [standard errors]; noise: `white`, `ar1:0.5` or `understated:1.5`; force: replace
-    files there that vegglue did not write, too. Errors: InputError.
+    Config, tables and the encoded truth are written into a folder.
+
+    Parameters
+    ----------
+    case : Case
+    to : Path or str
+        The folder.
+    hide : sequence of str
+        `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `nothing`, or `?` for any.
+    snr : float
+        How visible an effect without a size is made [standard errors].
+    noise : str
+        `white`, `ar1:0.5` or `understated:1.5`.
+    seed : int
+    force : bool
+        Whether to replace files that vegglue did not write.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        For an unknown effect or noise, an effect that cannot be seen, or if a file would be replaced.
     """
     refuse_command(case, "twin")
     model = case_run(case, "runs").model
@@ -142,8 +154,25 @@ def make_twin(
 
 
 def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False) -> list[str]:
-    """Open the seal of a twin: what is true and, where there is a diagnosis of it, how well that guessed; one sentence
-    each. trust: as for `load_case`. Errors: InputError when there is no seal, or it is broken.
+    """Report the truth of a twin and, if it was diagnosed, how well the diagnosis found it.
+
+    Parameters
+    ----------
+    folder : Path or str
+    runs : Path or str
+        Folder that holds the folders of runs.
+    trust : bool
+        As for `load_case`.
+
+    Returns
+    -------
+    list of str
+        One sentence each.
+
+    Raises
+    ------
+    InputError
+        If the encoded truth is missing or damaged.
     """
     folder = Path(folder)
     answer = opened_answer(folder / SEAL)
@@ -164,7 +193,7 @@ class Mark:
     named: whether the verdict is this effect alone; inside: whether it is in the set; open: whether it is listed among
     what is not excluded; holds: whether the 95 % interval holds the true amplitude, None if it is not in the set; away:
     distance [m] of the nearest place found from the true one, NaN without either; groups: of effects that the data
-    cannot tell apart, for each step; said: the set; shapes: (name, found, true) of shapes that differ by 5 % or more.
+    cannot separate, for each step; said: the set; shapes: (name, found, true) of shapes that differ by 5 % or more.
     """
 
     hidden: Hidden

@@ -9,7 +9,7 @@
   const toldAt = (panel, k) => {
     const error = panel.error[k] === null ? "" : ` ± ${written(panel.error[k])}`;
     const why = panel.reason[k] ? `, ${panel.reason[k]}` : "";
-    const first = `${written(panel.measured[k])}${error}${panel.aside[k] ? ` (set aside${why})` : ""}`;
+    const first = `${written(panel.measured[k])}${error}${panel.aside[k] ? ` (excluded${why})` : ""}`;
     const model = panel.before ? "with it" : "model";
     const before = panel.before ? `, before ${written(panel.before[k])}` : "";
     const y = String(panel.y[k]).replace("-", "−");

@@ -41,7 +41,7 @@ from vegglue.engine.interface import Model, linearise, predict
 from vegglue.measurements.kinds import leading_velocities
 from vegglue.measurements.observations import section_places, station_table
 
-# How often errors alone exceed what is told of them; 5 % is usual.
+# How often errors alone exceed the reported bound; 5 % is usual.
 BY_CHANCE = 0.05
 
 
@@ -84,8 +84,8 @@ def held_out_errors(base: Baseline, held_out: Model) -> HeldOutErrors:
     return HeldOutErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
 
 
-# Share of the cases in which the errors are to be smaller than what is told, and draws of them: the 95 % point of 2,000
-# is known to half a per cent of the share.
+# Share of the cases in which the errors are to be smaller than the reported bound, and draws of them: the 95 % point of
+# 2,000 is known to half a per cent of the share.
 SHARE_BELOW, DRAWN_ERRORS = 0.95, 2000
 
 

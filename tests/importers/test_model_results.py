@@ -1,0 +1,155 @@
+"""Finished results of other models: each format read back from a flow that is known, with its traps."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from result_files import GridFlow, at_nodes, write_flow_fm, write_hec_ras, write_selafin, write_trim
+
+from vegglue.errors import InputError
+from vegglue.importers.finished_results import holds_result, read_result
+from vegglue.importers.model_result import DRY_DEPTH
+
+
+def a_flow(angle: float = 30.0) -> GridFlow:
+    """A flow that is linear in x and y, so that means at faces and corners are exact; one bank is dry."""
+    x, y = np.linspace(0.0, 60.0, 13), np.linspace(-6.0, 6.0, 7)
+    cx, cy = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), indexing="ij")
+    depth = np.where(cy > 4.0, 0.0, 1.0 + 0.002 * cx)
+    wet = depth > 0.0
+    u, v = np.where(wet, 0.6 + 0.01 * cy, 0.0), np.where(wet, 0.05 + 0.001 * cx, 0.0)
+    bed = 10.0 - 0.001 * cx + np.where(cy > 4.0, 2.0, 0.0)
+    return GridFlow(x, y, bed, depth, u, v, np.full(bed.shape, 0.03), (683000.0, 247000.0), angle)
+
+
+def compare(result, flow: GridFlow, tolerance: float = 2e-5) -> None:
+    """All fields of cells, which are in the order of the grid."""
+    wet, (east, north) = flow.depth.ravel() > 0.0, flow.velocity
+    for got, wanted in zip((result.x, result.y), flow.centres, strict=True):
+        np.testing.assert_allclose(got, wanted.ravel(), atol=1e-3)
+    np.testing.assert_array_equal(result.wet, wet)
+    np.testing.assert_allclose(result.bed, flow.bed.ravel(), atol=tolerance)
+    np.testing.assert_allclose(result.depth, flow.depth.ravel(), atol=tolerance)
+    assert np.isnan(result.level[~wet]).all()
+    assert not result.u[~wet].any()
+    inner = np.zeros(flow.depth.shape, bool)
+    inner[1:-1, 1:-3] = True  # beside walls and the dry bank a face is no mean of two cells
+    for got, wanted in ((result.u, east), (result.v, north)):
+        np.testing.assert_allclose(got[inner.ravel()], wanted[inner], atol=tolerance)
+    np.testing.assert_allclose(result.manning()[wet & np.isfinite(result.manning())], 0.03, rtol=1e-4)
+
+
+@pytest.mark.parametrize("feet", [False, True])
+@pytest.mark.parametrize("version", ["5.0.5", "6.1"])
+def test_hec_ras(tmp_path: Path, feet: bool, version: str) -> None:
+    flow, path = a_flow(), tmp_path / "reach.p01.hdf"
+    write_hec_ras(path, flow, feet, version)
+    result = read_result(path)
+    assert (result.code, result.time) == ("HEC-RAS", "01JAN2020 12:00:00")
+    compare(result, flow)
+    assert result.corners.shape == (13 * 7, 2)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {},
+        {"double": True},
+        {"order": "<", "double": True},
+        {"french": True},
+        {"offset": (683000, 247000)},
+        {"cut": True},
+    ],
+)
+def test_selafin(tmp_path: Path, how: dict) -> None:
+    flow, path = a_flow(), tmp_path / "reach.slf"
+    write_selafin(path, flow, **how)
+    assert holds_result(path)
+    result, (east, north) = read_result(path), flow.velocity
+    single = not how.get("double") and not how.get("offset")  # a large coordinate with 24 bits is good to 3 cm
+    for got, wanted in zip((result.x, result.y), flow.nodes, strict=True):
+        np.testing.assert_allclose(got, wanted.ravel(), atol=0.04 if single else 2e-5)
+    depth = at_nodes(flow.depth).ravel()
+    np.testing.assert_allclose(result.depth, np.where(depth > DRY_DEPTH, depth, 0.0), atol=1e-6)
+    wet = result.wet
+    assert 0 < wet.sum() < wet.size
+    np.testing.assert_allclose(result.u[wet], at_nodes(east).ravel()[wet], atol=1e-6)
+    np.testing.assert_allclose(result.v[wet], at_nodes(north).ravel()[wet], atol=1e-6)
+    assert result.time == "2020-01-02 03:04:05 + 60 s"
+    assert result.manning() is None
+    np.testing.assert_allclose(result.manning("manning"), 0.03, rtol=1e-6)
+    np.testing.assert_allclose(
+        replace(result, roughness=result.roughness * 1000.0).manning("strickler"), 1.0 / 30.0, rtol=1e-6
+    )
+
+
+def test_selafin_that_is_no_result(tmp_path: Path) -> None:
+    path = tmp_path / "reach.slf"
+    write_selafin(path, a_flow())
+    path.write_bytes(path.read_bytes()[:900])
+    with pytest.raises(InputError, match=r"reach\.slf"):
+        read_result(path)
+
+
+@pytest.mark.parametrize("classic", [True, False])
+def test_flow_fm(tmp_path: Path, classic: bool) -> None:
+    flow, path = a_flow(), tmp_path / "reach_map.nc"
+    write_flow_fm(path, flow, classic)
+    result = read_result(path)
+    assert (result.code, result.crs) == ("D-Flow FM", "EPSG:28992")
+    compare(result, flow)
+
+
+def test_ghost_cells_of_a_partition(tmp_path: Path) -> None:
+    flow, path = a_flow(), tmp_path / "reach_0000_map.nc"
+    write_flow_fm(path, flow, ghosts=6)
+    assert read_result(path).x.size == flow.bed.size - 6
+
+
+@pytest.mark.parametrize("clockwise", [False, True])
+def test_trim(tmp_path: Path, clockwise: bool) -> None:
+    """U at a face is the mean of both centres, of a field linear in y: the mean of both faces is the field."""
+    flow, path = a_flow(), tmp_path / "trim-reach.nc"
+    write_trim(path, flow, clockwise)
+    result = read_result(path)
+    assert (result.code, result.manning()) == ("Delft3D-4", None)
+    compare(replace(result, roughness=np.full(result.x.size, 0.03), roughness_kind="manning"), flow, 6e-4)
+
+
+def test_another_file(tmp_path: Path) -> None:
+    path = tmp_path / "table.nc"
+    path.write_text("x,y\n")
+    assert not holds_result(path)
+    with pytest.raises(InputError, match=r"table\.nc"):
+        read_result(path)
+
+
+def own_library(name: str):
+    return pytest.importorskip(name)
+
+
+@pytest.mark.parametrize("code", ["selafin", "ugrid"])
+def test_values_of_the_format_s_own_library(tmp_path: Path, code: str) -> None:
+    """Ten points, read by xarray-selafin and xugrid, which are no dependency."""
+    flow = a_flow()
+    points = np.random.default_rng(1).choice(60, 10, replace=False)
+    if code == "selafin":
+        own_library("xarray_selafin")
+        xarray = own_library("xarray")
+        path = tmp_path / "reach.slf"
+        write_selafin(path, flow)
+        with xarray.open_dataset(path, engine="selafin") as data:
+            theirs = {"depth": data["H"][-1], "u": data["U"][-1], "v": data["V"][-1]}
+            theirs = {key: np.asarray(one)[points] for key, one in theirs.items()}
+    else:
+        xugrid = own_library("xugrid")
+        path = tmp_path / "reach_map.nc"
+        write_flow_fm(path, flow)
+        data = xugrid.open_dataset(path)
+        theirs = {"depth": data["mesh2d_waterdepth"], "u": data["mesh2d_ucx"], "v": data["mesh2d_ucy"]}
+        theirs = {key: np.asarray(one[-1])[points] for key, one in theirs.items()}
+    ours = read_result(path)
+    for key, one in theirs.items():
+        there = one > -0.005 if key == "depth" else slice(None)
+        np.testing.assert_allclose(getattr(ours, key)[points][there], one[there], atol=1e-7)

@@ -1,0 +1,199 @@
+"""Is what `vegglue plan` calls detectable detected? `python tests/studies/plan.py CONFIG --sets 60 --minutes 4`,
+and with `--compare 24` a proposed plan against plans made by hand.
+
+The plan of the stations of a config states for each listed effect the size that is detected nine times of ten, and the
+chance that a plausible size is. Twins of the built-in engine hide testable effects at that size, and effects that are
+hidden to the plan at a plausible size, each with parameters, errors and a sign of its own. An effect counts as detected
+if the diagnosis is alarmed, and as named if it is among the effects of a step, alone or as one of a few. Records are
+appended to data/plan/CONFIG.jsonl, and a set that is there is not made again.
+"""
+
+import argparse
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import scipy.stats
+
+import vegglue
+from vegglue.case.schema import Case, Planned, PlannedGauge, PlannedTransect
+from vegglue.case.zones import corners_of
+from vegglue.diagnosis.plan import plan_measurements, planned_pieces
+from vegglue.errors import InputError
+from vegglue.results.plan import FieldPlan, PlannedEffect, hours_of
+from vegglue.workflow.case_run import CaseRun
+
+ROOT = Path(__file__).parents[2]
+# Of three sets, two hide what is said to be detected and one what is said to be hidden.
+HIDDEN_EVERY = 3
+
+
+def candidates(plan: FieldPlan) -> tuple[list[PlannedEffect], list[PlannedEffect]]:
+    """Effects of the whole case, of experiments and patches, that are said to be detected, and to be hidden."""
+    seen = [one for one in plan.effects if one.testable]
+    return seen, [one for one in plan.effects if one.hidden and np.isfinite(one.plausible)]
+
+
+def one_set(config: Path, plan: FieldPlan, number: int) -> dict[str, Any] | None:
+    """The record of one twin; None if it cannot be made."""
+    seen, hidden = candidates(plan)
+    said_hidden = number % HIDDEN_EVERY == HIDDEN_EVERY - 1 and bool(hidden)
+    random = np.random.default_rng((number, 63))
+    of = hidden if said_hidden else seen
+    effect = of[int(random.integers(len(of)))]
+    size = min(effect.plausible, effect.furthest) if said_hidden else effect.smallest
+    case = vegglue.load_case(config)
+    off, low, high = amplitude_of(case, effect.name)
+    signs = [sign for sign in (1.0, -1.0) if low <= off + sign * size <= high]
+    value = off + float(random.choice(signs)) * size
+    with TemporaryDirectory() as name:
+        folder = Path(name) / "riddle"
+        try:
+            twin = vegglue.make_twin(case, folder, hide=[f"{effect.name}={value!r}"], seed=number + 1)
+        except InputError as error:
+            return {"set": number, "effect": effect.name, "failed": str(error)}
+        began = time.monotonic()
+        found = vegglue.diagnose(twin, runs=Path(name) / "runs")
+        seconds = time.monotonic() - began
+    verdict = found.verdict
+    alarmed = bool(found.steps or found.places or found.instruments)
+    named = sorted({rival for step in found.steps for rival in step.rivals})
+    similar = [other.name for other in effect.confused if other.cosine > 0.9]
+    return {
+        "set": number, "effect": effect.name, "amplitude": value, "said": "hidden" if said_hidden else "detected",
+        "kind": verdict.kind, "alarm": alarmed or verdict.kind != "nothing-missing",
+        "named": effect.name in named, "similar_named": any(one in named for one in similar),
+        "accepted": [step.accepted for step in found.steps], "places": len(found.places), "seconds": round(seconds, 1),
+        "said_of_it": {key: asdict(effect)[key] for key in ("smallest", "plausible", "chance_plausible")},
+    }  # fmt: skip
+
+
+def amplitude_of(case: Any, name: str) -> tuple[float, float, float]:
+    """Off, lowest and highest of the amplitude of an effect."""
+    from vegglue.effects.identity import EffectIdentity
+    from vegglue.effects.library import library
+
+    amplitude = library(case.effect_file)[EffectIdentity.parse(name).name].amplitude
+    return amplitude.off, amplitude.low, amplitude.high
+
+
+def share(found: list[bool]) -> str:
+    """A share with its 95 % interval (Clopper and Pearson)."""
+    count, number = sum(found), len(found)
+    if not number:
+        return "none"
+    low = scipy.stats.beta.ppf(0.025, count, number - count + 1) if count else 0.0
+    high = scipy.stats.beta.ppf(0.975, count + 1, number - count) if count < number else 1.0
+    return f"{count} of {number}, {100 * count / number:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def figures(records: list[dict[str, Any]]) -> str:
+    """What the records show, in lines."""
+    good = [one for one in records if "failed" not in one]
+    lines = []
+    for said in ("detected", "hidden"):
+        of = [one for one in good if one["said"] == said]
+        lines.append(f"said to be {said}: alarm in {share([one['alarm'] for one in of])}")
+        lines.append(f"  named: {share([one['named'] for one in of])}")
+        lines.append(f"  named, or one that is alike: {share([one['named'] or one['similar_named'] for one in of])}")
+    return "\n".join(lines)
+
+
+def counted(plan: FieldPlan) -> tuple[int, int]:
+    """Effects of the case, of experiments and of patches that are testable, and all; those of sections are left out,
+    as each section brings its own.
+    """
+    of_places = ("probe_gain", "station_shift", "device_gain", "zero_offset")
+    kept = [one for one in plan.effects if not one.name.startswith(of_places)]
+    return sum(one.testable for one in kept), len(kept)
+
+
+def made_by_hand(case: Case, hours: float, beside_plants: bool) -> list[Planned]:
+    """Transects equally spaced along the reach, or all beside the plants, with a gauge at each, in one flow and more:
+    as many as fit the hours.
+    """
+    site = CaseRun(case).model
+    low, high = case.grid.x
+    ends = [corners_of(case, patch)[:, 0] for patch in case.plants.patches]
+    found, names = [], list(case.experiments)
+    for flows in range(1, len(names) + 1):
+        best = None
+        for count in range(1, 30):
+            x = np.linspace(low, high, count + 2)[1:-1]
+            if beside_plants:
+                middles = [0.5 * (one.min() + one.max()) for one in ends]
+                x = np.array((middles * count)[:count]) if count <= len(middles) else np.array(middles)
+            x = np.round(x, 1)
+            transects = tuple(
+                PlannedTransect(x=float(one), spacing=0.5, experiments=tuple(names[-flows:])) for one in x
+            )
+            gauges = tuple(PlannedGauge(x=float(one), experiments=tuple(names[-flows:])) for one in x)
+            planned = Planned(hours=hours, transects=transects, gauges=gauges)
+            pieces = planned_pieces(site, planned)
+            if hours_of(pieces, planned.costs.discharge) > hours:
+                break
+            best = planned
+            if beside_plants and count > len(ends):
+                break
+        if best is not None:
+            found.append(best)
+    return found
+
+
+def compare(config: Path, hours: float) -> str:
+    """A plan proposed for some hours against plans made by hand, each with the number of flows that is best for it."""
+    case = vegglue.load_case(config).model_copy(update={"observations": (), "planned": Planned(hours=hours)})
+    lines = []
+    began = time.process_time()
+    plan = plan_measurements(CaseRun(case).model)
+    lines.append(
+        f"proposed: {counted(plan)} testable in {plan.hours:.1f} h ({time.process_time() - began:.1f} s of CPU)"
+    )
+    for beside in (False, True):
+        shown = []
+        for planned in made_by_hand(case, hours, beside):
+            with_plan = case.model_copy(update={"planned": planned})
+            plan = plan_measurements(CaseRun(with_plan).model)
+            flows = len({one.experiment for one in plan.pieces})
+            shown.append(
+                f"{counted(plan)} with {len(planned.transects)} transects in {flows} flows, {plan.hours:.1f} h"
+            )
+        lines.append(f"{'beside the plants' if beside else 'equally spaced'}: {'; '.join(shown)}")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("config", type=Path)
+    parser.add_argument("--sets", type=int, default=60)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--folder", type=Path, default=ROOT / "data/plan")
+    parser.add_argument("--compare", type=float, help="hours: compare a proposed plan with plans made by hand instead")
+    given = parser.parse_args()
+    if given.compare is not None:
+        print(compare(given.config, given.compare))
+        return
+    case = vegglue.load_case(given.config)
+    path = given.folder / f"{case.name}.jsonl"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    records = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    done = {one["set"] for one in records}
+    began = time.monotonic()
+    plan = plan_measurements(CaseRun(case).model) if len(done) < given.sets else None
+    for number in range(given.sets):
+        if number in done or plan is None or time.monotonic() - began > 60.0 * given.minutes:
+            continue
+        record = one_set(given.config, plan, number)
+        if record is not None:
+            records.append(record)
+            with path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(record) + "\n")
+    print(figures(records))
+
+
+if __name__ == "__main__":
+    main()

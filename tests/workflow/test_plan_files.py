@@ -1,0 +1,138 @@
+"""What a plan leaves to take along: stations on the map, waypoints, sheets that import reads back, and the page."""
+
+import csv
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from small_case import SMALL
+
+import vegglue
+from vegglue.case.config import load_case
+from vegglue.errors import InputError
+from vegglue.measurements.observations import read_observations
+from vegglue.pages.plan import confusions, days_of_work
+from vegglue.results.plan import FieldPlan
+from vegglue.results.plan_files import field_places, field_stations
+
+# Of UTM zone 32: the central meridian of 9 degrees east has the easting 500,000 m, the equator the northing 0.
+FRAME = """
+frame: {origin: [500000, 5000000], angle: 30, crs: "EPSG:32632"}
+planned:
+  transects: [{x: 9, spacing: 0.5}, {x: 16, spacing: 1.0}]
+  gauges: [{x: 5}]
+  points: [{x: 12, y: 0.7}]
+  costs: {transect: 3.0}
+"""
+Made = tuple[Path, FieldPlan]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    folder = tmp_path_factory.mktemp("field")
+    config = folder / "small.yaml"
+    config.write_text(SMALL + FRAME, encoding="utf-8")
+    return folder, vegglue.plan(load_case(config), runs=folder / "runs")
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_stations_stand_on_the_map(made: Made) -> None:
+    folder, plan = made
+    rows = rows_of(folder / "runs/small/plan/stations.csv")
+    assert len(rows) == sum(len(one.y) for one in plan.pieces)
+    assert [one.name for one in field_places(plan)] == ["T1", "T2", "V1", "G1"]
+    gauge = next(row for row in rows if row["station"] == "G1")
+    assert (gauge["x"], gauge["work"], gauge["flows"]) == ("5", "gauge", "low")
+    cosine, sine = np.cos(np.radians(30)), np.sin(np.radians(30))
+    x, y = float(gauge["x"]), float(gauge["y"])
+    assert float(gauge["east"]) == pytest.approx(500000 + x * cosine - y * sine, abs=0.01)
+    assert float(gauge["north"]) == pytest.approx(5000000 + x * sine + y * cosine, abs=0.01)
+
+
+def test_waypoints_are_in_degrees(made: Made) -> None:
+    pytest.importorskip("pyproj")
+    folder, plan = made
+    tree = ElementTree.parse(folder / "runs/small/plan/stations.gpx")
+    points = tree.findall("{http://www.topografix.com/GPX/1/1}wpt")
+    assert len(points) == sum(len(one.y) for one in plan.pieces)
+    stations, without = field_stations(load_case(folder / "small.yaml"), plan)
+    assert without == ""
+    # 5,000 km north of the equator: 45.15 degrees; a degree along the parallel is 78.8 km there.
+    assert np.array([one.latitude for one in stations]) == pytest.approx(45.153, abs=2e-3)
+    east = np.array([one.east - 500000 for one in stations])
+    assert np.array([one.longitude - 9.0 for one in stations]) == pytest.approx(east / 78_700, abs=1e-5)
+
+
+def test_without_a_system_there_are_no_waypoints(made: Made) -> None:
+    folder, plan = made
+    case = load_case(folder / "small.yaml")
+    assert field_stations(case.model_copy(update={"frame": None}), plan)[1] == "frame"
+    assert case.frame is not None
+    assert (
+        field_stations(case.model_copy(update={"frame": case.frame.model_copy(update={"crs": None})}), plan)[1] == "crs"
+    )
+
+
+def test_the_sheet_filled_in_is_imported_without_an_edit(made: Made, tmp_path: Path) -> None:
+    folder, plan = made
+    sheet = folder / "runs/small/plan/sheet"
+    for name, column in (("velocities.csv", "u"), ("levels.csv", "level")):
+        rows = rows_of(sheet / name)
+        for number, row in enumerate(rows):
+            row[column] = "" if number == 2 else f"{0.5 + 0.01 * number:.2f}" if column == "u" else "0.93"
+        with (sheet / name).open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, list(rows[0]))
+            writer.writeheader()
+            writer.writerows(rows)
+    case = vegglue.import_folder(sheet, tmp_path / "measured.yaml")
+    assert case.planned is None
+    assert list(case.parameters) == ["n_b", "phi"]
+    table = read_observations(case).table
+    velocities = table[table["kind"] == "velocity"]
+    assert len(velocities) == sum(len(one.y) for one in plan.pieces if one.work.value != "gauge") - 1
+    assert sorted(velocities["x"].unique()) == [9.0, 12.0, 16.0]
+    assert velocities["value"].iloc[3] == pytest.approx(0.54)
+    assert (table["standard_error"] > 0).all()
+    assert table["used"].all()
+
+
+def test_an_empty_sheet_is_refused(tmp_path: Path) -> None:
+    config = tmp_path / "small.yaml"
+    config.write_text(SMALL + FRAME, encoding="utf-8")
+    vegglue.plan(load_case(config), runs=tmp_path / "runs")
+    with pytest.raises(InputError):
+        vegglue.import_folder(tmp_path / "runs/small/plan/sheet", tmp_path / "measured.yaml")
+    assert not (tmp_path / "measured.yaml").exists()
+
+
+def test_days_are_eight_hours_at_most_and_hold_all_work(made: Made) -> None:
+    folder, plan = made
+    days = days_of_work(load_case(folder / "small.yaml"), plan, field_places(plan))
+    assert len(days) == 2
+    assert sum(len(day.work) for day in days) == len(plan.pieces)
+    assert all(day.work[-1].ends <= 8.0 + 1e-9 or len(day.work) == 1 for day in days)
+    assert days[0].work[0].place.name == "G1"
+
+
+def test_the_page_and_the_object_hold_the_plan(made: Made) -> None:
+    folder, plan = made
+    page = (folder / "runs/small/plan/plan.html").read_text(encoding="utf-8")
+    for one in (*plan.effects, *field_stations(load_case(folder / "small.yaml"), plan)[0]):
+        assert one.name in page
+    assert page.count("<circle") >= sum(len(one.y) for one in plan.pieces if one.work.value != "gauge")
+    tree = json.loads((folder / "runs/small/plan/plan.json").read_text(encoding="utf-8"))
+    assert tree["hours"] == pytest.approx(plan.hours)
+    assert [one["name"] for one in tree["effects"]] == [one.name for one in plan.effects]
+
+
+def test_effects_that_look_alike_are_one_group(made: Made) -> None:
+    _, plan = made
+    groups = confusions(plan.effects)
+    assert len({name for group in groups for name in group}) == sum(map(len, groups))
+    assert any({"smagorinsky", "mixing_length"} <= set(group) for group in groups)

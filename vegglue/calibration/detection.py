@@ -1,0 +1,186 @@
+"""Which size of what is missing a set of measurements would show, and what each piece of it adds.
+
+    P(T^2 > t^2) = 1 - F(t^2; 1, l^2),   l = |g| |S_perp|
+
+T is the score of a fingerprint S whose gain is g; its square has a noncentral chi2 distribution with one degree of
+freedom. t is the threshold of a diagnosis, and |S_perp| the length of the fingerprint after what calibration can mimic
+is projected out, see `score_test`. If g itself is normal around zero with a plausible size s,
+
+    P(T^2 > t^2) = 2 Phi(-t / (1 + a^2)^(1/2)),   a = s |S_perp|.
+
+Measurements whose own errors are independent add their information. With columns X = D^(-1/2) [J, U, S], J the slopes
+of the parameters, U the columns of all shared errors (covariance D + U U') and D the own errors,
+
+    A = sum over pieces of X' X,   |S_perp|^2 = A_SS - A_SN (1 + A_NN)^-1 A_NS,   N = [J, U],
+
+since parameters and shared errors have standard normal priors (Woodbury's identity). So a piece is added or taken away
+without the measurements themselves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from scipy.special import ndtr
+
+from vegglue.arrays import Array
+from vegglue.calibration.score_test import HypothesisKind, log_factors, prior_shrinkage
+
+# Chance with which what is called detectable before measuring is detected [-].
+PLANNED_POWER = 0.9
+# Largest score that is looked for [standard errors]: no data have more, and a longer fingerprint hides nothing.
+LARGEST_SCORE = 1e6
+# Halvings of an interval of lengths or of scores, which leave 1e-12 of it.
+HALVINGS = 40
+# Shared errors whose standard deviation is below this share of a station's own error count as its own [-].
+SMALL_SHARE = 0.05
+# Independent patterns of shared errors that are kept at most. Chosen: those left out are counted as own errors.
+MOST_PATTERNS = 120
+
+
+def detection_chance(length: Array, threshold: Array, only_sign: np.ndarray | int = 0) -> Array:
+    """Chance that a score exceeds a threshold.
+
+        P = Phi(l - t) + Phi(-l - t)
+
+    Parameters
+    ----------
+    length : array
+        l, standard errors by which the score is shifted [-].
+    threshold : array
+        t [standard errors].
+    only_sign : array of int
+        Nonzero if only a score of one sign counts: the second term is then absent.
+
+    Returns
+    -------
+    array
+        [-], one minus the noncentral chi2 distribution of t^2 with one degree of freedom and noncentrality l^2.
+    """
+    other = np.where(np.asarray(only_sign) == 0, ndtr(-np.abs(length) - threshold), 0.0)
+    return np.asarray(ndtr(np.abs(length) - threshold) + other)
+
+
+def detected_length(threshold: Array, chance: float = PLANNED_POWER, only_sign: np.ndarray | int = 0) -> Array:
+    """l at which `detection_chance` is `chance` [standard errors], by halving."""
+    threshold = np.asarray(threshold, dtype=float)
+    low, high = np.zeros_like(threshold), threshold + 10.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        enough = detection_chance(middle, threshold, only_sign) >= chance
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    return np.asarray(high)
+
+
+def chance_over_prior(size: Array, threshold: Array) -> Array:
+    """2 Phi(-t / (1 + a^2)^(1/2)): chance that an effect is detected whose gain is normal with a = s |S_perp| [-]."""
+    return np.asarray(2.0 * ndtr(-threshold / np.hypot(1.0, size)))
+
+
+def chance_to_separate(distance: Array) -> Array:
+    """Phi(D / 2): chance that of two equally probable hypotheses D standard errors apart the true one is likelier."""
+    return np.asarray(ndtr(0.5 * np.sqrt(np.maximum(distance, 0.0))))
+
+
+def alarm_thresholds(kind: HypothesisKind, columns: Sequence[np.ndarray], level: float) -> Array:
+    """Score of each column at which its own effect alone sounds the alarm of a diagnosis (c,) [standard errors].
+
+        ln sum_k exp(ln B_k(c_jk t) + ln prior_k) = level,   k over the columns of the effect of j
+
+    c_jk is the cosine between projected fingerprints: settings of one effect rise together. What other hypotheses add
+    is left out, so that the chance of detection is a lower bound.
+    """
+    units, found = kind.projected.units, single_threshold(kind.size, kind.log_prior, level)
+    for own in columns:
+        if own.size == 1:
+            continue
+        cosine = units[:, own].T @ units[:, own]
+        size, prior = kind.size[own], kind.log_prior[own]
+        low, high = np.zeros(own.size), found[own]  # others only add
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            evidence = log_factors(middle[:, None] * cosine, size) + prior
+            enough = np.logaddexp.reduce(evidence, axis=1) >= level
+            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        found[own] = high
+    return found
+
+
+def single_threshold(size: Array, log_prior: Array, level: float) -> Array:
+    """t of one hypothesis by itself (c,): t^2 = 2 (level - ln prior + 1/2 ln(1 + a^2)) (1 + a^2) / a^2."""
+    needed = np.maximum(2.0 * (level - log_prior) + np.log1p(size**2), 0.0)
+    return np.asarray(np.minimum(np.sqrt(needed / np.maximum(prior_shrinkage(size), 1e-300)), LARGEST_SCORE))
+
+
+def own_and_shared(own_variance: Array, shared: Array) -> tuple[Array, Array]:
+    """The covariance D + U U' of errors with fewer columns.
+
+    Parameters
+    ----------
+    own_variance : array (n,)
+        D, squares of the errors of each measurement by itself.
+    shared : array (n, k)
+        U.
+
+    Returns
+    -------
+    tuple of array (n,) and array (n, r)
+        D' and U' with at most MOST_PATTERNS columns. What U' lacks is in D', so that each measurement keeps its
+        variance.
+
+    References
+    ----------
+    Halko et al. (2011), doi:10.1137/090771806, for the range of many columns; not checked against it.
+    """
+    if not shared.size:
+        return own_variance, np.zeros((own_variance.size, 0))
+    white = shared / np.sqrt(own_variance)[:, None]
+    if min(white.shape) > 2 * MOST_PATTERNS:  # the range of U by random vectors
+        random = np.random.default_rng(0).standard_normal((white.shape[1], 2 * MOST_PATTERNS))
+        basis, _ = np.linalg.qr(white @ random)
+        left, strength, _ = np.linalg.svd(basis.T @ white, full_matrices=False)
+        left = basis @ left
+    else:
+        left, strength, _ = np.linalg.svd(white, full_matrices=False)
+    kept = np.flatnonzero(strength > SMALL_SHARE)[:MOST_PATTERNS]
+    columns = left[:, kept] * strength[kept]
+    rest = np.maximum((white**2).sum(axis=1) - (columns**2).sum(axis=1), 0.0)
+    return own_variance * (1.0 + rest), columns * np.sqrt(own_variance)[:, None]
+
+
+@dataclass(frozen=True)
+class Information:
+    """A = X' X of some measurements (m, m), its first `nuisances` columns those of parameters and shared errors."""
+
+    matrix: Array
+    nuisances: int
+
+    def __add__(self, other: "Information") -> "Information":
+        return Information(self.matrix + other.matrix, self.nuisances)
+
+    def __sub__(self, other: "Information") -> "Information":
+        return Information(self.matrix - other.matrix, self.nuisances)
+
+    def visible(self) -> Array:
+        """S_perp' S_perp (c, c): lengths and cosines of the traces that calibration cannot mimic."""
+        n = self.nuisances
+        known = self.matrix[:n, :n] + np.eye(n)
+        mixed = scipy.linalg.solve_triangular(np.linalg.cholesky(known), self.matrix[:n, n:], lower=True)
+        return np.asarray(self.matrix[n:, n:] - mixed.T @ mixed)
+
+    def lengths(self) -> Array:
+        """|S_perp| of each trace (c,) [standard errors per unit of gain]."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.visible()), 0.0)))
+
+
+def information(own_variance: Array, nuisances: Array, traces: Array, rows: np.ndarray) -> Information:
+    """Of the measurements `rows`: nuisances (n, q) and traces (n, c) in the unit of a station."""
+    columns = np.hstack([nuisances[rows], traces[rows]]) / np.sqrt(own_variance[rows])[:, None]
+    return Information(columns.T @ columns, nuisances.shape[1])
+
+
+def squared_distances(visible: Array) -> Array:
+    """D^2 (c, c) of each trace from what is left when another one may have any size: G_ii - G_ij^2 / G_jj [-]."""
+    own = np.maximum(np.diag(visible), 1e-300)
+    return np.asarray(np.maximum(own[:, None] - visible**2 / own[None], 0.0))

@@ -1,0 +1,95 @@
+"""A result file of another model, read by the reader of its format; in a process of its own first."""
+
+from pathlib import Path
+
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.delft3d_trim import read_delft3d_trim
+from vegglue.importers.hec_ras import read_hec_ras
+from vegglue.importers.library_files import read_by_library
+from vegglue.importers.model_result import ModelResult, netcdf_variables
+from vegglue.importers.selafin import looks_like_selafin, read_selafin
+from vegglue.importers.ugrid import read_ugrid
+from vegglue.sandboxed_reader import why_unreadable
+
+# Largest file that is read [bytes]. Chosen: results of long runs are large, and of these only the final state is read.
+LARGEST_RESULT = 50_000_000_000
+# Endings of files that may hold a result, besides what stands in them.
+ENDINGS = (".hdf", ".slf", ".nc", ".res")
+HDF5, NETCDF = b"\x89HDF", b"CDF"
+IN_ITS_PROCESS = f"{__name__}:why_no_result"
+
+
+def holds_result(path: Path) -> bool:
+    """Whether a file of a folder is a finished result of a model, by its name and its first bytes."""
+    if path.suffix.lower() not in ENDINGS or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        head = file.read(4)
+    return head == HDF5 or head[:3] == NETCDF or looks_like_selafin(path)
+
+
+def read_result(path: Path) -> ModelResult:
+    """The final state in a result file of HEC-RAS 2D, TELEMAC-2D, D-Flow FM, Delft3D-4, or on a UGRID mesh.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    ModelResult
+        In SI units.
+
+    Raises
+    ------
+    InputError
+        If the file is of another format, damaged, or lacks what is needed.
+    StorageError
+        If no process can be started to read it.
+    """
+    try:
+        state = path.stat()
+    except OSError as error:
+        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
+    if state.st_size > LARGEST_RESULT:
+        raise InputError(
+            f"{shown_path(path)}: expected at most {LARGEST_RESULT:,} bytes, got {state.st_size:,}; "
+            "keep the last time alone."
+        )
+    why = why_unreadable(path.absolute(), min(state.st_size, 10**9), state.st_mtime_ns, by=IN_ITS_PROCESS)
+    if why is not None:
+        raise InputError(f"{shown_path(path)} cannot be read as a result of a model: {why}; write it anew.")
+    return _read(path)
+
+
+def _read(path: Path) -> ModelResult:
+    with path.open("rb") as file:
+        head = file.read(4)
+    if looks_like_selafin(path):
+        return read_selafin(path)
+    if head != HDF5 and head[:3] != NETCDF:
+        raise InputError(
+            f"{shown_path(path)}: expected a result of HEC-RAS (.hdf), TELEMAC (.slf), D-Flow FM, Delft3D-4 or "
+            "UGRID (.nc), got another file."
+        )
+    with read_by_library(path, "a result of a model", limit=LARGEST_RESULT):
+        with netcdf_variables(path) as variables:
+            names = set(variables)
+            mesh = any(one.text("cf_role") == "mesh_topology" for one in variables.values())
+        if mesh:
+            return read_ugrid(path)
+        if {"U1", "V1", "S1"} <= names:
+            return read_delft3d_trim(path)
+        return read_hec_ras(path)
+
+
+def why_no_result(path: str) -> str | None:
+    """Read a result and drop what comes: None, as the next reader meets its errors, which harm nothing."""
+    try:
+        _read(Path(path))
+    except MemoryError:
+        raise
+    except Exception:  # on damaged files libraries raise anything
+        return None
+    return None

@@ -1,0 +1,158 @@
+"""The plan of HEC-RAS 2D with its results (.p01.hdf), of 5.0 to 6.x, read as HDF5.
+
+Format: Geometry/2D Flow Areas/<name> (cells, faces) and Results/Unsteady/Output/Output Blocks/Base Output/Unsteady Time
+Series/2D Flow Areas/<name> (Water Surface of cells, Face Velocity). Ghost cells beyond the perimeter come last, and
+their bed is NaN. The bed of a cell is its lowest point, so that a depth is the largest one in the cell; the water
+surface of a dry cell is its bed.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.model_result import (
+    DRY_DEPTH,
+    FOOT,
+    LENGTHS,
+    US_SURVEY_FOOT,
+    ModelResult,
+    model_result,
+    text_of,
+)
+
+AREAS = "Geometry/2D Flow Areas"
+SERIES = "Results/Unsteady/Output/Output Blocks/Base Output/Unsteady Time Series"
+# Smallest eigenvalue of the normals of a cell over the largest [-], below which its faces give one component only.
+ONE_DIRECTION = 1e-3
+
+
+def read_hec_ras(path: Path) -> ModelResult:
+    """The final state of a plan; all 2D flow areas together.
+
+    Parameters
+    ----------
+    path
+        A plan (.p01.hdf) that was computed.
+
+    Returns
+    -------
+    ModelResult
+        At the centres of its cells. Velocities are fits by least squares to the normal velocities of the faces of a
+        cell, weighted by the wetted area of each.
+
+    Raises
+    ------
+    InputError
+        If it holds no geometry, or no result, of a 2D flow area.
+    """
+    with h5py.File(path) as file:
+        results = file.get(f"{SERIES}/2D Flow Areas")
+        geometry = file.get(AREAS)
+        held = () if geometry is None else geometry
+        names = [name for name in results or () if f"{name}/Cells Center Coordinate" in held]
+        if not names:
+            what = "results" if geometry is not None and results is None else "2D flow areas with their geometry"
+            raise InputError(
+                f"{shown_path(path)}: expected a computed plan of HEC-RAS 2D, got no {what}; compute it anew."
+            )
+        system, projection = text_of(file.attrs.get("Units System")), text_of(file.attrs.get("Projection"))
+        customary = "SI" not in system.upper() if system else False
+        horizontal = 1.0 if not customary else US_SURVEY_FOOT if "FOOT_US" in projection.upper() else FOOT
+        parts = [_area(geometry[name], results[name], FOOT if customary else 1.0, horizontal) for name in names]
+        stamps = file.get(f"{SERIES}/Time Date Stamp")
+        time = text_of(stamps[-1]) if stamps is not None and len(stamps) else ""
+        notes = [f"{sum(part['ghosts'] for part in parts)} ghost cells left out"]
+        notes += ["feet turned into metres"] if customary else []
+        corners = np.vstack([part.pop("corners") for part in parts])
+        joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key not in ("ghosts",)}
+        rough = joined.pop("roughness")
+        return model_result(
+            "HEC-RAS", **joined, corners=corners, roughness=rough if np.isfinite(rough).any() else None,
+            roughness_kind="manning", crs=projection if not customary else "", time=time, notes=tuple(notes),
+        )  # fmt: skip
+
+
+def _area(geometry: Any, results: Any, vertical: float, horizontal: float) -> dict[str, Any]:
+    """Places, bed, level, depth, velocities and roughness of one area [SI], and how many ghost cells it has."""
+    bed = np.asarray(geometry["Cells Minimum Elevation"], dtype=np.float64) * vertical
+    count, real = bed.size, np.isfinite(bed)
+    level = np.asarray(results["Water Surface"][-1], dtype=np.float64)[:count] * _unit(
+        results["Water Surface"], vertical
+    )
+    depth = level - bed
+    if "Depth" in results:
+        depth = np.asarray(results["Depth"][-1], dtype=np.float64)[:count] * _unit(results["Depth"], vertical)
+    wet = real & (np.nan_to_num(depth) > DRY_DEPTH)
+    cells = np.asarray(geometry["Faces Cell Indexes"], dtype=np.int64)
+    normal = np.asarray(geometry["Faces NormalUnitVector and Length"], dtype=np.float64)
+    velocity = np.asarray(results["Face Velocity"][-1], dtype=np.float64) * _unit(results["Face Velocity"], vertical)
+    inside = (cells >= 0) & (cells < count)
+    at = np.where(inside, cells, 0)
+    sides = np.where(inside & wet[at], level[at], -np.inf)  # of a dry side, or a ghost cell, the other one counts
+    area, n_face = _of_faces(geometry, sides.max(axis=1), vertical, normal[:, 2] * horizontal)
+    u, v = _vectors(cells, inside, normal[:, :2], velocity, area, count)
+    rough = np.full(count, np.nan)
+    if "Cells Center Manning's n" in geometry:
+        rough = np.asarray(geometry["Cells Center Manning's n"], dtype=np.float64)
+    else:
+        n_face = np.where(np.isfinite(n_face), n_face, 0.0)
+        total, faces = (np.zeros(count), np.zeros(count))
+        for side in range(2):
+            ok = inside[:, side] & (n_face > 0.0)
+            total += np.bincount(at[ok, side], n_face[ok], count)
+            faces += np.bincount(at[ok, side], minlength=count)
+        rough = np.where(faces > 0, total / np.maximum(faces, 1), np.nan)
+    centre = np.asarray(geometry["Cells Center Coordinate"], dtype=np.float64) * horizontal
+    return {
+        "x": centre[real, 0], "y": centre[real, 1], "bed": bed[real], "level": level[real], "depth": depth[real],
+        "u": u[real], "v": v[real], "roughness": rough[real], "ghosts": int((~real).sum()),
+        "corners": np.asarray(geometry["FacePoints Coordinate"], dtype=np.float64) * horizontal,
+    }  # fmt: skip
+
+
+def _unit(dataset: Any, default: float) -> float:
+    """The unit [m or m/s] that an attribute of a dataset states: `Units` of 6.x, the quantity's own name in 5.0."""
+    for value in dataset.attrs.values():
+        if isinstance(value, bytes | np.bytes_) and text_of(value).lower() in LENGTHS:
+            return LENGTHS[text_of(value).lower()]
+    return default
+
+
+def _of_faces(geometry: Any, level: Array, vertical: float, length: Array) -> tuple[Array, Array]:
+    """Wetted area [m2] and Manning's n of each face at the level (faces,), -inf for dry; above its table walls."""
+    info = np.asarray(geometry["Faces Area Elevation Info"], dtype=np.int64)
+    table = np.asarray(geometry["Faces Area Elevation Values"], dtype=np.float64)
+    z, of_table = table[:, 0] * vertical, table[:, 1] * vertical**2
+    area, rough = np.zeros(level.size), np.full(level.size, np.nan)
+    for face, (start, rows) in enumerate(info):
+        here = slice(start, start + rows)
+        if rows and np.isfinite(level[face]):
+            area[face] = np.interp(level[face], z[here], of_table[here], left=0.0)
+            area[face] += length[face] * max(level[face] - z[start + rows - 1], 0.0)
+            rough[face] = np.interp(level[face], z[here], table[here, 3]) if table.shape[1] > 3 else np.nan
+    return area, rough
+
+
+def _vectors(
+    cells: np.ndarray[Any, Any], inside: np.ndarray[Any, Any], normal: Array, speed: Array, weight: Array, count: int
+) -> tuple[Array, Array]:
+    """min sum_f A_f (n_f . u - v_f)^2 of each cell: u and v (count,), along the only normal if all are parallel."""
+    of_face = {
+        "xx": normal[:, 0] ** 2, "xy": normal[:, 0] * normal[:, 1], "yy": normal[:, 1] ** 2,
+        "x": normal[:, 0] * speed, "y": normal[:, 1] * speed,
+    }  # fmt: skip
+    used = inside & (weight > 0.0)[:, None] & np.isfinite(speed)[:, None]
+    sums = {}
+    for key, value in of_face.items():
+        sums[key] = np.zeros(count)
+        for side in range(2):
+            here = used[:, side]
+            sums[key] += np.bincount(cells[here, side], (weight * value)[here], count)
+    matrix = np.stack([np.stack([sums["xx"], sums["xy"]], -1), np.stack([sums["xy"], sums["yy"]], -1)], -2)
+    inverse = np.linalg.pinv(matrix, rcond=ONE_DIRECTION, hermitian=True)
+    found = (inverse @ np.stack([sums["x"], sums["y"]], -1)[..., None])[..., 0]
+    return found[:, 0], found[:, 1]

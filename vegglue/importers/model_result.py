@@ -1,0 +1,168 @@
+"""A finished result of another model as one value, whatever code wrote it; and the netCDF files of two of these codes.
+
+Each format has one small file with a reader (path) -> `ModelResult`: `hec_ras.py`, `selafin.py`, `ugrid.py` and
+`delft3d_trim.py`; `finished_results.py` finds the right one. All read the final state.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import h5py
+import numpy as np
+from scipy.io import netcdf_file
+
+from vegglue.arrays import Array, Mask
+from vegglue.errors import InputError, shown_path
+
+RoughnessKind = Literal["manning", "strickler", "chezy", "nikuradse", "not-stated"]
+# Depth below which a point counts as dry [m]. Chosen: codes keep films of up to some millimetres on dry land, TELEMAC
+# also negative depths.
+DRY_DEPTH = 0.005
+# Units of length in files, in lower case [m].
+FOOT, US_SURVEY_FOOT = 0.3048, 1200.0 / 3937.0
+LENGTHS = {"m": 1.0, "meters": 1.0, "meter": 1.0, "metre": 1.0, "feet": FOOT, "ft": FOOT, "foot": FOOT}
+LENGTHS |= {"m/s": 1.0, "m s-1": 1.0, "ms-1": 1.0, "ft/s": FOOT, "ft s-1": FOOT}
+FILL_VALUES = (-999.0, -999.999, -9999.0, -99999.0)  # that codes write without declaring them
+
+
+@dataclass(frozen=True, eq=False)
+class ModelResult:
+    """The final state of a model run, at the places where its velocities lie.
+
+    Parameters
+    ----------
+    code
+        The program, such as HEC-RAS.
+    x, y
+        Places on the map of the file (n,) [m].
+    bed, depth, level
+        (n,) [m]; depth is 0 and level NaN where it is dry.
+    u, v
+        Depth-averaged velocity to the east and to the north of that map (n,) [m/s], 0 where it is dry.
+    corners
+        Nodes of the mesh (k, 2) [m]: how far it reaches.
+    roughness, roughness_kind
+        (n,) in the unit of its kind [s m^(-1/3), m^(1/3)/s, m^(1/2)/s, m]; None if the file has none.
+    crs
+        Coordinate system as the file states it, '' if it does not.
+    time
+        Of the final state, as the file states it.
+    notes
+        What was converted or left out.
+    """
+
+    code: str
+    x: Array
+    y: Array
+    bed: Array
+    depth: Array
+    level: Array
+    u: Array
+    v: Array
+    corners: Array
+    roughness: Array | None = None
+    roughness_kind: RoughnessKind = "not-stated"
+    crs: str = ""
+    time: str = ""
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def wet(self) -> Mask:
+        return self.depth > 0.0
+
+    def manning(self, kind: RoughnessKind | None = None) -> Array | None:
+        """n = 1/k_st, n = h^(1/6) / C, or n = k_s^(1/6) / 26 (n,) [s m^(-1/3)]; None if nothing states the law.
+
+        kind: the law instead of the file's. NaN where the file has no value, or C is needed and it is dry.
+        """
+        kind = kind or self.roughness_kind
+        if self.roughness is None or kind == "not-stated":
+            return None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            one = np.where(self.roughness > 0.0, self.roughness, np.nan)
+            if kind == "manning":
+                return one
+            if kind == "strickler":
+                return 1.0 / one
+            if kind == "nikuradse":
+                return one ** (1.0 / 6.0) / 26.0
+            return np.where(self.wet, self.depth ** (1.0 / 6.0) / one, np.nan)
+
+
+def model_result(
+    code: str, x: Array, y: Array, bed: Array, level: Array, depth: Array, u: Array, v: Array, **more: Any
+) -> ModelResult:
+    """The result with dry places as `ModelResult` describes them; places without a bed are left out."""
+    known = np.isfinite(x) & np.isfinite(y) & np.isfinite(bed)
+    wet = np.isfinite(level) & (np.nan_to_num(depth, nan=0.0) > DRY_DEPTH)
+    roughness = more.pop("roughness", None)
+    return ModelResult(
+        code, x[known], y[known], bed[known], np.where(wet, depth, 0.0)[known], np.where(wet, level, np.nan)[known],
+        np.where(wet, np.nan_to_num(u), 0.0)[known], np.where(wet, np.nan_to_num(v), 0.0)[known],
+        roughness=None if roughness is None else roughness[known], **more,
+    )  # fmt: skip
+
+
+def text_of(value: Any) -> str:
+    """An attribute of a file as text; '' if there is none."""
+    if isinstance(value, np.ndarray):
+        value = value.ravel()[0] if value.size else ""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", errors="replace")
+    return "" if value is None else str(value)
+
+
+@dataclass(frozen=True)
+class NetcdfVariable:
+    """A variable of a netCDF file: its values are read when they are asked for."""
+
+    source: Any
+    shape: tuple[int, ...]
+    attributes: Mapping[str, Any]
+
+    def text(self, name: str) -> str:
+        return text_of(self.attributes.get(name))
+
+    def values(self, last_of: int = 0) -> Array:
+        """Values in m, NaN where none is; last_of: number of times, of which the last is read."""
+        timed = last_of and self.shape[:1] == (last_of,)
+        raw = np.asarray(self.source[-1] if timed else self.source[()], dtype=np.float64)
+        named = [self.attributes[one] for one in ("_FillValue", "missing_value") if one in self.attributes]
+        marks = [float(np.ravel(one)[0]) for one in named]
+        with np.errstate(invalid="ignore"):
+            raw = np.where(np.isin(raw, [*marks, *FILL_VALUES]) | (np.abs(raw) > 1e30), np.nan, raw)
+        scale = float(np.ravel(self.attributes.get("scale_factor", 1.0))[0])
+        offset = float(np.ravel(self.attributes.get("add_offset", 0.0))[0])
+        return (raw * scale + offset) * LENGTHS.get(self.text("units").strip().lower(), 1.0)
+
+    def numbers(self) -> np.ndarray[Any, Any]:
+        """Whole numbers as they stand in the file."""
+        return np.asarray(self.source[()])
+
+
+@contextmanager
+def netcdf_variables(path: Path) -> Iterator[dict[str, NetcdfVariable]]:
+    """Within, the variables of a netCDF file, classic or of version 4, by name."""
+    with path.open("rb") as file:
+        classic = file.read(3) == b"CDF"
+    if classic:
+        with netcdf_file(path, mmap=False) as file:
+            yield {
+                name: NetcdfVariable(one.data, one.data.shape, one._attributes) for name, one in file.variables.items()
+            }
+        return
+    with h5py.File(path) as file:
+        yield {
+            name: NetcdfVariable(one, one.shape, dict(one.attrs))
+            for name, one in file.items()
+            if isinstance(one, h5py.Dataset)
+        }
+
+
+def refuse_degrees(path: Path, x: NetcdfVariable) -> None:
+    """Raise InputError if places are given in degrees."""
+    if "degree" in x.text("units").lower():
+        raise InputError(f"{shown_path(path)}: expected places in metres, got degrees; project the mesh first.")

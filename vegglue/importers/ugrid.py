@@ -1,0 +1,158 @@
+"""Results on a UGRID mesh: the map file of D-Flow FM, and any netCDF file whose fields are named by standard names.
+
+Format: UGRID 1.0, a variable with cf_role mesh_topology that names node coordinates and the nodes of each face. Fields
+lie at faces, or at nodes. Of D-Flow FM: flowelem_bl (bed, upward), s1, waterdepth, ucx, ucy (ucxa, ucya in 3D), czs
+(Chezy) and flowelem_domain, which marks the ghost cells of a partition.
+"""
+
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vegglue.arrays import Array
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.model_result import (
+    ModelResult,
+    NetcdfVariable,
+    RoughnessKind,
+    model_result,
+    netcdf_variables,
+    refuse_degrees,
+)
+
+# Of each quantity: names of D-Flow FM without the mesh, and standard names.
+NAMES = {
+    "bed": (("flowelem_bl", "bl"), ("altitude", "sea_floor_altitude", "bed_level")),
+    "level": (("s1",), ("sea_surface_height", "sea_surface_elevation", "water_surface_height_above_reference_datum")),
+    "depth": (("waterdepth",), ("sea_floor_depth_below_sea_surface", "water_depth", "depth")),
+    "u": (("ucxa", "ucx"), ("sea_water_x_velocity", "eastward_sea_water_velocity", "x_velocity")),
+    "v": (("ucya", "ucy"), ("sea_water_y_velocity", "northward_sea_water_velocity", "y_velocity")),
+}
+
+
+def read_ugrid(path: Path) -> ModelResult:
+    """The final state of a 2D mesh, at its faces, or at its nodes if velocities lie there.
+
+    Parameters
+    ----------
+    path
+        A netCDF file, classic or of version 4.
+
+    Returns
+    -------
+    ModelResult
+        Without the ghost cells of a partition.
+
+    Raises
+    ------
+    InputError
+        If it holds no 2D mesh, velocities in layers, or lacks bed, level or velocities.
+    """
+    with netcdf_variables(path) as variables:
+        meshes = [
+            (name, one)
+            for name, one in variables.items()
+            if one.text("cf_role") == "mesh_topology" and one.text("topology_dimension") in ("2", "")
+        ]
+        if not meshes:
+            raise InputError(f"{shown_path(path)}: expected a UGRID file with a 2D mesh, got none; export one.")
+        mesh, topology = meshes[0]
+        of_nodes = topology.text("node_coordinates").split()
+        node_x, node_y = (variables[name] for name in of_nodes[:2])
+        refuse_degrees(path, node_x)
+        nodes = np.column_stack([node_x.values(), node_y.values()])
+        corners = _corners_of_faces(variables[topology.text("face_node_connectivity")])
+        faces, times = corners.shape[0], max(variables["time"].shape[0], 1) if "time" in variables else 0
+        found = {key: _field(variables, mesh, key, (faces, len(nodes)), times) for key in NAMES}
+        missing = [key for key in ("u", "v") if found[key] is None]
+        if sum(found[key] is not None for key in ("bed", "level", "depth")) < 2:
+            missing += [key for key in ("bed", "level", "depth") if found[key] is None]
+        if missing:
+            layers = any(len(one.shape) == 3 and faces in one.shape[:-1] for one in variables.values())
+            hint = "write depth means (ucxa, ucya)" if layers else "add them to the output"
+            raise InputError(f"{shown_path(path)}: expected {', '.join(missing)} on the mesh, got none; {hint}.")
+        given = {key: one for key, one in found.items() if one is not None}
+        at_faces = given["u"].size == faces
+        centre = _mean_of_corners(nodes, corners)
+        if (named := topology.text("face_coordinates").split()) and at_faces and set(named[:2]) <= variables.keys():
+            centre = np.column_stack([variables[name].values() for name in named[:2]])
+        places = centre if at_faces else nodes
+        for key, one in given.items():
+            if one.size != places.shape[0] and at_faces:  # a bed at nodes
+                given[key] = _mean_of_corners(one[:, None], corners)[:, 0]
+        bed = given["bed"] if "bed" in given else given["level"] - given["depth"]
+        level = given["level"] if "level" in given else bed + given["depth"]
+        depth = given["depth"] if "depth" in given else level - bed
+        of_flow_fm = f"{mesh}_flowelem_bl" in variables or f"{mesh}_ucx" in variables
+        notes, keep = [], np.ones(len(places), bool)
+        domain = variables.get(f"{mesh}_flowelem_domain")
+        if domain is not None and at_faces:
+            numbers = np.ravel(domain.numbers()).astype(np.int64)
+            in_name = re.search(r"_(\d{4})_map", path.name)
+            own = int(in_name[1]) if in_name else Counter(numbers.tolist()).most_common(1)[0][0]
+            keep = numbers == own
+            if not keep.all():
+                notes.append(f"{int((~keep).sum())} ghost cells of other partitions left out")
+        roughness: Array | None = None
+        kind: RoughnessKind = "not-stated"
+        for name, of in (("czs", "chezy"), ("roughness_manning", "manning")):
+            one = variables.get(f"{mesh}_{name}")
+            if one is not None and at_faces and one.shape[-1] == faces:
+                roughness, kind = one.values(times), of  # type: ignore[assignment]
+        time = variables.get("time")
+        more: dict[str, Any] = {"corners": nodes, "crs": _system(variables), "notes": tuple(notes)}
+        more["roughness_kind"] = kind
+        if roughness is not None:
+            more["roughness"] = roughness[keep]
+        if time is not None:
+            more["time"] = f"{float(np.ravel(time.numbers())[-1]):g} {time.text('units')}"
+        fields = (places[:, 0], places[:, 1], bed, level, depth, given["u"], given["v"])
+        return model_result("D-Flow FM" if of_flow_fm else "UGRID", *(one[keep] for one in fields), **more)
+
+
+def _field(
+    variables: dict[str, NetcdfVariable], mesh: str, key: str, sizes: tuple[int, int], times: int
+) -> Array | None:
+    """A quantity at faces or nodes, by its name, else by its standard name; None if there is none without layers."""
+    names, standard = NAMES[key]
+    of_mesh = {name: one for name, one in variables.items() if one.text("mesh") in (mesh, "")}
+    by_name = [of_mesh[f"{mesh}_{name}"] for name in names if f"{mesh}_{name}" in of_mesh]
+    by_standard = [one for one in of_mesh.values() if one.text("standard_name") in standard]
+    by_standard.sort(key=lambda one: one.text("location") != "face")
+    for one in [*by_name, *by_standard]:
+        of_time = times and one.shape[:1] == (times,) and len(one.shape) == 2
+        rest = one.shape[1:] if of_time else one.shape
+        if len(rest) == 1 and rest[0] in sizes:
+            return one.values(times if of_time else 0)
+    return None
+
+
+def _corners_of_faces(connectivity: NetcdfVariable) -> np.ndarray[Any, Any]:
+    """Nodes of each face (faces, most), counted from 0, and -1 where a face has fewer."""
+    raw = connectivity.numbers()
+    start = int(np.ravel(connectivity.attributes.get("start_index", 0))[0])
+    fill = connectivity.attributes.get("_FillValue")
+    none = ~np.isfinite(raw.astype(np.float64)) | (raw < start)
+    if fill is not None:
+        none |= raw == np.ravel(fill)[0]
+    return np.where(none, -1, np.where(none, 0, raw).astype(np.int64) - start)
+
+
+def _mean_of_corners(values: Array, corners: np.ndarray[Any, Any]) -> Array:
+    """Means (faces, k) of values at nodes (nodes, k)."""
+    there = corners >= 0
+    return (values[np.where(there, corners, 0)] * there[..., None]).sum(axis=1) / there.sum(axis=1)[:, None]
+
+
+def _system(variables: dict[str, NetcdfVariable]) -> str:
+    """EPSG:... of the variable that states a projection; '' for none."""
+    for one in variables.values():
+        number = int(np.ravel(one.attributes.get("epsg", 0))[0]) if "epsg" in one.attributes else 0
+        if number:
+            return f"EPSG:{number}"
+        if found := re.search(r"EPSG:(\d+)", one.text("EPSG_code") + one.text("crs_wkt")):
+            return f"EPSG:{found[1]}" if int(found[1]) else ""
+    return ""
