@@ -96,11 +96,15 @@ def without_errors(case: Case) -> list[str]:
     return list(map(sentence, refused_for_errors(case, read_observations(case).table)))
 
 
+def errors_of_site(case: Case) -> list[str]:
+    """What a survey of the bed leaves open, and the errors of its site that are assumed."""
+    return list(map(sentence, [*remarks_on_survey(case), *remarks_on_assumed_errors(case)]))
+
+
 def unnamed_banks(case: Case) -> list[str]:
-    """What a survey of the bed leaves open, errors that are assumed, and steep cells without a class of friction."""
+    """That a bed is steep in many cells, and no class of friction is for them; nothing if not."""
     try:
-        of_survey = [*remarks_on_survey(case), *remarks_on_assumed_errors(case)]
-        return list(map(sentence, [*of_survey, *remarks_on_unnamed_banks(case, build_site(case))]))
+        return list(map(sentence, remarks_on_unnamed_banks(case, build_site(case))))
     except InputError:  # of a bed or a grid that `check` refuses with the same words; the config is written
         return []
 
