@@ -94,6 +94,7 @@ from vegglue.results.plan import (
     Work,
 )
 from vegglue.results.verdict import (
+    BeyondHandbook,
     ChiSquare,
     CommandCompared,
     Conclusion,
@@ -104,6 +105,8 @@ from vegglue.results.verdict import (
     EffectsUntestable,
     ErrorsLargerThanStated,
     ErrorsStillLarger,
+    EstimateAtBound,
+    EstimateOffPrior,
     FewTestable,
     HeldOutMissed,
     ImplausibleAmplitude,
@@ -115,6 +118,7 @@ from vegglue.results.verdict import (
     MisfitTooSmall,
     MisfitUnexplained,
     ModelErrorExceeded,
+    NameHangsOnSection,
     NeighboursCorrelated,
     NoneLeads,
     ParameterFarFromPrior,
@@ -129,6 +133,7 @@ from vegglue.workflow.compare import Comparison
 HERE = Path(__file__).parent
 COMMAND = "vegglue diagnose brook.yaml --details"
 STEEP = next(one for one in SHIPPED if one.name == "steep_bank")
+SURFACES = next(one for one in SHIPPED if one.name == "bank_roughness")
 
 
 def brook(**verdict: object) -> Diagnosis:
@@ -146,7 +151,8 @@ BANK = {"value": 0.67, "interval95": (0.54, 0.79), "unit": "-", "refitted": True
 
 def bank(**fields: object):
     usual = {"title": STEEP.title, "amplitude": 0.67, "interval95": (0.54, 0.79), "unit": "-"}
-    return an_effect_found("steep_bank", **(usual | {"rivals": (), "probability": 0.999} | fields))
+    name = str(fields.pop("name", "steep_bank"))
+    return an_effect_found(name, **(usual | {"rivals": (), "probability": 0.999} | fields))
 
 
 def doubt(*reasons: object, **verdict: object) -> Diagnosis:
@@ -185,6 +191,10 @@ VERDICTS: dict[str, Diagnosis] = {
         Rival("unlisted_bed", "bed", 0.79, 9.0, 0.5, 0.1), Rival("steep_bank", "effect", 0.08),
     )),
     "too many": doubt(TooManyGroups(tuple(Rival(name, "effect", 0.2) for name in ("wind", "waves", "steep_bank")))),
+    "a name of one section": doubt(NameHangsOnSection("steep_bank", "B", "wind"), effects=(bank(),)),
+    "two surfaces": brook(kind="identified", effects=(
+        bank(name="bank_roughness", title=SURFACES.title, amplitude=1.1, interval95=(0.9, 1.3)),
+    )),
     "a far parameter": doubt(ParameterFarFromPrior("n_b", 4.5), effects=(bank(),)),
     "misfit beyond errors": doubt(MisfitBeyondErrors(2.3), effects=(bank(),)),
     "misfit unexplained": doubt(MisfitUnexplained()),
@@ -201,6 +211,9 @@ VERDICTS: dict[str, Diagnosis] = {
 N_B, PHI = NamedParameter("n_b", "n_b", "s m^(-1/3)"), NamedParameter("phi", "φ", "-")
 VELOCITY = kind_of("velocity")
 NOTES = (
+    EstimateAtBound("n_b", 0.0051, "s m^(-1/3)", 0.005, 0.05, True),
+    BeyondHandbook("n_b", 0.062, "s m^(-1/3)", 0.01, 0.06, "Chow (1959) for streams wider than 30 m"),
+    EstimateOffPrior("eddy_viscosity", 0.002, "m2/s", 2.9),
     MisfitTooSmall(61.5, 150), ImplausibleAmplitude("wind", 3.4), EffectsNotExcluded(("wind", "waves"), beside=True),
     EffectsExcluded((("wind", "a laboratory"), ("unlisted_inflow", "glass walls"))),
     ModelErrorUsed(0.05, 0.01, 0.6, 0.0), LawStandsOut(candidate_laws_of("law_bank_speed_step"), ("steep_bank",)),

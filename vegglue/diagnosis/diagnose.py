@@ -31,7 +31,7 @@ from vegglue.diagnosis.competition import (
     nearly_as_likely,
     tempered_probabilities,
 )
-from vegglue.diagnosis.conclusion import assemble_diagnosis
+from vegglue.diagnosis.conclusion import NEIGHBOURS_WITHIN, assemble_diagnosis
 from vegglue.diagnosis.refits import calibrated_with, pruned
 from vegglue.diagnosis.search_state import (
     PriorWeight,
@@ -174,6 +174,15 @@ def _best_branch(
     return replace(ends[best], found=taken)
 
 
+def beside_excluded(base: Baseline, instrument: Instrument, found: SearchState) -> bool:
+    """Whether a single reading stands side by side with one that is excluded already."""
+    if instrument.kind != "reading":
+        return False
+    earlier = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
+    rows = [int(np.flatnonzero(base.noise.rows == station)[0]) for station in earlier]
+    return any(0.0 < base.noise.separation[row, instrument.readings[0]] < NEIGHBOURS_WITHIN for row in rows)
+
+
 def branch_with(
     screening: Screening, hypotheses: Sequence[Hypothesis], j: int, found: SearchState, watch: Watch
 ) -> SearchBranch | None:
@@ -189,6 +198,8 @@ def branch_with(
     if enough or one.log_evidence < 0.0:
         return None
     if isinstance(one.what, Instrument):
+        if beside_excluded(base, one.what, found):  # neighbours that fall together are a misfit of the model
+            return None
         watch(Progress(f"excluding a {one.kind} that is off"))
         noise = with_unknown_errors(base.noise, error_columns(one.what, base.noise.value))
         without = replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))

@@ -107,6 +107,15 @@ class AmplitudeAtBound:
 
 
 @dataclass(frozen=True)
+class NameHangsOnSection:
+    """Without the readings of one section another effect leads the accepted one."""
+
+    effect: str
+    section: str
+    instead: str
+
+
+@dataclass(frozen=True)
 class NeighboursExcluded:
     """Readings side by side are excluded, which one bad probe does not explain."""
 
@@ -194,6 +203,7 @@ Reason = (
     | MisfitBeyondErrors
     | ParameterFarFromPrior
     | AmplitudeAtBound
+    | NameHangsOnSection
     | NeighboursExcluded
     | TooManyGroups
     | NoneLeads
@@ -292,6 +302,40 @@ class ImplausibleAmplitude:
 
     effect: str
     times: float
+
+
+@dataclass(frozen=True)
+class EstimateAtBound:
+    """A calibrated parameter within PRESSES of an end of its prior, from low to high: the bound decides its value."""
+
+    parameter: str
+    value: float
+    unit: str
+    low: float
+    high: float
+    lower: bool
+
+
+@dataclass(frozen=True)
+class BeyondHandbook:
+    """A calibrated parameter beyond low to high [unit] of a handbook; source: which one, and for what."""
+
+    parameter: str
+    value: float
+    unit: str
+    low: float
+    high: float
+    source: str
+
+
+@dataclass(frozen=True)
+class EstimateOffPrior:
+    """A calibrated parameter some standard deviations from the middle of its prior, at `value` [unit]."""
+
+    parameter: str
+    value: float
+    unit: str
+    deviations: float
 
 
 @dataclass(frozen=True)
@@ -408,6 +452,9 @@ Note = (
     DischargeMismatch
     | MisfitTooSmall
     | ImplausibleAmplitude
+    | EstimateAtBound
+    | BeyondHandbook
+    | EstimateOffPrior
     | EffectsNotExcluded
     | EffectsExcluded
     | ModelErrorUsed
@@ -575,8 +622,9 @@ class VerdictInputs:
     errors alone exceed in 5 % of cases; neighbours: whether readings side by side are excluded; strained: the
     parameter furthest off its prior, and how far [standard deviations]; between: errors between the sections over those
     of the data [-]; carried: sections that clearly carry another discharge than stated; remainder: whether all
-    significant effects may be a remainder of what was accepted; surroundings: notes on the map, the measured stretch
-    and the depth; excluded: effects that cannot act at the site, with the reason of each.
+    significant effects may be a remainder of what was accepted; surroundings: notes on the map, the measured stretch,
+    the depth and the parameters; excluded: effects that cannot act at the site, with the reason of each; hangs_on: the
+    section without which another name leads.
     """
 
     candidates: tuple[CandidateEffect, ...]
@@ -601,6 +649,7 @@ class VerdictInputs:
     remainder: bool = False
     surroundings: tuple[Note, ...] = ()
     excluded: Mapping[str, str] = by_default(default_factory=dict)
+    hangs_on: NameHangsOnSection | None = None
 
 
 def make_verdict(inputs: VerdictInputs) -> Verdict:
@@ -692,14 +741,19 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
         near = any(abs(amplitude.value - end) < AT_BOUND * amplitude.scale for end in ends)
         if near or amplitude.relative_size > FURTHEST - AT_BOUND:
             at_bound.append(one.name)
-    return AmplitudeAtBound(tuple(at_bound)) if at_bound else None
+    return AmplitudeAtBound(tuple(at_bound)) if at_bound else inputs.hangs_on
 
 
 def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt: Reason | None) -> Verdict:
-    """Laws if no known effect explains the misfit; an instrument that is clearly off goes before laws that are not
-    likelier than all else, except readings side by side.
+    """Laws if no known effect explains the misfit, and if errors need not be absurdly large beside them; an instrument
+    that is clearly off goes before laws that are not likelier than all else, except readings side by side.
     """
     found = replace(plain, laws=laws)
+    used, absurd = inputs.model_error, math.sqrt(constants().absurd_misfit)
+    if inputs.errors.scale > absurd:
+        doubt = doubt or ErrorsLargerThanStated(inputs.errors.scale)
+    if used is not None and used.needed > 2.0 * absurd:
+        doubt = doubt or ModelErrorExceeded(used.needed, used.friction)
     if inputs.neighbours and not laws.likelier:
         doubt = doubt or NeighboursExcluded()
     if doubt:
