@@ -54,6 +54,7 @@ from vegglue.parallel import in_threads, submit
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.causes import CandidateEffect
 from vegglue.results.diagnosis import Diagnosis
+from vegglue.wording.phases import CALIBRATING, SEARCHING, SEARCHING_WITH
 from vegglue.wording.sentences import sentence
 
 # Effects and places that are accepted at most, and instruments.
@@ -78,7 +79,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     unseen: the model at measurements that no calibration sees, which silence has to agree with.
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
-    watch(Progress(with_compilation("calibrating the model as it is")))
+    watch(Progress(with_compilation(CALIBRATING)))
     implausible = tuple(implausible_values(model.case, model.site, model.station))
     try:
         base = kept_baseline(model)
@@ -87,7 +88,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
             raise
         why = " ".join(map(sentence, implausible))
         raise InputError(f"{model.case.name}: no flow comes near what was measured. {why}") from error
-    watch(Progress("looking for what is missing"))
+    watch(Progress(SEARCHING))
     first = screening = screen(base)
     found, effects = SearchState(implausible=implausible), dict[str, CandidateEffect]()
     laws = partial(laws_beside, first) if implausible else submit(laws_beside, first)
@@ -111,7 +112,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         earlier, last = found.steps[: len(found.steps) - newest], found.steps[len(found.steps) - newest :]
         base, again, effects = with_rivals_again(base, earlier, found.flagged, effects, watch)
         found = found.with_steps((*again, *last))
-        watch(Progress("looking for what is missing with it"))
+        watch(Progress(SEARCHING_WITH))
         at_hand = branch.screening if base is branch.base else None
         screening = at_hand or screen(base, found.flagged)
         model, fitted = screening.base.model, screening.base.fitted
