@@ -21,7 +21,7 @@ export OMP_NUM_THREADS := 1
 # Where Python may keep no bytecode, every process compiles all libraries anew: 8 s of a core for each of the tests' own.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo paper checked test check release house bench blind laws faults confluence fuzz clean simulate infer report setup
+.PHONY: help demo paper checked test check release house bench blind laws faults confluence measured fuzz clean simulate infer report setup
 .PRECIOUS: runs/%/ensemble.h5 runs/%/posterior.h5
 help:
 	@grep -E '^[a-z]+:.*#' $(MAKEFILE_LIST) | sed 's/:.*#/:/'
@@ -84,6 +84,9 @@ faults: $(TESTABLE)  # every command killed at random moments, counted in docs/f
 
 confluence: $(TESTABLE)  # the numbers of docs/confluence.md, from the published set in the folder DATA
 	$(BIN)/python tests/studies/confluence.py "$(DATA)" --jobs $(JOBS)
+
+measured: $(TESTABLE)  # the numbers of docs/measured.md, from copies of the published repositories in the folder DATA
+	$(BIN)/python tests/studies/measured.py "$(DATA)" --jobs $(JOBS)
 
 fuzz: $(TESTABLE)  # files from strangers, bred towards lines not yet reached, for MINUTES
 	$(BIN)/python tests/studies/fuzz.py --minutes $(MINUTES)

@@ -10,7 +10,8 @@ from systems import POSIX_ALONE
 
 from vegglue import whole_files
 from vegglue.errors import StorageError
-from vegglue.whole_files import MAKE_ROOM, folder_within, write_file
+from vegglue.whole_files import folder_within, write_file
+from vegglue.wording.remedies import MAKE_ROOM
 
 
 @POSIX_ALONE

@@ -26,6 +26,7 @@ from vegglue.parallel import (
     task_backend,
 )
 from vegglue.version import VERSION
+from vegglue.wording.remedies import GOES_ON, SCHEDULER_GONE
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -38,8 +39,6 @@ EACH_CORE = 16  # processes of local:N for each core at most; more than one only
 # Tasks under way [-]: for each thread of a worker one at work and one that waits; and a least number for new workers.
 EACH_THREAD, AT_LEAST = 2, 16
 DECIDING = ("numpy", "scipy", "numba")  # libraries that decide the last digits
-GOES_ON = "what was finished is kept, and the same command goes on from there"
-GONE = f"--cluster: expected the scheduler to stay, got no answer any more; {GOES_ON}, once there is one."
 Work = Callable[..., Any]
 DASK_SETTINGS = {
     # What tasks share is sent once and may be large: the warning against large graphs does not apply.
@@ -178,7 +177,7 @@ def results_of_tasks(client: "Client", work: Work, tasks: Iterable[tuple[Any, ..
             try:
                 threads = sum(client.nthreads().values())
             except (OSError, ValueError):
-                raise InputError(GONE) from None
+                raise InputError(SCHEDULER_GONE) from None
             had_workers |= threads > 0
             room = max(EACH_THREAD * threads, AT_LEAST) - len(under_way)
             for _, (position, task) in zip(range(room), waiting, strict=False):
@@ -197,7 +196,7 @@ def results_of_tasks(client: "Client", work: Work, tasks: Iterable[tuple[Any, ..
                 try:
                     there = len(client.nthreads())
                 except (OSError, ValueError):
-                    raise InputError(GONE) from None
+                    raise InputError(SCHEDULER_GONE) from None
                 had_workers |= there > 0
                 alone_since = None if there or not had_workers else alone_since or looked
                 if alone_since is not None and looked > alone_since + LONGEST_ALONE:
@@ -214,7 +213,7 @@ def results_of_tasks(client: "Client", work: Work, tasks: Iterable[tuple[Any, ..
                     f"memory; {GOES_ON}. Give workers more memory, or start fewer of them on a machine."
                 ) from None
             except CancelledError:
-                raise InputError(GONE) from None
+                raise InputError(SCHEDULER_GONE) from None
             except Exception:
                 refuse_other_versions(client)  # the likeliest reason, of a worker that came later
                 raise

@@ -62,14 +62,17 @@ class DecisionConstants:
     )  # fmt: skip
     # Plausible sizes of what may be missing or off.
     spot_drag: float = _constant(
-        1.0, "1/m", CHOSEN, "drag at a place: ten times the friction of a bed of n = 0.04 under 1 m of water, as of a "
-        "pier; after twelve unlisted objects of the blind study",
+        1.0, "-", CHOSEN, "drag at a place over that of a cylinder of C_D = 1 as long as the shortest spot, 1/(2 l); "
+        "on a floor of 3 m 1.1 1/m, which were 1 after twelve unlisted objects of the blind study",
     )  # fmt: skip
     spot_rise: float = _constant(
         0.3, "-", CHOSEN, "bed at a place over the mean depth; after the twelve objects and the measured confluence",
     )  # fmt: skip
     spot_inflow: float = _constant(0.05, "-", CHOSEN, "water that enters at a place over that of the inflows")
-    spot_viscosity: float = _constant(0.03, "m2/s", CHOSEN, "viscosity at a place")
+    spot_viscosity: float = _constant(
+        0.3, "-", CHOSEN, "viscosity at a place over h u*: the least of streams (Fischer et al. 1979); 0.03 m2/s in "
+        "1.1 m of water on a slope of 0.001",
+    )  # fmt: skip
     spots_in_noise: float = _constant(
         0.3, "-", CHOSEN, "sizes of spots over plausible ones when the correlation of errors is estimated, as hundreds "
         "overlap; the verdicts of open-a to f were the same from 0.1 to 1",

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import IO
 
 from vegglue.errors import StorageError
+from vegglue.wording.remedies import MAKE_ROOM, MAKE_WRITABLE
 
 # How often, and after how many seconds each, a file that another process is writing is tried again. Chosen: a result of
 # some hundred MB is written within this.
 ATTEMPTS, BETWEEN = 200, 0.05
-MAKE_ROOM = "make room and run it again"
 NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
 # Flags of POSIX; Windows opens neither links nor pipes by accident.
 NOT_FOLLOWED = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -95,7 +95,7 @@ def failed_writes_told(path: Path, advice: str) -> Iterator[None]:
         if number == errno.ENOSPC or "No space left" in str(error):
             raise StorageError(f"{path}: the disk is full; {advice}.") from error
         if number in NOT_ALLOWED:
-            advice = f"make the folder {path.parent} writable, then run it again"
+            advice = MAKE_WRITABLE.format(path.parent)
         raise StorageError(f"{path}: cannot be written ({why}); {advice}.") from error
 
 

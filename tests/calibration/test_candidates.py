@@ -22,9 +22,9 @@ from vegglue.calibration.candidates import (
     with_effect,
 )
 from vegglue.case.schema import Case, EffectEntry, Parameter
-from vegglue.case.site_schema import Value
+from vegglue.case.site_schema import FrictionClass, Plants, Value
 from vegglue.diagnosis.child_config import candidate_named
-from vegglue.effects.library import library
+from vegglue.effects.library import SHIPPED, library
 from vegglue.errors import InputError
 
 SOMEWHERE = Parameter(distribution="uniform", low=5.0, high=20.0, unit="m")
@@ -95,6 +95,20 @@ def test_an_effect_elsewhere_is_still_a_candidate() -> None:
     for entry, proposed in ((of_some, True), (of_all, False)):
         case = CASE.model_copy(update={"effects": {"own": entry}})
         assert ("wind" in [one.name for one in candidates_of(case, STATION)]) == proposed
+
+
+def test_what_cannot_be_is_no_candidate() -> None:
+    """Walls are those of a laboratory; without plants, banks or gauges nothing is wrong with them."""
+    walls = FrictionClass(law="manning", n=0.01)
+    indoors = CASE.model_copy(update={"friction": CASE.friction.model_copy(update={"walls": walls})})
+    bare = CASE.model_copy(update={"plants": Plants()})
+    without_gauges = STATION[STATION["kind"] != "level"]
+    before = {one.effect.name for one in candidates_of(CASE, STATION)}
+    in_flume = {one.effect.name for one in candidates_of(indoors, STATION)}
+    assert {"wind", "lateral_inflow", "bank_drag_trend"} <= before - in_flume
+    of_plants = {one.name for one in SHIPPED if "plants" in one.needs}
+    assert not of_plants & {one.effect.name for one in candidates_of(bare, STATION)}
+    assert not {"gauge_datum", "gauge_head"} & {one.effect.name for one in candidates_of(CASE, without_gauges)}
 
 
 def readings(*rows: tuple[str, str, float, float]) -> pd.DataFrame:

@@ -8,7 +8,7 @@ import pytest
 
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
-from vegglue.diagnosis.effect_contract import AMPLITUDE, CHANNEL, ContractRule, breaches, sizes
+from vegglue.diagnosis.effect_contract import AMPLITUDE, CHANNEL, CHANNEL_SCALES, ContractRule, breaches, sizes, trial
 from vegglue.effects.definition import STAGES, Amplitude, Effect, Shape
 from vegglue.effects.library import SHIPPED, library
 from vegglue.flow.march import march
@@ -17,10 +17,28 @@ from vegglue.flow.problem import ALONG, take
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.starts import backwater
 
+# Weather and the turn of the earth are as large at every site.
+OF_THE_PLANET = ("wind", "turning_earth")
 
+
+@pytest.mark.parametrize("scale", CHANNEL_SCALES)
 @pytest.mark.parametrize("effect", SHIPPED, ids=lambda effect: effect.name)
-def test_every_shipped_effect_keeps_the_contract(effect):
-    assert breaches(effect) == []
+def test_every_shipped_effect_keeps_the_contract_at_three_scales(effect, scale):
+    assert breaches(effect, scale=CHANNEL_SCALES[scale]) == []
+
+
+def test_no_effect_holds_a_length_or_a_speed_of_its_own():
+    """At 0.04 and 15 times the size each number has grown by the power of length of its unit, by Froude's law."""
+    powers = {"m": 1.0, "m/s": 0.5, "m2/s": 1.5, "m3/s": 2.5, "1/m": -1.0, "s/m": -0.5, "-": 0.0}
+    brook = {effect.name: trial(effect).effect for effect in SHIPPED}
+    for scale in CHANNEL_SCALES.values():
+        for effect in SHIPPED:
+            there = trial(effect, scale=scale).effect
+            for here, then in zip(brook[effect.name].parameters, there.parameters, strict=True):
+                if effect.name in OF_THE_PLANET or getattr(here, "default", 1.0) == 0.0:
+                    continue
+                size = then.scale / here.scale if isinstance(here, Amplitude) else then.default / here.default
+                assert size == pytest.approx(scale ** powers[here.unit], rel=0.12), (effect.name, here.name)
 
 
 def test_the_library_covers_all_stages():
@@ -179,10 +197,11 @@ def everyone():
     """One member for each effect, which is on in that member alone."""
     names = [effect.name for effect in SHIPPED]
     parameters = dict.fromkeys(names, CHANNEL["parameters"][AMPLITUDE])
-    works = {effect.name: {"values": {effect.amplitude.name: effect.name}} for effect in SHIPPED}
+    every = [trial(effect).effect for effect in SHIPPED]
+    works = {effect.name: {"values": {effect.amplitude.name: effect.name}} for effect in every}
     case = Case.model_validate(CHANNEL | {"source": Path("contract"), "effects": works, "parameters": parameters})
-    off = np.array([effect.amplitude.off for effect in SHIPPED])[:, None] * np.ones(len(SHIPPED))
-    off[np.diag_indices(len(SHIPPED))] = [sizes(effect)[1] for effect in SHIPPED]
+    off = np.array([effect.amplitude.off for effect in every])[:, None] * np.ones(len(SHIPPED))
+    off[np.diag_indices(len(SHIPPED))] = [sizes(effect)[1] for effect in every]
     return build_problem(case, build_site(case), "flow", dict(zip(names, off, strict=True)))
 
 

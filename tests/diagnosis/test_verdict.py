@@ -39,6 +39,7 @@ from vegglue.results.verdict import (
     ImplausibleAmplitude,
     MisfitBeyondErrors,
     ModelErrorExceeded,
+    NameHangsOnSection,
     NeighboursCorrelated,
     NeighboursExcluded,
     NoFlowHeldOut,
@@ -438,3 +439,19 @@ def test_a_law_beside_what_was_found_is_a_note(steps: tuple[Step, ...], parts: d
 def test_a_law_is_worth_a_search_unless_another_cause_comes_first() -> None:
     for kind, laws, worth in (("cannot-tell", None, False), ("cannot-tell", LIKELY, True), ("one-of", None, True)):
         assert replace(a_diagnosis(verdict={"kind": kind, "laws": laws}), laws=LIKELY).law_stands_out is worth
+
+
+def test_a_name_that_hangs_on_one_section_is_none() -> None:
+    """Three sections, one out in turn, gave three answers."""
+    found = {"candidates": (a_candidate_effect("wind"),), "steps": (step("wind"),), "misfit": FITS}
+    assert verdict_on(**found).kind in ("identified", "one-of")
+    hanging = verdict_on(**found, hangs_on=NameHangsOnSection("wind", "B", "waves"))
+    assert (hanging.kind, tags(hanging.reasons)) == ("cannot-tell", ["name_hangs_on_section"])
+
+
+def test_no_law_is_named_beside_errors_without_sense() -> None:
+    laws = candidate_laws_of("law_bank_speed_step")
+    for absurd in ({"errors": replace(AS_STATED, scale=7.2)}, {"model_error": replace(NEEDS_MORE, needed=9.0)}):
+        found = verdict_on(laws=laws, misfit=MISSES, **absurd)
+        assert found.kind == "cannot-tell"
+        assert tags(found.reasons)[0] in ("errors_larger_than_stated", "model_error_exceeded")

@@ -25,9 +25,8 @@ def filled(kind, given, shape):
 
 
 def geometry(**given):
-    return ChannelGeometry(
-        **filled(ChannelGeometry, {"dx": 0.5, "dy": 0.25, "filter_width": 0.3, "stretch": 1.0} | given, (5, 5, 1))
-    )
+    usual = {"dx": 0.5, "dy": 0.25, "filter_width": 0.3, "stretch": 1.0, "depth_scale": 1.0, "speed_scale": 0.5}
+    return ChannelGeometry(**filled(ChannelGeometry, usual | given, (5, 5, 1)))
 
 
 def cells(u=0.0, v=0.0, on=None, **given):
@@ -41,7 +40,11 @@ def cells(u=0.0, v=0.0, on=None, **given):
 
 def plant_cells(**given):
     return PlantCells(
-        **filled(PlantCells, {"phi": 2.0, "canopy_height": 0.5, "depth": 0.8, "speed": 0.7} | given, (1, 1))
+        **filled(
+            PlantCells,
+            {"phi": 2.0, "canopy_height": 0.5, "depth": 0.8, "speed": 0.7, "speed_scale": 0.5} | given,
+            (1, 1),
+        )
     )
 
 
@@ -92,6 +95,11 @@ ROWS = {
     "discharge_error": (boundary(), {"relative_error": 0.1}, {"discharge": [[2.2], [1.1]]}),
     "inflow_skew": (boundary(), {"skew": 0.2}, {"spread": [[[0.9], [1.1]]] * 2}),
     "inflow_core": (boundary(), {"excess": 0.4}, {"spread": 1.0 + 0.2 * (1.0 - 0.75)}),
+    "inflow_peak": (
+        boundary(),
+        {"excess": 0.4, "middle": 0.5, "width": 0.5},
+        {"spread": [[[1.0 + 0.4 * exp(-4.0)], [1.4]]] * 2},
+    ),
     "lateral_inflow": (boundary(), {"share": 0.1}, {"lateral": 0.3}),
     "outlet_level_error": (boundary(), {"rise": 0.05}, {"level": 0.95}),
     "streamlining": (plant_cells(), {"vogel_exponent": -1.0, "reference_speed": 0.35}, {"phi": 1.0}),
@@ -128,6 +136,13 @@ ROWS = {
     ),
     "bed_trend": (cells(on=geometry(share_along=-0.25)), {"trend": 2.0}, {"rate": 0.1 * exp(-0.5)}),
     "bank_difference": (cells(on=geometry(bank=1.0, offset=-1.3)), {"log_ratio": 1.0}, {"rate": 0.1 * exp(-0.5)}),
+    "bank_roughness": (cells(on=geometry(bank=1.0)), {"log_ratio": 1.5}, {"rate": 0.1 * exp(1.5)}),
+    "floor_difference": (cells(on=geometry(offset=0.5)), {"log_ratio": 1.0}, {"rate": 0.1 * exp(0.5)}),
+    "bed_stretch": (
+        cells(on=geometry(share_along=0.25)),
+        {"log_ratio": 1.0, "middle": 0.0, "share": 0.5},
+        {"rate": 0.1 * exp(exp(-1.0))},
+    ),
     "steep_bank": (cells(on=geometry(side_slope=0.75)), {"share": 1.0}, {"rate": 0.1 * 1.25}),  # 3, 4, 5
     "bank_vegetation": (
         cells(on=geometry(bank=1.0)),

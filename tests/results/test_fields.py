@@ -70,7 +70,7 @@ def test_large_fields_are_compressed_in_batches_of_members() -> None:
 
 def test_without_a_window_no_fields_are_written(path: Path) -> None:
     write_chunks(path, ALL, a_header())
-    with pytest.raises(InputError, match=r"fields\.h5: .* say in `simulate\.fields` where .* run `vegglue simulate"):
+    with pytest.raises(InputError, match=r"fields\.h5: .* state in `simulate\.fields` where .* run `vegglue simulate"):
         read_fields(path.with_name("fields.h5"))
 
 

@@ -96,6 +96,7 @@ from vegglue.results.plan import (
 from vegglue.results.verdict import (
     AmplitudeBeyondPlausible,
     BedCorrected,
+    BeyondHandbook,
     ChiSquare,
     CommandCompared,
     Conclusion,
@@ -106,6 +107,8 @@ from vegglue.results.verdict import (
     EffectsUntestable,
     ErrorsLargerThanStated,
     ErrorsStillLarger,
+    EstimateAtBound,
+    EstimateOffPrior,
     FewTestable,
     HeldOutMissed,
     ImplausibleAmplitude,
@@ -117,6 +120,7 @@ from vegglue.results.verdict import (
     MisfitTooSmall,
     MisfitUnexplained,
     ModelErrorExceeded,
+    NameHangsOnSection,
     NeighboursCorrelated,
     NoneLeads,
     ParameterFarFromPrior,
@@ -131,6 +135,7 @@ from vegglue.workflow.compare import Comparison
 HERE = Path(__file__).parent
 COMMAND = "vegglue diagnose brook.yaml --details"
 STEEP = next(one for one in SHIPPED if one.name == "steep_bank")
+SURFACES = next(one for one in SHIPPED if one.name == "bank_roughness")
 
 
 def brook(**verdict: object) -> Diagnosis:
@@ -148,7 +153,8 @@ BANK = {"value": 0.67, "interval95": (0.54, 0.79), "unit": "-", "refitted": True
 
 def bank(**fields: object):
     usual = {"title": STEEP.title, "amplitude": 0.67, "interval95": (0.54, 0.79), "unit": "-"}
-    return an_effect_found("steep_bank", **(usual | {"rivals": (), "probability": 0.999} | fields))
+    name = str(fields.pop("name", "steep_bank"))
+    return an_effect_found(name, **(usual | {"rivals": (), "probability": 0.999} | fields))
 
 
 def doubt(*reasons: object, **verdict: object) -> Diagnosis:
@@ -187,6 +193,10 @@ VERDICTS: dict[str, Diagnosis] = {
         Rival("unlisted_bed", "bed", 0.79, 9.0, 0.5, 0.1), Rival("steep_bank", "effect", 0.08),
     )),
     "too many": doubt(TooManyGroups(tuple(Rival(name, "effect", 0.2) for name in ("wind", "waves", "steep_bank")))),
+    "a name of one section": doubt(NameHangsOnSection("steep_bank", "B", "wind"), effects=(bank(),)),
+    "two surfaces": brook(kind="identified", effects=(
+        bank(name="bank_roughness", title=SURFACES.title, amplitude=1.1, interval95=(0.9, 1.3)),
+    )),
     "a far parameter": doubt(ParameterFarFromPrior("n_b", 4.5), effects=(bank(),)),
     "an absurd size": doubt(AmplitudeBeyondPlausible("wind", 5.2), effects=(bank(),)),
     "misfit beyond errors": doubt(MisfitBeyondErrors(2.3), effects=(bank(),)),
@@ -204,6 +214,9 @@ VERDICTS: dict[str, Diagnosis] = {
 N_B, PHI = NamedParameter("n_b", "n_b", "s m^(-1/3)"), NamedParameter("phi", "φ", "-")
 VELOCITY = kind_of("velocity")
 NOTES = (
+    EstimateAtBound("n_b", 0.0051, "s m^(-1/3)", 0.005, 0.05, True),
+    BeyondHandbook("n_b", 0.062, "s m^(-1/3)", 0.01, 0.06, "Chow (1959) for streams wider than 30 m"),
+    EstimateOffPrior("eddy_viscosity", 0.002, "m2/s", 2.9),
     MisfitTooSmall(61.5, 150), ImplausibleAmplitude("wind", 3.4), EffectsNotExcluded(("wind", "waves"), beside=True),
     BedCorrected(49.0, -1.2, -0.3, (-0.45, -0.15), (45.0, 54.0)),
     BedCorrected(2.0, 0.4, 0.11, (0.02, 0.2), (float("nan"), float("nan"))),

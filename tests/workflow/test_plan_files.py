@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from browser import found_in_page
 from small_case import SMALL
 
 import vegglue
@@ -136,3 +137,17 @@ def test_effects_that_look_alike_are_one_group(made: Made) -> None:
     groups = confusions(plan.effects)
     assert len({name for group in groups for name in group}) == sum(map(len, groups))
     assert any({"smagorinsky", "mixing_length"} <= set(group) for group in groups)
+
+
+@pytest.mark.parametrize("width", [360, 1300])
+def test_the_page_fits_a_phone_and_a_desktop(made: Made, width: int) -> None:
+    folder, plan = made
+    script = """(window, document) => ({
+      wide: document.documentElement.scrollWidth,
+      rows: document.querySelectorAll("#order ~ div tbody tr").length,
+      stations: document.querySelectorAll("#stations ~ details tbody tr").length,
+    })"""
+    found = found_in_page(folder / "runs/small/plan/plan.html", width, script)
+    assert found["wide"] <= width
+    assert found["rows"] == len(plan.pieces)
+    assert found["stations"] == sum(len(one.y) for one in plan.pieces)

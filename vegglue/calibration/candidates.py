@@ -10,18 +10,20 @@ An instrument is found by its offset. A probe may be off by a factor, too: once 
 import itertools
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.case.case_effects import effect_of
+from vegglue.case.case_effects import effect_named, effect_of
+from vegglue.case.channel_geometry import site_scales
 from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case, EffectEntry, Parameter
 from vegglue.case.site_schema import Value
 from vegglue.decision_constants import constants
-from vegglue.effects.definition import Amplitude, Effect
+from vegglue.effects.definition import Amplitude, Effect, Need
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.engine.interface import Cause
@@ -41,7 +43,7 @@ class Candidate:
     """An effect and where it would act; empty tuples mean everywhere.
 
     at: its patch or its place, as a target of `EffectIdentity`; fixed: the shapes of it; scale: a plausible size in
-    this case, None for that of the effect.
+    this case, None for that of the effect; above_off: whether the amplitude may only lie above off.
     """
 
     effect: Effect
@@ -51,6 +53,7 @@ class Candidate:
     at: tuple[str, ...] = ()
     fixed: tuple[tuple[str, float], ...] = ()
     scale: float | None = None
+    above_off: bool = False
 
     @property
     def identity(self) -> EffectIdentity:
@@ -68,7 +71,8 @@ class Candidate:
     def amplitude(self) -> Amplitude:
         """That of the effect, with a plausible size in this case."""
         own = self.effect.amplitude
-        return own if self.scale is None else replace(own, scale=self.scale)
+        own = own if self.scale is None else replace(own, scale=self.scale)
+        return replace(own, low=own.off) if self.above_off else own
 
     @property
     def parameter(self) -> str:
@@ -90,12 +94,15 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
     device.
     """
     found = []
-    possible = where_it_may_act(case, station)
-    for effect in library(case.effect_file).values():
-        if effect.name in (case.exclude or ()):
+    possible, missing = where_it_may_act(case, station), missing_needs(case, station)
+    for name, listed in library(case.effect_file).items():
+        if name in (case.exclude or ()):
             continue
-        if NOT_SEARCHED & set(effect.tags) or (effect.stage == "plants" and not case.plants.patches):
+        if NOT_SEARCHED & set(listed.tags) or missing & set(listed.needs):
             continue
+        if listed.stage == "plants" and not case.plants.patches:
+            continue
+        effect = effect_named(case, name)
         if effect.each == "case":
             found.append(Candidate(effect))
         elif effect.each == "patch":
@@ -103,6 +110,42 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
         else:
             found += [acting_in(effect, effect.each, (name,)) for name in possible[effect.each]]
     return [one for one in found if not at_work(case, one)]
+
+
+# Heights in a vertical from which its mean is that of the depth, whatever the law: one is a sample, two give a slope,
+# three a curve.
+ENOUGH_HEIGHTS = 3
+
+
+def missing_needs(case: Case, station: pd.DataFrame) -> set[Need]:
+    """What effects may need and the site does not have: without it they are no candidates.
+
+    Side walls are those of a laboratory, where no wind blows and no water seeps in.
+    """
+    used = station[station["used"]]
+    kinds = [kind_of(str(name)) for name in used["kind"].unique()]
+    averaged = [one for one in case.observations if one.kind == "adv"]
+    has: dict[Need, bool] = {
+        "open air": case.friction.walls is None,
+        "open ground": case.friction.walls is None,
+        "banks": site_scales(case).banks,
+        "plants": bool(case.plants.patches),
+        "one surface": len({one.coefficient for one in case.friction.classes.values()}) == 1,
+        "gauges": any(kind.instrument == "gauge" for kind in kinds),
+        "few heights": not averaged
+        or len(averaged) < sum(kind_of(one.kind).velocity for one in case.observations if one.kind != "adv")
+        or min(heights_in_verticals(str(one.file), one.case) for one in averaged) < ENOUGH_HEIGHTS,
+    }
+    return {need for need, there in has.items() if not there}
+
+
+@lru_cache
+def heights_in_verticals(file: str, case: str | None) -> float:
+    """Median number of points in the verticals of a table of ADV points; case: the rows of it that count."""
+    rows = pd.read_csv(file)
+    rows = rows[rows["case"] == case] if case is not None and "case" in rows else rows
+    place = [name for name in ("experiment", "section", "x", "y") if name in rows]
+    return float(rows.groupby(place).size().median()) if place and len(rows) else 0.0
 
 
 def at_work(case: Case, candidate: Candidate) -> bool:
@@ -163,10 +206,12 @@ def patch_candidate(effect: Effect, index: int, case: Case) -> Candidate:
     return Candidate(effect, at=(case.plants.patches[index].name,), fixed=(("patch", index + 1.0),))
 
 
-def place_candidate(effect: Effect, place: Mapping[str, float], scale: float | None = None) -> Candidate:
+def place_candidate(
+    effect: Effect, place: Mapping[str, float], scale: float | None = None, above_off: bool = False
+) -> Candidate:
     """Something unlisted at a place, x and y among its shapes [m]; scale: a plausible size."""
     at = EffectIdentity.at_place(effect.name, place["x"], place["y"]).target
-    return Candidate(effect, at=at, fixed=tuple(place.items()), scale=scale)
+    return Candidate(effect, at=at, fixed=tuple(place.items()), scale=scale, above_off=above_off)
 
 
 def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, float]) -> EffectEntry:

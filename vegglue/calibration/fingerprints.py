@@ -6,13 +6,15 @@ the water, of drag, of bed level, of inflow or of viscosity.
 A place has one fingerprint for all experiments: what lies there stays where it is.
 """
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Candidate, candidates_of, cause_of
 from vegglue.calibration.model_error import (
@@ -24,9 +26,9 @@ from vegglue.calibration.model_error import (
     gaussian_basis_at,
     responses_to_basis,
 )
+from vegglue.case.channel_geometry import site_scales
 from vegglue.case.grid import cell_stretch
 from vegglue.case.gridded_site import in_experiment
-from vegglue.case.parameter_space import middle_value
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.effects.definition import Amplitude
@@ -52,8 +54,12 @@ SPOT_CELLS = 1.0
 STEPS_AROUND = 4
 # Share of a spot that has to lie under water, of water that enters in all experiments, else in one of them [-].
 LEAST_SHARE = 0.5
-# Depth [m] above which a cell counts as under water.
+# Depth over that of the site [-] above which a cell counts as under water.
 LEAST_DEPTH = 0.05
+# Cells that a spot keeps from the inflow at least: nearer, it only changes how the water enters.
+FROM_INFLOW = 2.0
+# Share of a spot under plants [-] up to which it lies on a bare bed.
+WITHOUT_PLANTS = 0.02
 # The effect of the library that stands for a term at a place.
 EFFECT_AT_PLACE: Mapping[Term, str] = {term: effect for effect, term in TERM_OF.items()}
 
@@ -61,7 +67,8 @@ EFFECT_AT_PLACE: Mapping[Term, str] = {term: effect for effect, term in TERM_OF.
 @dataclass(frozen=True)
 class Places:
     """Spots of one term: middles x, y, half lengths and half widths (spot,) [m]; plausible: size of one [unit of the
-    effect that stands for it]; fingerprints (station, spot) [unit of a station per that of the effect].
+    effect that stands for it]; fingerprints (station, spot) [unit of a station per that of the effect]; bare (spot,):
+    whether no plants stand there.
     """
 
     term: Term
@@ -71,6 +78,13 @@ class Places:
     width: Array
     plausible: float
     fingerprints: Array
+    bare: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    @property
+    def only_sign(self) -> NDArray[np.int_]:
+        """The only sign that the size of each spot may have, 0 for both (spot,): a bare bed has no drag to lose."""
+        one_sided = self.term == "drag" and self.bare.size == self.x.size
+        return self.bare.astype(int) if one_sided else np.zeros(self.x.size, dtype=int)
 
     @property
     def name(self) -> str:
@@ -78,8 +92,9 @@ class Places:
         return f"{self.term} at a place"
 
     def shapes(self, spot: int) -> dict[str, float]:
-        """The shapes of the effect at one of them, rounded to a centimetre."""
-        return {name: round(float(getattr(self, name)[spot]), 2) for name in ("x", "y", "length", "width")}
+        """The shapes of the effect at one of them, rounded to a centimetre, or to a tenth of its half width."""
+        digits = digits_of_place(float(self.width[spot]))
+        return {name: round(float(getattr(self, name)[spot]), digits) for name in ("x", "y", "length", "width")}
 
 
 @dataclass(frozen=True)
@@ -107,6 +122,11 @@ class Fingerprints:
         """Whether gains (c,), and their opposites, are allowed for each column, (2, c); see `Amplitude.allows`."""
         pairs = list(zip(self.amplitudes, gains, strict=True))
         return np.array([[amplitude.allows(sign * gain, largest) for amplitude, gain in pairs] for sign in (1.0, -1.0)])
+
+
+def digits_of_place(width: float) -> int:
+    """Decimals of coordinates [m] of something of a half width [m]."""
+    return max(2, 1 - math.floor(math.log10(width)))
 
 
 def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
@@ -139,8 +159,9 @@ def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ..
         term: [gaussian_basis(grid, length * width, width, SPOT_CELLS) for length in lengths]
         for term, lengths in SPOT_LENGTHS.items()
         if term not in excluded
+        and not (term == "inflow" and model.case.friction.walls is not None)  # no water passes a wall
     }
-    return _places_over(model, point, rasters)
+    return _places_over(model, point, rasters, beside_inflow=False)
 
 
 def places_around(model: Model, point: Point, term: Term, place: Mapping[str, float], share: float) -> Places:
@@ -153,7 +174,10 @@ def places_around(model: Model, point: Point, term: Term, place: Mapping[str, fl
     return _places_over(model, point, {term: [gaussian_basis_at(model.site.grid, x, y, length, width)]})[0]
 
 
-def _places_over(model: Model, point: Point, rasters: Mapping[Term, Sequence[GaussianBasis]]) -> tuple[Places, ...]:
+def _places_over(
+    model: Model, point: Point, rasters: Mapping[Term, Sequence[GaussianBasis]], beside_inflow: bool = True
+) -> tuple[Places, ...]:
+    """beside_inflow: whether spots may reach the inflow, where any of them is another distribution of what enters."""
     cells, grid = cell_responses(model, point, tuple(rasters)), model.site.grid
     water = {}
     if "inflow" in rasters:
@@ -162,13 +186,12 @@ def _places_over(model: Model, point: Point, rasters: Mapping[Term, Sequence[Gau
             water[experiment] = share_under_water(model.case, site, model.case.experiments[experiment])
             cells.of["inflow"][rows] *= water[experiment]
     depth = np.stack([flow_at_centres(model, point, name).depth for name in point.flows])
-    wet = depth > LEAST_DEPTH
-    mean_depth = float(depth[wet].mean()) if wet.any() else 0.0
+    wet = depth > least_depth(model)
 
     def places_of_term(term: Term, spots: Sequence[GaussianBasis]) -> Places:
         # Water that enters does so where there is water at all times.
         seen = wet.all(axis=0) if term == "inflow" else wet.any(axis=0)
-        parts = []
+        parts, bare, cover = [], [], model.site.cover
         for over in spots:
             answers = responses_to_basis(cells, term, over)
             if term == "inflow":
@@ -183,20 +206,30 @@ def _places_over(model: Model, point: Point, rasters: Mapping[Term, Sequence[Gau
             within = share > LEAST_SHARE * over.along.sum(axis=1)[:, None] * over.across.sum(axis=1)[None]
             # With the middle in the grid, to a cell, as places are rounded.
             along = (over.x >= grid.x[0] - grid.dx) & (over.x <= grid.x[-1] + grid.dx)
+            if not beside_inflow:
+                along &= over.x >= grid.x[0] + max(over.length, FROM_INFLOW * grid.dx)
             across = (over.y >= grid.y[0] - grid.dy) & (over.y <= grid.y[-1] + grid.dy)
             a, b = np.nonzero(within & (along[:, None] & across))
             size = np.full((2, a.size), [[over.length], [over.width]])
             parts.append((over.x[a], over.y[b], *size, answers[:, a, b]))
+            bare.append((over.along @ cover @ over.across.T <= WITHOUT_PLANTS * share)[a, b])
         x, y, length, width, fingerprints = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
-        return Places(term, x, y, length, width, plausible_size(model.case, term, mean_depth), fingerprints)
+        return Places(term, x, y, length, width, plausible_size(model.case, term), fingerprints, np.concatenate(bare))
 
     return tuple(in_threads(places_of_term, rasters.items()))
 
 
-def plausible_size(case: Case, term: Term, depth: float) -> float:
-    """Of the effect that stands for a term at a place, in its unit, in water of a mean depth [m]."""
-    of = constants()
-    if term != "inflow":
-        return {"drag": of.spot_drag, "bed": of.spot_rise * depth, "viscosity": of.spot_viscosity}[term]
-    totals = [sum(middle_value(case, value) for value in one.discharge.values()) for one in case.experiments.values()]
-    return of.spot_inflow * float(np.mean(totals))
+def least_depth(model: Model) -> float:
+    """Depth above which a cell counts as under water [m]."""
+    return LEAST_DEPTH * site_scales(model.case, model.site).depth
+
+
+def plausible_size(case: Case, term: Term) -> float:
+    """Of the effect that stands for a term at a place, in its unit: a multiple of a scale of the site."""
+    of, scales = constants(), site_scales(case)
+    return {
+        "drag": of.spot_drag * scales.of("object"),
+        "bed": of.spot_rise * scales.mean_depth,
+        "inflow": of.spot_inflow * scales.discharge,
+        "viscosity": of.spot_viscosity * scales.of("eddy"),
+    }[term]

@@ -99,14 +99,14 @@ def _in_case(law: Law, water: _Water, first: float | None = None, change: float 
         for cells in flows:
             q = np.broadcast_to(law.quantity.of(cells), cells.depth.shape)
             share = np.broadcast_to(law.term.share(cells), cells.depth.shape)
-            found = q[(share > 0.0) & (cells.depth > LEAST_DEPTH)]
+            found = q[(share > 0.0) & (cells.depth > LEAST_DEPTH * cells.geometry.depth_scale)]
             parts.append(found[np.isfinite(found)])
         return np.concatenate(parts)
 
     def with_references(shape: Shape) -> Shape:
         if shape.name == "reference":
-            return replace(shape, default=tried[len(tried) // 2], grid=tuple(tried))
-        return shape if first is None else replace(shape, default=first)
+            return replace(shape, default=tried[len(tried) // 2], grid=tuple(tried), of="")
+        return shape if first is None else replace(shape, default=first, of="")
 
     everywhere, measured = water
     values = values_in(measured)
@@ -225,7 +225,9 @@ def laws_beyond_their_range(model: Model, point: Point) -> Iterator[LawBeyondRan
                 changed = next(iter(effect.act(cells, **strength, **shapes).values()))
                 off = 0.0 if effect.stage == "exchange" else cells.rate
                 q = np.broadcast_to(seen.of(cells), cells.depth.shape)
-                found.append(q[(changed != off) & (cells.depth > LEAST_DEPTH) & np.isfinite(q)])
+                found.append(
+                    q[(changed != off) & (cells.depth > LEAST_DEPTH * cells.geometry.depth_scale) & np.isfinite(q)]
+                )
             measured = bool(found[0].size)
             q = found[0] if measured else found[1]
             share = float(np.mean((q < seen.low) | (q > seen.high))) if q.size else 0.0

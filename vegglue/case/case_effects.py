@@ -5,11 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from vegglue.arrays import Array
+from vegglue.case.channel_geometry import site_scales
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import Value
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.definition import Effect, Stage
 from vegglue.effects.library import library
+from vegglue.effects.scales import has_scales, sized
 
 Theta = Mapping[str, Array]
 
@@ -21,9 +23,15 @@ def value_of(value: Value, theta: Theta, members: int) -> Array:
     return np.full(members, float(value))
 
 
+def effect_named(case: Case, name: str) -> Effect:
+    """The effect of this name in the library, with sizes made of the scales of the case."""
+    effect = library(case.effect_file)[name]
+    return sized(effect, site_scales(case)) if has_scales(effect) else effect
+
+
 def effect_of(case: Case, name: str) -> Effect:
-    """The effect, from the library, that an entry of `effects` stands for."""
-    return library(case.effect_file)[case.effects[name].effect or name]
+    """The effect that an entry of `effects` stands for, see `effect_named`."""
+    return effect_named(case, case.effects[name].effect or name)
 
 
 def parameters_of_effects(case: Case) -> set[str]:

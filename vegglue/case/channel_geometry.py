@@ -2,6 +2,7 @@
 what of it is known before anything flows: discharges that have entered, and expected depths.
 """
 
+from collections import OrderedDict
 from functools import lru_cache
 
 import numpy as np
@@ -9,10 +10,13 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.grid import Grid, cell_stretch, curvature_of, filter_width_of
-from vegglue.case.gridded_site import Site, in_experiment
-from vegglue.case.parameter_space import middle_value
+from vegglue.case.gridded_site import Site, build_site, in_experiment
+from vegglue.case.parameter_space import middle_value, value_at
 from vegglue.case.schema import Case, Experiment
+from vegglue.case.site_schema import FrictionClass
 from vegglue.case.zones import BANK_SLOPE, beyond_slope_break
+from vegglue.effects.physical_constants import GRAVITY
+from vegglue.effects.scales import SiteScales
 from vegglue.effects.surroundings import ChannelGeometry
 
 # Least distance of the centre of a cell from the front or side of a patch, over the size of the cell [-]: the mean over
@@ -26,9 +30,9 @@ def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry
     """The geometry (nx, ny, 1) that effects see in one experiment, with the patches that stand in it."""
     stems = np.array([patch.stems for patch in case.plants.patches])
     relative = tuple((stems / stems.mean()).tolist()) if stems.size else ()
-    return _geometry(
-        in_experiment(site, experiment), filter_width_of(case), patches_present(case, experiment), relative
-    )
+    scales, patches = site_scales(case, site), patches_present(case, experiment)
+    of_flow = scales.depth, scales.speed
+    return _geometry(in_experiment(site, experiment), filter_width_of(case), patches, relative, of_flow)
 
 
 def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
@@ -59,6 +63,11 @@ def half_width(site: Site) -> float:
     return float(np.median(_section(site)[1]))
 
 
+def beyond_floor(site: Site) -> NDArray[np.bool_]:
+    """Cells (nx, ny) beyond the toe of the banks."""
+    return ~_section(site)[2]
+
+
 def cells_across(site: Site) -> float:
     """Width of the floor over that of a cell, 2 `half_width` / dy [-]."""
     return 2.0 * half_width(site) / site.grid.dy
@@ -66,7 +75,11 @@ def cells_across(site: Site) -> float:
 
 @lru_cache(GEOMETRIES_KEPT)  # every problem of every member needs the same
 def _geometry(
-    site: Site, filter_width: float, present: tuple[int, ...], relative_stems: tuple[float, ...]
+    site: Site,
+    filter_width: float,
+    present: tuple[int, ...],
+    relative_stems: tuple[float, ...],
+    of_flow: tuple[float, float],
 ) -> ChannelGeometry:
     grid, bed = site.grid, site.bed
     axis, half_width, floor = _section(site)
@@ -84,6 +97,8 @@ def _geometry(
         dx=grid.dx,
         dy=grid.dy,
         filter_width=filter_width,
+        depth_scale=of_flow[0],
+        speed_scale=of_flow[1],
         bed=bed[..., None],
         offset=((grid.y[None] - axis[:, None]) / half_width[:, None])[..., None],
         half_width=np.repeat(half_width[:, None, None], grid.y.size, axis=1),
@@ -129,7 +144,7 @@ def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGe
     if geometry.turning.size:
         cut |= {"stretch": geometry.stretch[columns, rows], "turning": geometry.turning[columns, rows]}
     along = {name: getattr(geometry, name)[columns] for name in ("x", "share_along")}
-    whole = {name: getattr(geometry, name) for name in ("dx", "dy", "filter_width")}
+    whole = {name: getattr(geometry, name) for name in ("dx", "dy", "filter_width", "depth_scale", "speed_scale")}
     return ChannelGeometry(y=geometry.y[:, rows], **whole, **along, **cut)
 
 
@@ -170,3 +185,84 @@ def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
     floor = site.bed.min(axis=1)
     level = np.maximum(outlet, floor + outlet - floor[-1])
     return level[:, None] - site.bed
+
+
+# Cases whose scales are kept: one, its children and those of held-out experiments.
+SCALES_KEPT = 16
+_kept: OrderedDict[tuple[int, ...], tuple[tuple[object, ...], SiteScales]] = OrderedDict()
+
+
+def site_scales(case: Case, site: Site | None = None) -> SiteScales:
+    """The scales of a case; site: on its grid, if it is at hand.
+
+        h = mean over the experiments of the median depth on the floor,   U = Q / A,   u* = (g h S)^(1/2)
+
+    with a water surface parallel to the floor, as `expected_depth` has it, and S the slope of the bed if Manning's n or
+    the roughness between the ends of its prior can balance it, else S = (U / (C h^(1/2)))^2 of the middle of the prior.
+    Kept by the parts of the case that they hang on, which its children and its coarser grids share.
+    """
+    parts = (case.bed, case.experiments, case.friction, case.plants, case.eddy_viscosity)
+    key = tuple(map(id, parts))
+    if key in _kept:
+        return _kept[key][1]
+    found = _scales(case, build_site(case) if site is None else site)
+    _kept[key] = (parts, found)  # with the parts, whose identities are theirs as long as they are kept
+    while len(_kept) > SCALES_KEPT:
+        _kept.popitem(last=False)
+    return found
+
+
+def _scales(case: Case, site: Site) -> SiteScales:
+    depths, means, speeds, discharges = [], [], [], []
+    banks = beyond_floor(site)
+    for name, experiment in case.experiments.items():
+        here = in_experiment(site, name)
+        depth = np.maximum(expected_depth(case, here, experiment), 0.0)
+        floor = np.where(beyond_floor(here), 0.0, depth)
+        wet = (depth > 0.0).sum(axis=1)
+        area, columns = depth.sum(axis=1) * site.grid.dy, wet > 0
+        on_floor = floor[floor > 0.0]
+        if not columns.any() or not on_floor.size:
+            continue
+        discharge = sum(middle_value(case, value) for value in experiment.discharge.values())
+        discharges.append(discharge)
+        depths.append(float(np.median(on_floor)))
+        means.append(float(np.median(area[columns] / (wet[columns] * site.grid.dy))))
+        speeds.append(discharge / float(np.median(area[columns])))
+    width = half_width(site)
+    depth = float(np.mean(depths)) if depths else width
+    speed = max(float(np.mean(speeds)) if speeds else 1.0, 1e-3 * (GRAVITY * depth) ** 0.5)
+    of_floor = case.friction.classes[case.friction.default]
+    slopes = sorted((speed / (_chezy(case, of_floor, share, depth) * depth**0.5)) ** 2 for share in (0.0, 0.5, 1.0))
+    level = (site.bed * ~banks).sum(axis=1) / np.maximum((~banks).sum(axis=1), 1)
+    has_floor = (~banks).any(axis=1)
+    fall = -float(np.polyfit(site.grid.x[has_floor], level[has_floor], 1)[0]) if has_floor.sum() > 1 else 0.0
+    slope = fall if slopes[0] <= fall <= slopes[2] else slopes[1]
+    heights = [middle_value(case, one.canopy_height) for one in case.plants.stands.values()]
+    patches = [site.patch == index for index in np.unique(site.patch[site.patch >= 0])]
+    lengths = [float(one.any(axis=1).sum() * site.grid.dx) for one in patches]
+    widths = [float(one.any(axis=0).sum() * site.grid.dy) for one in patches]
+    return SiteScales(
+        depth=depth,
+        mean_depth=float(np.mean(means)) if means else depth,
+        half_width=width,
+        speed=speed,
+        shear_velocity=(GRAVITY * depth * slope) ** 0.5,
+        slope=slope,
+        discharge=float(np.mean(discharges)) if discharges else speed * depth * width,
+        viscosity=middle_value(case, case.eddy_viscosity),
+        canopy=float(np.median(heights)) if heights else 0.5 * depth,
+        patch_length=float(np.median(lengths)) if lengths else 2.0 * width,
+        patch_width=float(np.median(widths)) if widths else width,
+        banks=bool(banks.any()),
+    )
+
+
+def _chezy(case: Case, of: FrictionClass, share: float, depth: float) -> float:
+    """C [m^1/2/s] at a share of the prior of its coefficient: h^(1/6)/n, 18 log10(12 h/k_s), or given."""
+    value = value_at(case, of.coefficient, share)
+    if of.law == "manning":
+        return depth ** (1.0 / 6.0) / value
+    if of.law == "keulegan":
+        return 18.0 * float(np.log10(max(12.0 * depth / value, case.numerics.bank_argument_minimum)))
+    return value

@@ -2,6 +2,7 @@
 disagree: every name used is declared and every declaration used, files and places exist.
 """
 
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -323,6 +324,8 @@ def _agree_on_effects(case: Case) -> None:
             if word not in parameters:
                 raise CaseError(at, f"is no parameter of this effect: {nearest(word, list(parameters))}")
             low, high, unit = parameters[word].low, parameters[word].high, parameters[word].unit
+            if parameters[word].of:  # multiples of what the site is like: their signs alone are known here
+                low, high = (0.0 if low >= 0.0 else -math.inf), (0.0 if high <= 0.0 else math.inf)
             if isinstance(value, str) and value in case.parameters:
                 prior = case.parameters[value]
                 if share_below(prior, low) > LEAST_PROBABILITY or share_below(prior, high) < 1.0 - LEAST_PROBABILITY:

@@ -84,6 +84,7 @@ def effects_command(
         _check(check, as_object, trust)
         return
     case = vegglue.load_case(config, trust) if config is not None else None
+    from vegglue.case.case_effects import effect_named
     from vegglue.case.messages import nearest_effect
     from vegglue.effects.definition import STAGES
     from vegglue.effects.library import library
@@ -101,7 +102,7 @@ def effects_command(
         return
     if name not in known:
         raise InputError(f"effects: there is no effect `{name}`: {nearest_effect(name, known)}")
-    effect, doing = known[name], []
+    effect, doing = known[name] if case is None else effect_named(case, name), []
     for key, entry in ({} if case is None else case.effects).items():
         if case is not None and (entry.effect or key) == name:
             of = {one: case.parameters[one].distribution for one in entry.values.values() if isinstance(one, str)}
@@ -139,7 +140,7 @@ def _check(file: Path, as_object: bool, trust: bool) -> None:
 
 def effect_json(effect: "Effect") -> dict[str, object]:
     """All that is declared of an effect."""
-    plain = ("name", "stage", "title", "equation", "source", "doi", "checked", "read_in", "each", "mirrored")
+    plain = ("name", "stage", "title", "equation", "source", "doi", "checked", "read_in", "each", "mirrored", "needs")
     of_values = {"amplitude": vars(effect.amplitude), "shapes": [vars(shape) for shape in effect.shapes]}
     return {name: getattr(effect, name) for name in plain} | of_values | {"tags": list(effect.tags)}
 

@@ -82,6 +82,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[objec
         *channel_check.remarks_on_canopies(case, site, observations),
         *channel_check.remarks_on_bank_law(case, site),
         *station_check.remarks_on_patch_edges(case, observations),
+        *station_check.remarks_on_walls(case, observations),
         *vertical_check.remarks_on_errors_across_plants(case, observations),
         *flow_check.remarks_on_discharges(case, site, observations),
     ]

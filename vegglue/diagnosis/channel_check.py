@@ -20,7 +20,7 @@ from vegglue.case.zones import BANK_SLOPE, area_of, corners_of, share_in_patch, 
 from vegglue.diagnosis.flow_check import dry_outlets
 from vegglue.measurements.kinds import UnstatedErrors, unstated_errors
 from vegglue.measurements.observations import OUTSIDE, Observations
-from vegglue.results.fields import excess
+from vegglue.results.fields import FieldsTooLarge, excess
 
 # Share of the wet cells from which it matters that they are steep [-]: with banks twice as rough as the floor, a tenth
 # of the width changes its friction by a tenth, which is twice what imported cases allow the model for.
@@ -258,7 +258,7 @@ class StationUnused:
 class FieldsBeyondBudget:
     """Kept fields larger than their budget; reason: the refusal of `simulate`."""
 
-    reason: str
+    reason: FieldsTooLarge
 
 
 @dataclass(frozen=True)
@@ -445,8 +445,8 @@ def refused_for_errors(case: Case, table: pd.DataFrame) -> Iterator[ErrorsRefuse
 
 def remarks_on_kept_fields(case: Case, site: Site) -> Iterator[FieldsBeyondBudget]:
     """Fields that would exceed their budget."""
-    if reason := excess(case, site.grid):
-        yield FieldsBeyondBudget(reason)
+    if beyond := excess(case, site.grid):
+        yield FieldsBeyondBudget(beyond)
 
 
 def remarks_on_parameters(case: Case, site: Site) -> Iterator[object]:

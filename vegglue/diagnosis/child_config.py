@@ -20,6 +20,8 @@ from vegglue.calibration.candidates import (
     where_it_may_act,
     with_effect,
 )
+from vegglue.calibration.fingerprints import digits_of_place
+from vegglue.case.case_effects import effect_named
 from vegglue.case.messages import nearest_effect
 from vegglue.case.resolved_config import Tree
 from vegglue.case.schema import Case
@@ -43,7 +45,7 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
     identity, known = EffectIdentity.parse(name), library(case.effect_file)
     if identity.name not in known or identity.text != name:
         raise InputError(f"--add: `{name}` is not an effect of the library: {nearest_effect(identity.name, known)}")
-    effect, where = known[identity.name], tuple(part.strip() for part in identity.target)
+    effect, where = effect_named(case, identity.name), tuple(part.strip() for part in identity.target)
     if where and "search" in effect.tags:
         place = EffectIdentity(effect.name, where).place
         if place is None:
@@ -79,7 +81,7 @@ def spread_over_its_error(anomaly: LocalAnomaly) -> LocalAnomaly:
     A spot exp(-(x / l)^2) whose middle errs by a normal e_x has this as its mean. What enters stays as much as it is.
     """
     length, width = (
-        round(float(np.hypot(half, 2.0**0.5 * error)), 2)
+        round(float(np.hypot(half, 2.0**0.5 * error)), digits_of_place(anomaly.width))
         for half, error in ((anomaly.length, anomaly.x_spread), (anomaly.width, anomaly.y_spread))
     )
     share = 1.0 if anomaly.term == "inflow" else anomaly.length * anomaly.width / (length * width)
@@ -96,7 +98,7 @@ def spread_over_its_error(anomaly: LocalAnomaly) -> LocalAnomaly:
 
 def candidate_at(case: Case, anomaly: LocalAnomaly) -> Candidate:
     """Something unlisted where a diagnosis found it, with the size that the diagnosis held to be plausible there."""
-    return place_candidate(library(case.effect_file)[anomaly.effect], anomaly.shapes, anomaly.plausible)
+    return place_candidate(effect_named(case, anomaly.effect), anomaly.shapes, anomaly.plausible)
 
 
 def with_additions(parent: Case, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Case:

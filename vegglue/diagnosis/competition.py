@@ -37,12 +37,12 @@ from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Instrument, InstrumentKind, place_candidate, with_effect
-from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Places, places_around
+from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Places, digits_of_place, places_around
 from vegglue.calibration.residual_screening import Screening, conditional_screenings, refit_start
 from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors
+from vegglue.case.case_effects import effect_named
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
-from vegglue.effects.library import library
 from vegglue.progress import Progress, Watch
 
 # Odds beyond e^this are reported as this: larger numbers mean no more.
@@ -109,8 +109,10 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
         best = int(np.argmax(window.log_factor))
         if window.log_factor[best] < moved.log_factor + LEAST_RISE:
             break
-        shapes = {**moved.shapes, "x": round(float(window.x[best]), 2), "y": round(float(window.y[best]), 2)}
-        candidate = place_candidate(moved.candidate.effect, shapes, places.plausible)
+        digits = digits_of_place(moved.shapes["width"])
+        x, y = round(float(window.x[best]), digits), round(float(window.y[best]), digits)
+        shapes = {**moved.shapes, "x": x, "y": y}
+        candidate = place_candidate(moved.candidate.effect, shapes, places.plausible, moved.candidate.above_off)
         if candidate.key in search.model.case.effects:  # it would take the place of what acts there
             break
         start = start_with(search.model.case, candidate, shapes, moved.fitted.point.z[:-1], float(window.gain[best]))
@@ -152,7 +154,7 @@ def _window(search: SearchModel, places: Places, refit: Refit) -> Window:
     slope = noise.whiten(noise.used(point.slope[:, :-1]))
     projected = score_test.project(slope, residual, point.z[:-1], traces)
     size = projected.length * places.plausible
-    score = score_test.scores(projected, np.zeros(size.size, dtype=bool))
+    score = score_test.scores(projected, around.only_sign)
     gain = expected_gain(score, projected.length, size)
     first_order = log_factors(score, size)
     return Window(around.x, around.y, first_order - first_order[own] + refit.log_factor, gain)
@@ -225,7 +227,8 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
         spots = [(one, spot) for one, some in places for spot in some]
         for one, spot in spots:  # from the best place and shares of the size of its score
             shapes, gain = one.shapes(spot), float(kind_named(screening.kinds, one.term).gain[spot])
-            candidate = place_candidate(library(case.effect_file)[EFFECT_AT_PLACE[one.term]], shapes, one.plausible)
+            bare = bool(one.only_sign[spot])
+            candidate = place_candidate(effect_named(case, EFFECT_AT_PLACE[one.term]), shapes, one.plausible, bare)
             starts = (start_with(case, candidate, shapes, search.point.z, share * gain) for share in START_SHARES)
             trials.append(RefitTrial(candidate, shapes, tuple(starts)))
         refits = refits_of(search, trials, watch)
@@ -278,7 +281,7 @@ def promising_spots(screening: Screening, places: Places, best: float) -> list[i
     the same place has its name, and would take its place in the case.
     """
     kind, case = kind_named(screening.kinds, places.term), screening.search.model.case
-    effect = library(case.effect_file)[EFFECT_AT_PLACE[places.term]]
+    effect = effect_named(case, EFFECT_AT_PLACE[places.term])
     acting = [place_candidate(effect, places.shapes(spot)).key in case.effects for spot in range(places.x.size)]
     evidence = np.where(acting, -np.inf, kind.log_evidence)
     of_length = [np.flatnonzero(places.length == length) for length in np.unique(places.length)]

@@ -9,7 +9,7 @@ import pandas as pd
 
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, log_evidence
-from vegglue.calibration.fingerprints import LEAST_DEPTH
+from vegglue.calibration.fingerprints import least_depth
 from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
 from vegglue.calibration.law_screening import LawScreening
 from vegglue.calibration.learned_bed import learned_bed, wet_cells
@@ -27,6 +27,7 @@ from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.competition import tempering
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
+from vegglue.diagnosis.handbook import parameter_doubts
 from vegglue.diagnosis.held_out import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.search_state import SearchState, rivals_in
 from vegglue.effects.definition import Stage
@@ -51,6 +52,7 @@ from vegglue.results.verdict import (
     BedCorrected,
     EstimatedErrors,
     MeasuredStretch,
+    NameHangsOnSection,
     Note,
     PlacesOnMap,
     TooShallow,
@@ -121,6 +123,8 @@ NEIGHBOURS_WITHIN = 1.5
 BED_CORRECTIONS = 3
 # Hypotheses that a verdict names if none leads.
 UNDECIDED_NAMED = 3
+# Sections up to which a name is tried without each: of more, one hardly decides. Chosen, not measured.
+FEW_SECTIONS = 4
 # Share of the channel below which velocities come from a small part of it. Chosen, not measured.
 SMALL_PART = 0.5
 # Stages whose effects may change from place to place along the channel; others act at an end, or in what is read.
@@ -150,8 +154,9 @@ def assemble_diagnosis(
     field, field_map = (None, None) if likely else _field(first, last, found, misfit)
     base, before = last.base, first.base
     model_error = _model_error(last)
+    hangs_on = name_without_a_section(first, found)
     bed_map, of_bed = (None, []) if found.implausible else bed_of_measurements(base)
-    verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, held_out, of_bed)
+    verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, held_out, hangs_on, of_bed)
     strongest = first.ranking[:COMPARED]
     columns = [first.best_column(j) for j in strongest]
     # Scores of the term of the first place that was found, else of drag, before anything was accepted.
@@ -226,6 +231,7 @@ def _verdict(
     laws: CandidateLaws | None,
     model_error: ModelErrorUsed | None,
     held_out: Model | None,
+    hangs_on: NameHangsOnSection | None,
     of_bed: Sequence[Note],
 ) -> Verdict:
     """The verdict on what was found, once all that it rests on is computed."""
@@ -246,8 +252,9 @@ def _verdict(
     beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
     surroundings: list[Note] = [*of_bed, *mapped_places(model.case, named_places(found.places, undecided))]
     surroundings += measured_stretch(model.case, model.station)
+    surroundings += parameter_doubts(base)
     if not any(one.x.size for one in last.fingerprints.places):
-        surroundings.append(TooShallow(LEAST_DEPTH))
+        surroundings.append(TooShallow(least_depth(model)))
     return make_verdict(
         VerdictInputs(
             candidates=ranked,
@@ -272,8 +279,47 @@ def _verdict(
             remainder=bool(beside) and not significant_effects(last, found, found.slack),
             surroundings=tuple(surroundings),
             excluded=model.case.exclude or {},
+            hangs_on=hangs_on,
         )
     )
+
+
+def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnSection | None:
+    """The section without whose readings another listed effect leads the first accepted one, to first order; None where
+    the name survives each, where no effect was accepted first, and where there are more than FEW_SECTIONS.
+
+    Scores and evidence are those of the first screening, with the rows of one section taken out.
+    """
+    base, prints = first.base, first.fingerprints
+    used = base.model.station.iloc[base.noise.rows]
+    velocity = velocity_rows(used)
+    label = (used["experiment"] + "\n" + used["section"]).to_numpy()
+    sections = [str(name) for name in dict.fromkeys(label[velocity])]
+    names = [one.name for one in prints.candidates]
+    if not found.steps or found.places or not 1 < len(sections) <= FEW_SECTIONS:
+        return None
+    step = found.steps[0]
+    together = {name for group in step.groups if step.accepted in group for name in group} | set(step.rivals)
+    if step.accepted not in names:
+        return None
+    covariance = base.noise.lower @ base.noise.lower.T
+    point, plausible = base.fitted.point, np.array([one.plausible_gain for one in prints.amplitudes])
+    columns = base.noise.used(point.slope), base.noise.used(prints.values)
+    residual = base.noise.residual(point.prediction)
+    for section in sections:
+        kept = label != section
+        lower = np.linalg.cholesky(covariance[np.ix_(kept, kept)])
+        slope, changes = (np.linalg.solve(lower, part[kept]) for part in columns)
+        projected = score_test.project(slope, np.linalg.solve(lower, residual[kept]), point.z, changes)
+        scores = score_test.scores(projected, prints.only_sign)
+        evidence = score_test.log_factors(scores, plausible * projected.length)
+        of_each = np.array([float(evidence[some].max()) for some in prints.columns])
+        best = int(np.argmax(of_each))
+        own = max(float(of_each[names.index(name)]) for name in together if name in names)
+        ahead = (float(of_each[best]) - own) / float(tempering(np.array(own)))
+        if names[best] not in together and ahead > np.log(constants().same_kind_odds):
+            return NameHangsOnSection(step.accepted, section.rpartition("\n")[2], names[best])
+    return None
 
 
 def as_calibrated(place: LocalAnomaly, base: Baseline) -> LocalAnomaly:

@@ -31,7 +31,7 @@ from vegglue.diagnosis.competition import (
     nearly_as_likely,
     tempered_probabilities,
 )
-from vegglue.diagnosis.conclusion import assemble_diagnosis
+from vegglue.diagnosis.conclusion import NEIGHBOURS_WITHIN, assemble_diagnosis
 from vegglue.diagnosis.refits import calibrated_with, pruned
 from vegglue.diagnosis.search_state import (
     PriorWeight,
@@ -54,6 +54,7 @@ from vegglue.parallel import in_threads, submit
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.causes import CandidateEffect
 from vegglue.results.diagnosis import Diagnosis
+from vegglue.wording.phases import CALIBRATING, SEARCHING, SEARCHING_WITH
 from vegglue.wording.sentences import sentence
 
 # Effects and places that are accepted at most, and instruments.
@@ -78,7 +79,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     unseen: the model at measurements that no calibration sees, which silence has to agree with.
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
-    watch(Progress(with_compilation("calibrating the model as it is")))
+    watch(Progress(with_compilation(CALIBRATING)))
     implausible = tuple(implausible_values(model.case, model.site, model.station))
     try:
         base = kept_baseline(model)
@@ -87,7 +88,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
             raise
         why = " ".join(map(sentence, implausible))
         raise InputError(f"{model.case.name}: no flow comes near what was measured. {why}") from error
-    watch(Progress("looking for what is missing"))
+    watch(Progress(SEARCHING))
     first = screening = screen(base)
     found, effects = SearchState(implausible=implausible), dict[str, CandidateEffect]()
     laws = partial(laws_beside, first) if implausible else submit(laws_beside, first)
@@ -111,7 +112,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         earlier, last = found.steps[: len(found.steps) - newest], found.steps[len(found.steps) - newest :]
         base, again, effects = with_rivals_again(base, earlier, found.flagged, effects, watch)
         found = found.with_steps((*again, *last))
-        watch(Progress("looking for what is missing with it"))
+        watch(Progress(SEARCHING_WITH))
         at_hand = branch.screening if base is branch.base else None
         screening = at_hand or screen(base, found.flagged)
         model, fitted = screening.base.model, screening.base.fitted
@@ -174,6 +175,15 @@ def _best_branch(
     return replace(ends[best], found=taken)
 
 
+def beside_excluded(base: Baseline, instrument: Instrument, found: SearchState) -> bool:
+    """Whether a single reading stands side by side with one that is excluded already."""
+    if instrument.kind != "reading":
+        return False
+    earlier = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
+    rows = [int(np.flatnonzero(base.noise.rows == station)[0]) for station in earlier]
+    return any(0.0 < base.noise.separation[row, instrument.readings[0]] < NEIGHBOURS_WITHIN for row in rows)
+
+
 def branch_with(
     screening: Screening, hypotheses: Sequence[Hypothesis], j: int, found: SearchState, watch: Watch
 ) -> SearchBranch | None:
@@ -189,6 +199,8 @@ def branch_with(
     if enough or one.log_evidence < 0.0:
         return None
     if isinstance(one.what, Instrument):
+        if beside_excluded(base, one.what, found):  # neighbours that fall together are a misfit of the model
+            return None
         watch(Progress(f"excluding a {one.kind} that is off"))
         noise = with_unknown_errors(base.noise, error_columns(one.what, base.noise.value))
         without = replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))

@@ -4,20 +4,23 @@ Shipped effects and a user's own are judged alike. `breaches` returns what an ef
 in `wording/templates/checks.j2`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
+from vegglue.case.channel_geometry import site_scales
 from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.schema import Case
 from vegglue.effects.active_effect import applied
 from vegglue.effects.definition import Effect
+from vegglue.effects.scales import sized
 from vegglue.effects.surroundings import PlantCells
 from vegglue.errors import InputError
 from vegglue.flow.closures import closures
@@ -28,12 +31,16 @@ from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.flow.starts import backwater
 
+# Length of the channel over that of a brook at which every shipped effect is tried [-]: a flume of 3 cm of water, a
+# brook, a river of 10 m.
+CHANNEL_SCALES = {"flume": 0.04, "brook": 1.0, "river": 15.0}
 # Column of cells from which on water is made faster, and how many upstream of it may feel that.
 CHANGED, FELT_AFAR = 20, 4
 # What a faulty function of an effect may raise.
 OF_ITS_FUNCTION = (ValueError, TypeError, KeyError, IndexError, AttributeError, NameError)
 AMPLITUDE = "amplitude"
-CHANNEL = {
+LEVEL_OF_OUTLET = 0.7
+CHANNEL: dict[str, Any] = {
     "name": "contract",
     "grid": {"x": (0.0, 20.0), "y": (-4.0, 4.0), "cell": (0.5, 0.5)},
     "bed": [
@@ -52,7 +59,7 @@ CHANNEL = {
         ],
     },
     "inflows": {"main": {"side": "west"}},
-    "experiments": {"flow": {"discharge": {"main": 1.2}, "level": 0.7}},
+    "experiments": {"flow": {"discharge": {"main": 1.2}, "level": LEVEL_OF_OUTLET}},
     "parameters": {AMPLITUDE: {"distribution": "uniform", "low": 0.0, "high": 1.0, "unit": "-"}},
 }
 # Stations stand in pairs that change places in the mirror.
@@ -65,6 +72,31 @@ TRIAL_STATIONS = pd.DataFrame(
     ]
 )
 PAIRS = np.arange(len(TRIAL_STATIONS)).reshape(-1, 4)[:, ::-1].ravel()
+
+
+def channel_at(scale: float) -> dict[str, Any]:
+    """CHANNEL with all lengths `scale` times as large, by Froude's law: Q ~ l^2.5, nu ~ l^1.5, n ~ l^(1/6)."""
+    (bed,), friction, plants = CHANNEL["bed"], CHANNEL["friction"], CHANNEL["plants"]
+
+    def longer(given: Mapping[str, Any], *keys: str) -> dict[str, Any]:
+        times = {key: np.multiply(given[key], scale).tolist() for key in keys}
+        return {**given, **times}
+
+    classes = {
+        "floor": {"law": "manning", "n": 0.04 * scale ** (1 / 6)},
+        "bank": {"law": "keulegan", "k_s": 0.5 * scale},
+    }
+    patches = [longer(one, "x", "y") for one in plants["patches"]]
+    stands = {name: longer(one, "canopy_height") for name, one in plants["stands"].items()}
+    return CHANNEL | {
+        "grid": longer(CHANNEL["grid"], "x", "y", "cell"),
+        "bed": [{"trapezoid": longer(bed["trapezoid"], "axis", "bottom_width", "level")}],
+        "friction": {**friction, "classes": classes},
+        "plants": {"stands": stands, "patches": patches},
+        "experiments": {"flow": {"discharge": {"main": 1.2 * scale**2.5}, "level": LEVEL_OF_OUTLET * scale}},
+        "eddy_viscosity": 0.01 * scale**1.5,
+        "numerics": {"film_depth": 0.01 * min(scale, 1.0)},
+    }
 
 
 class ContractRule(Enum):
@@ -112,6 +144,7 @@ class Trial:
     effect: Effect
     case: Case
     site: Site
+    stations: pd.DataFrame
 
     def problem(self, *amplitude: float) -> Problem:
         return build_problem(self.case, self.site, "flow", {AMPLITUDE: np.array(amplitude)})
@@ -121,11 +154,13 @@ class Trial:
         return build_problem(bare, self.site, "flow", {AMPLITUDE: np.zeros(members)})
 
 
-def trial(effect: Effect, own: Path | None = None) -> Trial:
-    """The channel with an effect in it; own: the file of the effect, if it is a user's."""
+def trial(effect: Effect, own: Path | None = None, scale: float = 1.0) -> Trial:
+    """The channel of some scale with an effect in it; own: the file of the effect, if it is a user's."""
     works = {effect.name: {"values": {effect.amplitude.name: AMPLITUDE}}}
-    case = Case.model_validate(CHANNEL | {"source": Path("contract"), "effect_file": own, "effects": works})
-    return Trial(effect, case, build_site(case))
+    case = Case.model_validate(channel_at(scale) | {"source": Path("contract"), "effect_file": own, "effects": works})
+    site = build_site(case)
+    stations = TRIAL_STATIONS.assign(x=scale * TRIAL_STATIONS["x"], y=scale * TRIAL_STATIONS["y"])
+    return Trial(sized(effect, site_scales(case, site)), case, site, stations)
 
 
 def at_rest(problem: Problem) -> Array:
@@ -143,12 +178,15 @@ def dry(problem: Problem) -> Array:
 
 
 def moving_water(problem: Problem) -> Array:
-    """Water in motion, not steady, not symmetric: every derivative differs from 0, and the banks are partly dry."""
+    """Water in motion, not steady, not symmetric: every derivative differs from 0, and the banks are partly dry; of the
+    same Froude number whatever the scale of the channel.
+    """
     nx, ny = problem.shape
+    scale = problem.dx / CHANNEL["grid"]["cell"][0]
     x, y = np.linspace(0.0, 1.0, nx)[:, None, None], np.linspace(-1.0, 1.0, ny)[None, :, None]
     state = at_rest(problem)
-    depth = np.clip(0.7 - problem.bed, 0.0, None)[..., None]
-    state[:, LEVEL] += 0.02 * (1.0 - x) + 0.002 * np.sin(7.0 * x + 2.0 * y)
+    depth = scale**-0.5 * np.clip(LEVEL_OF_OUTLET * scale - problem.bed, 0.0, None)[..., None]
+    state[:, LEVEL] += scale * (0.02 * (1.0 - x) + 0.002 * np.sin(7.0 * x + 2.0 * y))
     state[:, ALONG] = depth * (0.8 + 0.2 * np.sin(9.0 * x) + 0.15 * y - 0.3 * y**2)
     state[:, ACROSS] = depth * 0.1 * np.cos(8.0 * x + y)
     state[:, ACROSS, 0] = 0.0
@@ -172,7 +210,7 @@ def mirrored(state: Array) -> Array:
 
 def answer(tried: Trial, problem: Problem, state: Array) -> tuple[Array, Array]:
     """All that an effect can change: the residual (nx, 3, ny, m), and the readings (station, m)."""
-    return residual(problem, state), predictions_at_sensors(problem, state, tried.site.grid, TRIAL_STATIONS).T
+    return residual(problem, state), predictions_at_sensors(problem, state, tried.site.grid, tried.stations).T
 
 
 def sizes(effect: Effect) -> tuple[float, ...]:
@@ -184,12 +222,14 @@ def sizes(effect: Effect) -> tuple[float, ...]:
 WATERS = {"still": at_rest, "moving": moving_water, "backward": running_back, "no": dry}
 
 
-def breaches(effect: Effect, own: Path | None = None) -> list[Breach]:
-    """What an effect breaks of the contract; empty for a good one. own: the file of the effect, if it is a user's."""
+def breaches(effect: Effect, own: Path | None = None, scale: float = 1.0) -> list[Breach]:
+    """What an effect breaks of the contract; empty for a good one. own: the file of the effect, if it is a user's;
+    scale: of the channel, see `CHANNEL_SCALES`.
+    """
     declared = list(undeclared(effect))
     if declared:
         return declared
-    tried = trial(effect, own)
+    tried = trial(effect, own, scale)
     try:
         with np.errstate(divide="raise", over="raise", invalid="raise", under="ignore"):
             problem = tried.problem(*sizes(effect))

@@ -36,6 +36,7 @@ from vegglue.effects.grammar import SAME_AS
 from vegglue.engine.interface import Model
 from vegglue.engine.model import with_compilation
 from vegglue.progress import Progress, Watch
+from vegglue.wording.phases import CALIBRATING, SEARCHING_SECOND
 
 # How often errors alone sound the alarm of products [-]: it comes on top of that of laws, as theirs in a diagnosis.
 PRODUCT_ALARMS = 0.01
@@ -50,7 +51,7 @@ def product_beside(
 
     search: without the law; listed: fingerprints of what is listed there; refit: of the law.
     """
-    watch(Progress("looking for what that law changes with"))
+    watch(Progress(SEARCHING_SECOND))
     case = with_effect(search.model.case, refit.candidate, refit.shapes)
     base = Baseline(replace(search.model, case=case), search.noise, refit.fitted, None, None)
     screening = screen_products(base, listed, law, refit.shapes.get("reference"))
@@ -106,7 +107,7 @@ def discover_laws(model: Model, without: Sequence[str], watch: Watch) -> Discove
 
     Errors: InputError when the model finds no flow, or a station has no standard error.
     """
-    watch(Progress(with_compilation("calibrating the model as it is")))
+    watch(Progress(with_compilation(CALIBRATING)))
     return laws_beyond(baseline(model), without, watch)
 
 

@@ -103,6 +103,15 @@ class StationsOnPatchEdge:
     y: tuple[float, ...]
 
 
+@dataclass(frozen=True)
+class StationsNearWall:
+    """Velocities of a section within a cell of a side wall, in its boundary layer; y and width of a cell [m]."""
+
+    section: str
+    y: tuple[float, ...]
+    cell: float
+
+
 def remarks_on_stations(case: Case, site: Site, observations: Observations) -> Iterator[object]:
     """Stations outside the grid or above the expected water; one remark of each experiment."""
     table = observations.table
@@ -177,6 +186,16 @@ def remarks_on_patch_edges(case: Case, observations: Observations) -> Iterator[S
         near = [distance_to_outline(outline, x, y) < limit for x, y in zip(table["x"], table["y"], strict=True)]
         for section, rows in table[np.array(near, dtype=bool)].groupby("section"):
             yield StationsOnPatchEdge(str(section), patch.name, tuple(sorted({float(y) for y in rows["y"]})))
+
+
+def remarks_on_walls(case: Case, observations: Observations) -> Iterator[StationsNearWall]:
+    """Stations of velocity within a cell of a side wall, of whose boundary layer the model has the mean alone."""
+    table = observations.table[velocity_rows(observations.table) & observations.table["used"]]
+    if case.friction.walls is None:
+        return
+    (south, north), cell = case.grid.y, case.grid.cell[1]
+    for section, rows in table[np.minimum(table["y"] - south, north - table["y"]) < cell].groupby("section"):
+        yield StationsNearWall(str(section), tuple(sorted({float(y) for y in rows["y"]})), cell)
 
 
 def remarks_on_implausible_values(

@@ -3,8 +3,10 @@
 Shapes and units as in BoundaryValues. Parameters are (m,); unit and meaning of each stand in EFFECTS.
 """
 
+import numpy as np
+
 from vegglue.arrays import Array
-from vegglue.effects.definition import Amplitude, Effect
+from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import BoundaryValues
 
 
@@ -57,6 +59,27 @@ def inflow_core(boundary: BoundaryValues, excess: Array) -> dict[str, Array]:
         `spread` (inflow, cell, m) [-].
     """
     return {"spread": boundary.spread * (1.0 + excess * (1.0 - 3.0 * boundary.position**2) / 2.0)}
+
+
+def inflow_peak(boundary: BoundaryValues, excess: Array, middle: Array, width: Array) -> dict[str, Array]:
+    """q -> q (1 + a exp(-((s - c) / w)^2)), s = -1 .. 1 across each inflow.
+
+    Parameters
+    ----------
+    boundary : BoundaryValues
+    excess : (m,) [-]
+        relative excess a in the middle of that part.
+    middle : (m,) [-]
+        middle c of that part.
+    width : (m,) [-]
+        its half width w.
+
+    Returns
+    -------
+    dict
+        `spread` (inflow, cell, m) [-].
+    """
+    return {"spread": boundary.spread * (1.0 + excess * np.exp(-(((boundary.position - middle) / width) ** 2)))}
 
 
 def lateral_inflow(boundary: BoundaryValues, share: Array) -> dict[str, Array]:
@@ -127,6 +150,21 @@ EFFECTS = (
         checked=True,
     ),
     Effect(
+        name="inflow_peak",
+        stage="boundary",
+        title="More water enters at one part of the inflow",
+        equation="q -> q (1 + a exp(-((s - c)/w)^2)), s from -1 to 1 across the inflow towards larger y",
+        act=inflow_peak,
+        amplitude=Amplitude("excess", "-", "relative excess a in the middle of that part", 0.4, -0.9, 5.0),
+        shapes=(
+            Shape("middle", "-", "middle c of that part", 0.0, -1.0, 1.0, (-0.75, -0.45, -0.15, 0.15, 0.45, 0.75)),
+            Shape("width", "-", "its half width w", 0.3, 0.05, 2.0),
+        ),
+        source="definition",
+        checked=True,
+        mirrored=False,
+    ),
+    Effect(
         name="lateral_inflow",
         stage="boundary",
         title="Water seeps in along the reach",
@@ -137,6 +175,7 @@ EFFECTS = (
         ),
         source="definition",
         checked=True,
+        needs=("open ground",),
     ),
     Effect(
         name="outlet_level_error",
@@ -144,7 +183,7 @@ EFFECTS = (
         title="The water at the outlet stands higher than reported",
         equation="z_out -> z_out + d",
         act=outlet_level,
-        amplitude=Amplitude("rise", "m", "true level less the one reported", 0.05, -0.3, 0.3),
+        amplitude=Amplitude("rise", "m", "true level less the one reported", 0.05, -0.3, 0.3, of="depth"),
         source="definition",
         checked=True,
         each="experiment",

@@ -27,6 +27,10 @@ Act = Callable[..., Mapping[str, Array]]
 Stage = Literal["site", "boundary", "plants", "resistance", "exchange", "force", "sensor"]
 Each = Literal["case", "experiment", "section", "device", "patch"]
 EACH: tuple[Each, ...] = ("case", "experiment", "section", "device", "patch")
+# What a site has to have for an effect to act there: wind, and water that seeps in, need a channel without walls of a
+# laboratory; partial sampling needs verticals that were sampled at too few heights.
+Need = Literal["open air", "open ground", "banks", "plants", "gauges", "few heights", "one surface"]
+NEEDS: tuple[Need, ...] = ("open air", "open ground", "banks", "plants", "gauges", "few heights", "one surface")
 STAGES: tuple[Stage, ...] = ("site", "boundary", "plants", "resistance", "exchange", "force", "sensor")
 # What each stage hands on, and whether an effect adds to it or takes its place.
 ADDED = {"site": ("bed", "inflow"), "exchange": ("viscosity", "xx", "xy", "yy"), "force": ("x", "y")}
@@ -58,6 +62,11 @@ class Amplitude:
         The value [unit] at which the effect does nothing.
     power
         Exponent of the gain [-].
+    of
+        Scale of the site, see `scales.SiteScales.of`, of which scale, low, high and off are multiples; "": they are in
+        the unit.
+    low_of
+        Scale of which `low` is a multiple, if it is another.
     """
 
     name: str
@@ -68,6 +77,8 @@ class Amplitude:
     high: float
     off: float = 0.0
     power: int = 1
+    of: str = ""
+    low_of: str = ""
 
     @property
     def only_sign(self) -> int:
@@ -122,6 +133,8 @@ class Shape:
         Its support.
     grid
         Values that a search tries; empty: the default alone.
+    of
+        Scale of the site of which all of these are multiples; "": they are in the unit.
     """
 
     name: str
@@ -131,6 +144,7 @@ class Shape:
     low: float
     high: float
     grid: tuple[float, ...] = ()
+    of: str = ""
 
 
 @dataclass(frozen=True)
@@ -177,9 +191,11 @@ class Effect:
     mirrored
         Whether a mirrored flow feels the mirrored effect; if not, `equation` contains what breaks the mirror.
     tags
-        "search": something at a place; "law": of the grammar; "negative control".
+        "search": something at a place; "law": of the grammar; "negative control"; "common": an omission that is common.
     seen
         Where a discovered effect was found to hold; elsewhere it is an extrapolation, of which commands warn.
+    needs
+        What a site has to have, else the effect is not offered there.
     from_file
         Whether it was read from a user's file, so that what it returns is checked. Set by `library.effects_of`.
     """
@@ -199,6 +215,7 @@ class Effect:
     mirrored: bool = True
     tags: tuple[str, ...] = ()
     seen: SeenRange | None = None
+    needs: tuple[Need, ...] = ()
     from_file: bool = False
 
     @property

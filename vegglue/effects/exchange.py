@@ -14,8 +14,8 @@ from vegglue.effects.surroundings import Cells
 LEAST_RELATIVE_DEPTH = 0.2
 # Secondary currents fade out from here, in half widths from the axis: on the banks they have no room to turn.
 CURRENTS_END = 1.5
-# m2/s2, the square of 0.05 m/s, added to |U|^2: the direction of slower water shows no bend.
-STILL_SQUARED = 0.0025
+# Speed over that of the site [-], whose square is added to |U|^2: the direction of slower water shows no a bend.
+STILL = 0.1
 # a [-] at which b of `helical_flow` is held: the formula is for smoother beds.
 LARGEST_ROUGHNESS = 0.5
 
@@ -195,11 +195,11 @@ def curvature(cells: Cells) -> Array:
     """r = h (u^2 v_x - v^2 u_y + u v (v_y - u_x)) / |U|^3, depth over radius of the bend, as r / (1 + 4 r^2)^(1/2) [-].
 
     Positive where the flow turns towards larger y, and never above 1/2: no bend is narrower than it is deep.
-    |U|^2 is u^2 + v^2 + (0.05 m/s)^2, so that water at rest has no bend. Shape (nx, ny, m).
+    |U|^2 is u^2 + v^2 + (0.1 U)^2, U the speed of the site, so that water at rest has no bend. Shape (nx, ny, m).
     """
     u, v = cells.u, cells.v
     turn = u**2 * cells.v_x - v**2 * cells.u_y + u * v * (cells.v_y - cells.u_x)
-    bend = cells.depth * turn / (u**2 + v**2 + STILL_SQUARED) ** 1.5
+    bend = cells.depth * turn / (u**2 + v**2 + (STILL * cells.geometry.speed_scale) ** 2) ** 1.5
     return bend / np.sqrt(1.0 + 4.0 * bend**2)
 
 
@@ -233,7 +233,7 @@ EFFECTS = (
         title="Eddy viscosity larger or smaller than assumed",
         equation="nu -> nu + nu_1",
         act=viscosity,
-        amplitude=Amplitude("added", "m2/s", "viscosity nu_1 added", 0.02, -0.009, 0.5),
+        amplitude=Amplitude("added", "m2/s", "viscosity nu_1 added", 0.15, -0.9, 5.0, of="eddy", low_of="viscosity"),
         source="definition",
         checked=True,
     ),
@@ -264,7 +264,7 @@ EFFECTS = (
         title="Turbulence made by lateral shear",
         equation="nu -> nu + l^2 |du/dy|",
         act=mixing_length,
-        amplitude=Amplitude("length", "m", "mixing length l", 0.5, 0.0, 3.0, power=2),
+        amplitude=Amplitude("length", "m", "mixing length l", 0.5, 0.0, 3.0, power=2, of="depth"),
         source="Prandtl (1925)",
         doi="10.1002/zamm.19250050212",
     ),
@@ -275,9 +275,10 @@ EFFECTS = (
         equation="nu -> nu + c d^2 |du/dy| exp(-(e/d)^2), e the distance from the side of a patch",
         act=edge_mixing,
         amplitude=Amplitude("coefficient", "-", "c, viscosity over speed difference times width", 0.2, 0.0, 5.0),
-        shapes=(Shape("width", "m", BAND, 0.6, 0.05, 5.0, (0.3, 0.6, 1.2)),),
+        shapes=(Shape("width", "m", BAND, 0.4, 0.03, 3.3, (0.2, 0.4, 0.8), "half_width"),),
         source="after White and Nepf (2008)",
         doi="10.1029/2006WR005651",
+        needs=("plants",),
     ),
     Effect(
         name="coherent_structures",
@@ -287,8 +288,8 @@ EFFECTS = (
         act=coherent_structures,
         amplitude=Amplitude("coefficient", "-", "b, some 0.07", 0.1, 0.0, 1.0, power=2),
         shapes=(
-            Shape("width", "m", BAND, 2.0, 0.1, 20.0),
-            Shape("mean_depth", "m", "depth h_m between both", 0.6, 0.05, 10.0),
+            Shape("width", "m", BAND, 1.0, 0.05, 13.0, of="half_width"),
+            Shape("mean_depth", "m", "depth h_m between both", 1.0, 0.05, 10.0, of="mean_depth"),
         ),
         source="van Prooijen, Battjes and Uijttewaal (2005)",
         doi="10.1061/(ASCE)0733-9429(2005)131:3(175)",
@@ -299,10 +300,13 @@ EFFECTS = (
         title="Eddies shed behind the plants",
         equation="nu -> nu + c |U| exp(-s/L), s the distance downstream of a patch",
         act=wake_mixing,
-        amplitude=Amplitude("coefficient", "m", "c, viscosity over speed at the end of the patch", 0.05, 0.0, 1.0),
-        shapes=(Shape("length", "m", "length L over which they fade", 5.0, 0.2, 100.0, (2.0, 8.0)),),
+        amplitude=Amplitude(
+            "coefficient", "m", "c, viscosity over speed at the end of the patch", 0.03, 0.0, 0.6, of="patch_width"
+        ),
+        shapes=(Shape("length", "m", "length L over which they fade", 3.3, 0.13, 66.0, (1.3, 5.3), "patch_width"),),
         source="after Zong and Nepf (2012)",
         doi="10.1017/jfm.2011.479",
+        needs=("plants",),
     ),
     Effect(
         name="secondary_current",

@@ -11,11 +11,11 @@ from vegglue.effects.physical_constants import AIR_OVER_WATER, GRAVITY
 from vegglue.effects.surroundings import Cells
 
 WIND_DRAG = 1.3e-3  # C_w [-], of winds of some 8 m/s by Garratt (1977)
-LEAST_WINDY_DEPTH = 0.05  # m; a stress on less water would be a force without end
+LEAST_WINDY_DEPTH = 0.05  # over that of the site [-]; a stress on less water would be a force without end
 
 
 def wind(cells: Cells, speed: Array) -> dict[str, Array]:
-    """f_x = C_w (rho_air / rho) |W| W / h, C_w = 1.3e-3, h at least 0.05 m.
+    """f_x = C_w (rho_air / rho) |W| W / h, C_w = 1.3e-3, h at least 0.05 of that of the site.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def wind(cells: Cells, speed: Array) -> dict[str, Array]:
         `x` (nx, ny, m) [m/s2].
     """
     stress = WIND_DRAG * AIR_OVER_WATER * np.abs(speed) * speed
-    return {"x": stress / np.maximum(cells.depth, LEAST_WINDY_DEPTH)}
+    return {"x": stress / np.maximum(cells.depth, LEAST_WINDY_DEPTH * cells.geometry.depth_scale)}
 
 
 def panel_current(cells: Cells, strength: Array, slope: Array, bank_ratio: Array) -> dict[str, Array]:
@@ -77,13 +77,14 @@ EFFECTS = (
         name="wind",
         stage="force",
         title="Wind along the channel",
-        equation="f_x = C_w (rho_air / rho) |W| W / h, C_w = 1.3e-3, h at least 0.05 m",
+        equation="f_x = C_w (rho_air / rho) |W| W / h, C_w = 1.3e-3, h at least 0.05 of that of the site",
         act=wind,
         amplitude=Amplitude("speed", "m/s", "wind speed W downstream", 5.0, -30.0, 30.0, power=2),
         source="Garratt (1977)",
         read_in="RegCM, where C_w is 1.29e-3 at 8 m/s",
         doi="10.1175/1520-0493(1977)105<0915:RODCOO>2.0.CO;2",
         tags=("negative control",),
+        needs=("open air",),
     ),
     Effect(
         name="panel_current",
@@ -93,7 +94,7 @@ EFFECTS = (
         act=panel_current,
         amplitude=Amplitude("strength", "-", "strength k = Gamma / (rho g h S) on the floor", 0.1, -0.8, 0.8),
         shapes=(
-            Shape("slope", "-", "slope S that drives the flow", 0.001, 1e-6, 0.05),
+            Shape("slope", "-", "slope S that drives the flow", 1.0, 0.001, 50.0, of="slope"),
             Shape("bank_ratio", "-", "strength r on the banks over that on the floor", -1.0, -3.0, 3.0, (-1.0, 0.0)),
         ),
         source="Shiono and Knight (1991); values of k by Abril and Knight (2004)",
@@ -110,5 +111,6 @@ EFFECTS = (
         checked=True,
         mirrored=False,
         tags=("negative control",),
+        needs=("open air",),
     ),
 )

@@ -70,6 +70,8 @@ class LawQuantity:
         q in each cell, as a function and as code.
     usual
         A usual value [unit], the default of the reference r.
+    scale
+        Scale of the site of which that is a multiple, "" for none.
     """
 
     name: str
@@ -79,6 +81,7 @@ class LawQuantity:
     of: Callable[[Cells], Array]
     written: str
     usual: float
+    scale: str = ""
 
     @property
     def unit_behind(self) -> str:
@@ -197,7 +200,7 @@ def _reference(name: str, law: Law) -> tuple[Shape, ...]:
     """The reference of a law as a shape of that name; none where its g has none."""
     quantity = law.quantity
     low, high = (-0.5, 0.5) if quantity.name == "along" else (1e-3 * quantity.usual, 1e3 * quantity.usual)
-    shape = Shape(name, quantity.unit, f"reference r of {quantity.words}", quantity.usual, low, high)
+    shape = Shape(name, quantity.unit, f"reference r of {quantity.words}", quantity.usual, low, high, of=quantity.scale)
     return (shape,) if law.form.quantiles else ()
 
 
@@ -239,12 +242,12 @@ _ADVECTION = LawTerm(
     lambda cells, factor: dispersion(cells, factor - 1.0), "dispersion(cells, {factor} - 1)",
 )  # fmt: skip
 
-_DEPTH = LawQuantity("depth", "the depth", "h", "m", lambda cells: cells.depth, "cells.depth", 0.5)
-_SPEED = LawQuantity("speed", "the speed", "|U|", "m/s", lambda cells: cells.speed, "cells.speed", 0.5)
+_DEPTH = LawQuantity("depth", "the depth", "h", "m", lambda cells: cells.depth, "cells.depth", 0.5, "depth")
+_SPEED = LawQuantity("speed", "the speed", "|U|", "m/s", lambda cells: cells.speed, "cells.speed", 1.0, "speed")
 _FROUDE = LawQuantity(
     "froude", "the Froude number", "F", "-",
-    lambda cells: cells.speed / np.sqrt(GRAVITY * cells.depth.clip(LEAST_DEPTH_OF_POWER)),
-    f"cells.speed / np.sqrt({GRAVITY} * cells.depth.clip({LEAST_DEPTH_OF_POWER}))", 0.2,
+    lambda cells: cells.speed / np.sqrt(GRAVITY * cells.depth.clip(LEAST_DEPTH_OF_POWER * cells.geometry.depth_scale)),
+    f"cells.speed / np.sqrt({GRAVITY} * cells.depth.clip({LEAST_DEPTH_OF_POWER} * cells.geometry.depth_scale))", 0.2,
 )  # fmt: skip
 _SHEAR = LawQuantity(
     "shear", "the lateral shear", "(|du/dy| h/|U|)", "-", lambda cells: np.abs(cells.u_y) * cells.depth / cells.speed,
@@ -260,11 +263,11 @@ _OFFSET = LawQuantity(
 )  # fmt: skip
 _FRONT = LawQuantity(
     "front", "the distance from the front of a patch", "d", "m", lambda cells: cells.geometry.front,
-    "cells.geometry.front", 2.0,
+    "cells.geometry.front", 0.5, "patch_length",
 )  # fmt: skip
 _EDGE = LawQuantity(
     "edge", "the distance from the side of a patch", "d", "m", lambda cells: np.abs(cells.geometry.edge),
-    "np.abs(cells.geometry.edge)", 0.5,
+    "np.abs(cells.geometry.edge)", 0.33, "patch_width",
 )  # fmt: skip
 
 _STEMS = LawQuantity(

@@ -10,8 +10,9 @@ from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.physical_constants import WATER_VISCOSITY
 from vegglue.effects.surroundings import PlantCells
 
-# Speed [m/s] below which plants do not yield further: a negative exponent would give infinite drag at rest.
-LEAST_YIELDING_SPEED = 0.02
+# Speed over that of the site [-] below which plants do not yield further: a negative exponent would give infinite drag
+# at rest.
+LEAST_YIELDING_SPEED = 0.04
 # Cauchy number [-] that stands for still water: far below 1, where nothing bends, and its powers stay finite.
 LEAST_CAUCHY = 1e-3
 # Reynolds number [-] below which C_D stays as it is, 2 mm/s at a stem of 1 cm: it grows without end towards rest.
@@ -19,7 +20,7 @@ LEAST_REYNOLDS = 20.0
 
 
 def streamlining(plants: PlantCells, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
-    """phi -> phi (|U| / U_0)^chi, |U| at least 0.02 m/s.
+    """phi -> phi (|U| / U_0)^chi, |U| at least 0.04 of that of the site.
 
     Parameters
     ----------
@@ -34,7 +35,8 @@ def streamlining(plants: PlantCells, vogel_exponent: Array, reference_speed: Arr
     dict
         `phi` (cell, m) [-].
     """
-    return {"phi": plants.phi * (np.maximum(plants.speed, LEAST_YIELDING_SPEED) / reference_speed) ** vogel_exponent}
+    speed = np.maximum(plants.speed, LEAST_YIELDING_SPEED * plants.speed_scale)
+    return {"phi": plants.phi * (speed / reference_speed) ** vogel_exponent}
 
 
 def canopy_height_error(plants: PlantCells, relative_error: Array) -> dict[str, Array]:
@@ -134,7 +136,7 @@ def undergrowth(plants: PlantCells, drag: Array, height: Array) -> dict[str, Arr
 
 
 def foliage(plants: PlantCells, drag: Array, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
-    """phi -> phi + phi_F (|U| / U_0)^chi_F min(h / h_d, 1), |U| at least 0.02 m/s.
+    """phi -> phi + phi_F (|U| / U_0)^chi_F min(h / h_d, 1), |U| at least 0.04 of that of the site.
 
     Parameters
     ----------
@@ -151,7 +153,7 @@ def foliage(plants: PlantCells, drag: Array, vogel_exponent: Array, reference_sp
     dict
         `phi` (cell, m) [-].
     """
-    bent = (np.maximum(plants.speed, LEAST_YIELDING_SPEED) / reference_speed) ** vogel_exponent
+    bent = (np.maximum(plants.speed, LEAST_YIELDING_SPEED * plants.speed_scale) / reference_speed) ** vogel_exponent
     return {"phi": plants.phi + drag * bent * np.minimum(plants.depth / plants.canopy_height, 1.0)}
 
 
@@ -268,7 +270,7 @@ def patch_density(plants: PlantCells, excess: Array, patch: Array) -> dict[str, 
     return {"phi": plants.phi * (1.0 + excess * (plants.patch == patch - 1.0))}
 
 
-REFERENCE_SPEED = Shape("reference_speed", "m/s", "speed U_0 at which phi holds", 0.35, 0.05, 2.0)
+REFERENCE_SPEED = Shape("reference_speed", "m/s", "speed U_0 at which phi holds", 0.7, 0.1, 4.0, of="speed")
 EFFECTS = (
     Effect(
         name="streamlining",
@@ -281,6 +283,7 @@ EFFECTS = (
         source="Vogel (1984); Järvelä (2004)",
         read_in="Delft3D-FLOW (trtrou.f90, law 155)",
         doi="10.1080/15715124.2004.9635222",
+        needs=("plants",),
     ),
     Effect(
         name="canopy_height_error",
@@ -291,6 +294,7 @@ EFFECTS = (
         amplitude=Amplitude("relative_error", "-", "true over assumed height, less one", 0.2, -0.6, 1.0),
         source="definition",
         checked=True,
+        needs=("plants",),
     ),
     Effect(
         name="canopy_deflection",
@@ -298,9 +302,10 @@ EFFECTS = (
         title="The canopy is pushed down as the water runs faster",
         equation="h_d -> h_d exp(-k |U|)",
         act=canopy_deflection,
-        amplitude=Amplitude("rate", "s/m", "share k of the height lost for each m/s", 0.5, 0.0, 3.0),
+        amplitude=Amplitude("rate", "s/m", "share k of the height lost for each m/s", 0.25, 0.0, 1.5, of="slowness"),
         source="after Verschoren et al. (2016)",
         doi="10.1007/s10652-015-9432-1",
+        needs=("plants",),
     ),
     Effect(
         name="canopy_bending",
@@ -317,6 +322,7 @@ EFFECTS = (
         source="Luhar and Nepf (2011)",
         read_in="ROMS (vegetation_drag.F; l_e alone)",
         doi="10.4319/lo.2011.56.6.2003",
+        needs=("plants",),
     ),
     Effect(
         name="undergrowth",
@@ -325,9 +331,10 @@ EFFECTS = (
         equation="phi -> phi + phi_u min(h/h_u, 1)",
         act=undergrowth,
         amplitude=Amplitude("drag", "-", "drag phi_u of the lower layer", 3.0, 0.0, 100.0),
-        shapes=(Shape("height", "m", "height h_u of the lower layer", 0.3, 0.02, 2.0),),
+        shapes=(Shape("height", "m", "height h_u of the lower layer", 0.33, 0.02, 2.0, of="canopy"),),
         source="definition",
         checked=True,
+        needs=("plants",),
     ),
     Effect(
         name="foliage",
@@ -343,6 +350,7 @@ EFFECTS = (
         source="Västilä and Järvelä (2014)",
         read_in="Delft3D-FLOW (trtrou.f90, law 155)",
         doi="10.1002/2013WR013819",
+        needs=("plants",),
     ),
     Effect(
         name="emergent_part",
@@ -353,6 +361,7 @@ EFFECTS = (
         amplitude=Amplitude("share", "-", "share s of the plants to which this applies", 0.5, 0.0, 1.0),
         source="definition",
         checked=True,
+        needs=("plants",),
     ),
     Effect(
         name="slow_stems",
@@ -361,8 +370,9 @@ EFFECTS = (
         equation="phi -> phi (1 + s (C_D - 1)), C_D = 1 + 10 Re^(-2/3), Re = |U| D/nu at least 20",
         act=slow_stems,
         amplitude=Amplitude("share", "-", "share s of the excess of C_D over 1", 1.0, 0.0, 5.0),
-        shapes=(Shape("diameter", "m", "diameter D of the stems", 0.01, 0.0005, 0.2, (0.003, 0.01)),),
+        shapes=(Shape("diameter", "m", "diameter D of the stems", 1.0, 0.05, 20.0, (0.35, 1.0), "stem"),),
         source="White (1991), Viscous Fluid Flow, a fit for single cylinders",
+        needs=("plants",),
     ),
     Effect(
         name="debris_screen",
@@ -371,9 +381,10 @@ EFFECTS = (
         equation="phi -> phi (1 + a exp(-f/L)), f the distance from the front of the patch",
         act=debris_screen,
         amplitude=Amplitude("excess", "-", "relative excess a of drag at the front", 2.0, -0.9, 50.0),
-        shapes=(Shape("length", "m", "depth L of the screen", 0.5, 0.05, 10.0, (0.3, 1.0)),),
+        shapes=(Shape("length", "m", "depth L of the screen", 0.125, 0.0125, 2.5, (0.075, 0.25), "patch_length"),),
         source="definition",
         checked=True,
+        needs=("plants",),
     ),
     Effect(
         name="density_trend",
@@ -382,9 +393,21 @@ EFFECTS = (
         equation="phi -> phi (1 + a tanh(f/L - 1)), f the distance from the front of the patch",
         act=density_trend,
         amplitude=Amplitude("trend", "-", "relative excess a towards the end", 0.3, -0.95, 0.95),
-        shapes=(Shape("length", "m", "distance L from the front where phi holds", 2.0, 0.1, 50.0, (1.0, 2.0)),),
+        shapes=(
+            Shape(
+                "length",
+                "m",
+                "distance L from the front where phi holds",
+                0.5,
+                0.025,
+                12.5,
+                (0.25, 0.5),
+                "patch_length",
+            ),
+        ),
         source="definition",
         checked=True,
+        needs=("plants",),
     ),
     Effect(
         name="edge_thinning",
@@ -393,9 +416,10 @@ EFFECTS = (
         equation="phi -> phi (1 - a exp(-e/w)), e the distance inward from the sides of the patch",
         act=edge_thinning,
         amplitude=Amplitude("share", "-", "share a missing at the very side, negative for more there", 0.4, -5.0, 0.95),
-        shapes=(Shape("width", "m", "width w of the thinner rim", 0.3, 0.02, 5.0, (0.2, 0.5)),),
+        shapes=(Shape("width", "m", "width w of the thinner rim", 0.2, 0.013, 3.3, (0.13, 0.33), "patch_width"),),
         source="definition",
         checked=True,
+        needs=("plants",),
     ),
     Effect(
         name="patch_density",
@@ -409,5 +433,6 @@ EFFECTS = (
         checked=True,
         each="patch",
         mirrored=False,
+        needs=("plants",),
     ),
 )

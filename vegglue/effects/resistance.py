@@ -9,13 +9,13 @@ from vegglue.arrays import Array
 from vegglue.effects.definition import Amplitude, Effect, Shape
 from vegglue.effects.surroundings import Cells
 
-# Depth [m] below which a law that depends on it stays as it is, twice the default film: its power would be infinite
-# where there is no water.
+# Depth over that of the site [-] below which a law that depends on it stays as it is: its power would be infinite where
+# there is no water.
 LEAST_DEPTH_OF_POWER = 0.02
 
 
 def depth_dependent_bank(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
-    """k -> k (h / h_0)^e on the banks, h at least 0.02 m.
+    """k -> k (h / h_0)^e on the banks, h at least 0.02 of that of the site.
 
     Parameters
     ----------
@@ -30,12 +30,12 @@ def depth_dependent_bank(cells: Cells, exponent: Array, reference_depth: Array) 
     dict
         `rate` (nx, ny, m) [1/m].
     """
-    depth = cells.depth.clip(LEAST_DEPTH_OF_POWER)
+    depth = cells.depth.clip(LEAST_DEPTH_OF_POWER * cells.geometry.depth_scale)
     return {"rate": cells.rate * (depth / reference_depth) ** (exponent * cells.geometry.bank)}
 
 
 def depth_dependent_bed(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
-    """k -> k (h / h_0)^e on the floor where no plants stand, h at least 0.02 m.
+    """k -> k (h / h_0)^e on the floor where no plants stand, h at least 0.02 of that of the site.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ def depth_dependent_bed(cells: Cells, exponent: Array, reference_depth: Array) -
         `rate` (nx, ny, m) [1/m].
     """
     open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
-    return {"rate": cells.rate * (cells.depth.clip(LEAST_DEPTH_OF_POWER) / reference_depth) ** (exponent * open_floor)}
+    depth = cells.depth.clip(LEAST_DEPTH_OF_POWER * cells.geometry.depth_scale)
+    return {"rate": cells.rate * (depth / reference_depth) ** (exponent * open_floor)}
 
 
 def bank_trend(cells: Cells, trend: Array) -> dict[str, Array]:
@@ -125,6 +126,64 @@ def bank_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
     return {"rate": cells.rate * np.exp(0.5 * log_ratio * cells.geometry.bank * np.sign(cells.geometry.offset))}
 
 
+def bank_roughness(cells: Cells, log_ratio: Array) -> dict[str, Array]:
+    """k -> k exp(a) beyond the toe of the banks: another surface than the floor's.
+
+    Parameters
+    ----------
+    cells : Cells
+    log_ratio : (m,) [-]
+        logarithm a of friction there over that of the law.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
+    return {"rate": cells.rate * np.exp(log_ratio * cells.geometry.bank)}
+
+
+def floor_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
+    """k -> k exp(+-a / 2) on the floor where no plants stand, + on the side of larger y.
+
+    Parameters
+    ----------
+    cells : Cells
+    log_ratio : (m,) [-]
+        logarithm a of the ratio of both.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
+    open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
+    return {"rate": cells.rate * np.exp(0.5 * log_ratio * open_floor * np.sign(cells.geometry.offset))}
+
+
+def bed_stretch(cells: Cells, log_ratio: Array, middle: Array, share: Array) -> dict[str, Array]:
+    """k -> k exp(a g) on the floor where no plants stand, g = exp(-((x / L - c) / (s / 2))^4), x / L -1/2 .. 1/2.
+
+    Parameters
+    ----------
+    cells : Cells
+    log_ratio : (m,) [-]
+        logarithm a of friction there over that of the rest.
+    middle : (m,) [-]
+        its middle c over the length of the channel.
+    share : (m,) [-]
+        its share s of the length of the channel.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
+    open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
+    within = np.exp(-(((cells.geometry.share_along - middle) / (0.5 * share)) ** 4))
+    return {"rate": cells.rate * np.exp(log_ratio * open_floor * within)}
+
+
 def steep_bank(cells: Cells, share: Array) -> dict[str, Array]:
     """k -> k (1 + a ((1 + s^2)^(1/2) - 1)), s = |dz_b/dy|.
 
@@ -180,24 +239,25 @@ def stem_blockage(cells: Cells, share: Array) -> dict[str, Array]:
     return {"rate": cells.rate * (1.0 - share * cells.geometry.planted) ** -2.0}
 
 
-REFERENCE_DEPTH = Shape("reference_depth", "m", "depth h_0 at which nothing changes", 0.5, 0.05, 5.0)
+REFERENCE_DEPTH = Shape("reference_depth", "m", "depth h_0 at which nothing changes", 0.5, 0.05, 5.0, of="depth")
 EFFECTS = (
     Effect(
         name="depth_dependent_bank",
         stage="resistance",
         title="Banks grow rougher or smoother with depth than their law says",
-        equation="k -> k (h / h_0)^e on the banks, h at least 0.02 m",
+        equation="k -> k (h / h_0)^e on the banks, h at least 0.02 of that of the site",
         act=depth_dependent_bank,
         amplitude=Amplitude("exponent", "-", "exponent e", 0.5, -3.0, 3.0),
         shapes=(REFERENCE_DEPTH,),
         source="definition",
         checked=True,
+        needs=("banks",),
     ),
     Effect(
         name="depth_dependent_bed",
         stage="resistance",
         title="The floor grows rougher or smoother with depth than its law says",
-        equation="k -> k (h / h_0)^e on the floor without plants, h at least 0.02 m",
+        equation="k -> k (h / h_0)^e on the floor without plants, h at least 0.02 of that of the site",
         act=depth_dependent_bed,
         amplitude=Amplitude("exponent", "-", "exponent e", 0.5, -3.0, 3.0),
         shapes=(REFERENCE_DEPTH,),
@@ -213,6 +273,7 @@ EFFECTS = (
         amplitude=Amplitude("trend", "-", "logarithm a of k at the end over k at the beginning", 0.5, -4.0, 4.0),
         source="definition",
         checked=True,
+        needs=("banks",),
     ),
     Effect(
         name="bank_drag_trend",
@@ -220,11 +281,12 @@ EFFECTS = (
         title="Plants or stones on the banks stand ever closer along the channel",
         equation="k -> k + c (1/2 + d (x - x_m)/L) on the banks, x_m the middle of the grid, L its length",
         act=bank_drag_trend,
-        # A bank with n = 0.03 holds back 0.3 m of water by 0.04 1/m.
-        amplitude=Amplitude("drag", "1/m", "drag c that is added where there is most", 0.05, 0.0, 5.0),
+        # On half of the depth, as on banks, friction is twice that of the floor.
+        amplitude=Amplitude("drag", "1/m", "drag c that is added where there is most", 1.5, 0.0, 150.0, of="friction"),
         shapes=(Shape("direction", "-", "d, 1 where it grows downstream, -1 upstream", 1.0, -1.0, 1.0, (1.0, -1.0)),),
         source="definition",
         checked=True,
+        needs=("banks", "open ground"),
     ),
     Effect(
         name="bed_trend",
@@ -246,6 +308,45 @@ EFFECTS = (
         source="definition",
         checked=True,
         mirrored=False,
+        needs=("banks",),
+    ),
+    # Plausible, as of concrete beside short grass: n differs by 1.6, friction by its square (Chow 1959, table 5-6).
+    Effect(
+        name="bank_roughness",
+        stage="resistance",
+        title="Floor and banks, or floodplains, are two surfaces of different roughness",
+        equation="k -> k exp(a) beyond the toe of the banks",
+        act=bank_roughness,
+        amplitude=Amplitude("log_ratio", "-", "logarithm a of friction there over that of the law", 1.0, -4.0, 4.0),
+        source="definition",
+        checked=True,
+        tags=("common",),
+        needs=("banks", "one surface"),
+    ),
+    Effect(
+        name="floor_difference",
+        stage="resistance",
+        title="The left and the right of the floor are two surfaces of different roughness",
+        equation="k -> k exp(a/2) on the floor without plants at larger y than the axis, k exp(-a/2) on the other side",
+        act=floor_difference,
+        amplitude=Amplitude("log_ratio", "-", "logarithm a of the ratio of both", 1.0, -4.0, 4.0),
+        source="definition",
+        checked=True,
+        mirrored=False,
+    ),
+    Effect(
+        name="bed_stretch",
+        stage="resistance",
+        title="A stretch of the floor is of another roughness than the rest",
+        equation="k -> k exp(a exp(-((x/L - c)/(s/2))^4)) on the floor without plants, x/L from -1/2 to 1/2",
+        act=bed_stretch,
+        amplitude=Amplitude("log_ratio", "-", "logarithm a of friction there over that of the rest", 1.0, -4.0, 4.0),
+        shapes=(
+            Shape("middle", "-", "its middle c over the length of the channel", 0.0, -0.5, 0.5, (-0.33, 0.0, 0.33)),
+            Shape("share", "-", "its share s of the length of the channel", 0.33, 0.02, 1.0),
+        ),
+        source="definition",
+        checked=True,
     ),
     Effect(
         name="steep_bank",
@@ -259,6 +360,7 @@ EFFECTS = (
         source="definition; as in Shiono and Knight (1991)",
         doi="10.1017/S0022112091001246",
         checked=True,
+        needs=("banks",),
     ),
     Effect(
         name="bank_vegetation",
@@ -267,9 +369,10 @@ EFFECTS = (
         equation="k -> k + phi_b min(h/h_b, 1) / (2 h) on the banks",
         act=bank_vegetation,
         amplitude=Amplitude("drag", "-", "drag phi_b of the plants", 0.5, 0.0, 50.0),
-        shapes=(Shape("height", "m", "height h_b of the plants", 0.3, 0.02, 3.0, (0.15, 0.6)),),
+        shapes=(Shape("height", "m", "height h_b of the plants", 0.3, 0.02, 3.0, (0.15, 0.55), "depth"),),
         source="definition",
         checked=True,
+        needs=("banks",),
     ),
     Effect(
         name="stem_blockage",
@@ -281,5 +384,6 @@ EFFECTS = (
         source="definition; constricted speed as in Stone and Shen (2002)",
         doi="10.1061/(ASCE)0733-9429(2002)128:5(500)",
         checked=True,
+        needs=("plants",),
     ),
 )

@@ -165,7 +165,7 @@ EFFECTS = (
         title="Velocity probes do not read zero in still water",
         equation="u -> u + c",
         act=zero_offset,
-        amplitude=Amplitude("offset", "m/s", "what the probes read in still water", 0.01, -0.2, 0.2),
+        amplitude=Amplitude("offset", "m/s", "what the probes read in still water", 0.02, -0.4, 0.4, of="speed"),
         source="definition",
         checked=True,
         each="device",
@@ -176,7 +176,7 @@ EFFECTS = (
         title="Probes stood beside the places reported",
         equation="u -> u + d du/dy, d towards larger y",
         act=station_shift,
-        amplitude=Amplitude("shift", "m", "true less reported place", 0.1, -0.5, 0.5),
+        amplitude=Amplitude("shift", "m", "true less reported place", 0.1, -0.5, 0.5, of="depth"),
         source="definition",
         checked=True,
         each="section",
@@ -193,6 +193,7 @@ EFFECTS = (
         ),
         source="definition, from the log law",
         checked=True,
+        needs=("few heights",),
     ),
     Effect(
         name="among_plants",
@@ -203,6 +204,7 @@ EFFECTS = (
         amplitude=Amplitude("gain", "-", "relative error a of a probe deep in the plants", 0.2, -0.9, 2.0),
         source="definition",
         checked=True,
+        needs=("plants",),
     ),
     Effect(
         name="gauge_datum",
@@ -210,9 +212,10 @@ EFFECTS = (
         title="Gauges stand on another datum than the bed",
         equation="z_s -> z_s + d",
         act=gauge_datum,
-        amplitude=Amplitude("shift", "m", "how much too high the gauges read", 0.02, -0.5, 0.5),
+        amplitude=Amplitude("shift", "m", "how much too high the gauges read", 0.02, -0.5, 0.5, of="depth"),
         source="definition",
         checked=True,
+        needs=("gauges",),
     ),
     Effect(
         name="gauge_head",
@@ -223,5 +226,6 @@ EFFECTS = (
         amplitude=Amplitude("share", "-", "share a of the velocity head that they show", 0.5, -1.0, 1.0),
         source="definition, from Bernoulli's equation",
         checked=True,
+        needs=("gauges",),
     ),
 )

@@ -55,6 +55,8 @@ class ChannelGeometry:
         Length of a cell over dx on a grid along a centreline [-].
     turning
         Curvature of that line along the row of a cell [1/m]; empty on a straight grid.
+    depth_scale, speed_scale
+        Depth on the floor [m] and mean speed [m/s] of the site, of which laws keep to a share where water all but ends.
     """
 
     x: Array
@@ -76,6 +78,8 @@ class ChannelGeometry:
     relative_stems: Array = field(default_factory=lambda: np.ones((1, 1, 1)))
     stretch: Array = field(default_factory=lambda: np.ones((1, 1, 1)))
     turning: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    depth_scale: float = 1.0
+    speed_scale: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -162,6 +166,8 @@ class PlantCells:
         Distances from the upstream end of the patch and from its nearest side, (cell, 1) [m].
     x, y, patch
         Place [m] and index of the patch, (cell, 1).
+    speed_scale
+        Mean speed of the site [m/s].
     """
 
     phi: Array
@@ -173,6 +179,7 @@ class PlantCells:
     x: Array
     y: Array
     patch: Array
+    speed_scale: float = 0.5
 
 
 @dataclass(frozen=True)

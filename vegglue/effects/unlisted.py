@@ -89,8 +89,8 @@ def unlisted_viscosity(cells: Cells, viscosity: Array, **place: Array) -> dict[s
 PLACE = (
     Shape("x", "m", "where along the channel", 0.0, -1e5, 1e5),
     Shape("y", "m", "where across it", 0.0, -1e5, 1e5),
-    Shape("length", "m", "its half length l", 0.5, 0.01, 1e4),
-    Shape("width", "m", "its half width w", 0.5, 0.01, 1e4),
+    Shape("length", "m", "its half length l", 0.3, 0.006, 1e4, of="half_width"),
+    Shape("width", "m", "its half width w", 0.3, 0.006, 1e4, of="half_width"),
 )
 SPOT = "exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2)"
 
@@ -109,7 +109,7 @@ EFFECTS = (
         "Something holds the flow back (or pushes it on) at one place",
         f"k -> k + c {SPOT}",
         unlisted_object,
-        Amplitude("drag", "1/m", "drag c of the object per length of flow through it", 0.5, -5.0, 50.0),
+        Amplitude("drag", "1/m", "drag c of the object per length of flow through it", 0.5, -5.0, 50.0, of="object"),
     ),
     _at_place(
         "unlisted_bed",
@@ -117,7 +117,7 @@ EFFECTS = (
         "The bed lies higher (or lower) than surveyed at one place",
         f"z_b -> z_b + dz {SPOT}",
         unlisted_bed,
-        Amplitude("rise", "m", "how much higher the bed lies there than surveyed", 0.1, -2.0, 2.0),
+        Amplitude("rise", "m", "how much higher the bed lies there than surveyed", 0.1, -2.0, 2.0, of="depth"),
     ),
     _at_place(
         "unlisted_inflow",
@@ -125,7 +125,7 @@ EFFECTS = (
         "Water enters (or leaves) at one place",
         f"q -> q + Q/(pi l w) {SPOT}, without momentum",
         unlisted_inflow,
-        Amplitude("discharge", "m3/s", "discharge Q that enters there", 0.1, -50.0, 50.0),
+        Amplitude("discharge", "m3/s", "discharge Q that enters there", 0.05, -20.0, 20.0, of="discharge"),
     ),
     _at_place(
         "unlisted_viscosity",
@@ -133,6 +133,6 @@ EFFECTS = (
         "The water mixes more (or less) at one place",
         f"nu -> nu + n {SPOT}",
         unlisted_viscosity,
-        Amplitude("viscosity", "m2/s", "additional viscosity n in the middle of it", 0.03, -0.5, 5.0),
+        Amplitude("viscosity", "m2/s", "additional viscosity n in the middle of it", 0.3, -5.0, 50.0, of="eddy"),
     ),
 )

@@ -47,7 +47,8 @@ from vegglue.measurements.plausibility import is_mark
 from vegglue.parallel import cores_allowed, has_backend
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.resume import hold_lock
-from vegglue.whole_files import MAKE_ROOM, failed_writes_told
+from vegglue.whole_files import failed_writes_told
+from vegglue.wording.remedies import MAKE_ROOM
 
 PARAMETERS_FILE, STATIONS_FILE, PREDICTIONS_FILE = "parameters.json", "stations.csv", "predictions.csv"
 COLUMNS_LEFT = ("station", "prediction")

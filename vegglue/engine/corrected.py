@@ -24,6 +24,7 @@ from vegglue.engine.interface import Cause, Engine, Model, Point, Wanted, linear
 from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
 from vegglue.progress import Watch
+from vegglue.wording.phases import RUNNING_COMMAND
 
 # Share of a difference [-] that is bend or noise, above which a slope counts as rough: root mean square over
 # stations of f(h) + f(-h) - 2 f(0) over f(h) - f(-h). A flow that bends as much as it slopes has a twentieth at a step
@@ -192,5 +193,5 @@ def _run(runs: CommandRuns, model: Model, bare: Model, z: Array, watch: Watch) -
     """Runs of the command at z (m, q)."""
     theta = theta_at(bare.case, z)
     thetas = [{name: float(values[member]) for name, values in theta.items()} for member in range(len(z))]
-    why = f"running the command of {model.case.name}"
+    why = RUNNING_COMMAND.format(model.case.name)
     return command_predictions(runs, bare.case, model.station, thetas, watch, why)

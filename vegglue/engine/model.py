@@ -11,6 +11,7 @@ from vegglue.engine.interface import Engine, Model
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.block_elimination import solve
 from vegglue.measurements.observations import Observations
+from vegglue.wording.phases import COMPILING
 
 
 def with_compilation(phase: str) -> str:
@@ -20,7 +21,7 @@ def with_compilation(phase: str) -> str:
     """
     if solve.signatures or is_kept(solve):
         return phase
-    return f"{phase} (compiling the solver for this machine first, once: up to a minute)"
+    return phase + COMPILING
 
 
 # Least number of cells of a coarser grid, along and across. Chosen, not measured: fewer hardly resolve a section.

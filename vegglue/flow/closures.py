@@ -149,6 +149,7 @@ def bent_plants(problem: Problem, state: Array, depth: Array) -> tuple[Array, Ar
         x=geometry.x[column, 0],
         y=geometry.y[0, row],
         patch=geometry.patch[column, row],
+        speed_scale=geometry.speed_scale,
     )
     now = applied(problem.effects, "plants", seen, {"phi": phi, "canopy_height": canopy_height})
     return np.array(now["phi"]), np.array(now["canopy_height"])

@@ -6,6 +6,6 @@ options) -> `MeasuredRows`, and its place in `instruments.py`; transects of a bo
 further layout of folders is a file that makes the keys and values of a config, and a line in
 `workflow/import_folder.py`.
 
-May import: case, measurements, wording.
+May import: case, effects, measurements, wording.
 Open first: field_folder.py, measured_files.py, instruments.py, table_parser.py, column_names.py.
 """

@@ -22,6 +22,7 @@ from vegglue.case.resolved_config import Tree
 from vegglue.case.site_schema import Frame
 from vegglue.case.text_files import case_name, told_apart
 from vegglue.case.zones import BANK_SLOPE
+from vegglue.effects.physical_constants import GRAVITY
 from vegglue.errors import InputError, path_from, shown_path
 from vegglue.importers.config_parts import (
     FIRST_LOOK,
@@ -79,6 +80,9 @@ OF_NO_BANK = 1.0
 OF_SHEET = "case"
 # Relative error of a canopy height estimated by eye.
 BY_EYE = 0.12
+# Transverse mixing over h u* [-] (Fischer et al. 1979, chapter 5): of straight flumes and of streams. Points each
+# way at which the bed is sampled for it.
+MIXING_OF_FLUME, MIXING_OF_STREAM, SAMPLED = 0.15, 0.6, 48
 PARAMETERS: Tree = {"n_b": bed_prior(0.01, 0.2)}
 # Of plaster and glass up to cobbles.
 BED_OF_FLUME = bed_prior(0.005, 0.05)
@@ -131,6 +135,8 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     measured = measured_files(folder, target, site, place, used, ground.level)
     held_out = held_out_measurements(folder, target, site, place, ground.level)
     stated, factor = site.eddy_viscosity_m2_s, site.viscosity_factor
+    if "eddy_viscosity_m2_s" not in site.model_fields_set:
+        stated = usual_viscosity(site, ground)
     unknown = {VISCOSITY: viscosity_prior(stated, factor)} if factor > 1 else {}
     classes = ground.tree["friction"]["classes"]
     of_bed = BED_OF_FLUME if site.walls is not None else PARAMETERS["n_b"]
@@ -194,6 +200,34 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     texts = {**ground.texts, **texts_of_tables(target, [*measured.tables, *held_out.tables])}
     kept = {"frame": frame.model_dump(exclude_none=True) | {"origin": list(frame.origin)}} if frame is not None else {}
     return FolderCase(tree | kept | ({"imported": measured.imported} if measured.imported else {}), texts)
+
+
+def usual_viscosity(site: FieldSite, ground: Ground) -> float:
+    """nu = a h u* [m2/s], a = 0.15 between walls and 0.6 in streams, u* = (g h S)^(1/2), to two digits; the mean of the
+    experiments.
+
+    h is the depth where water stands, with a surface parallel to the floor but nowhere below the outlet's, and S what
+    n = 0.011 between walls and 0.035 in streams needs, S = (n U)^2 / h^(4/3), U = Q / A.
+    """
+    (west, east), (south, north), (dx, dy) = (ground.tree["grid"][key] for key in ("x", "y", "cell"))
+    x, y = (
+        np.linspace(west + 0.5 * dx, east - 0.5 * dx, SAMPLED),
+        np.linspace(south + 0.5 * dy, north - 0.5 * dy, SAMPLED),
+    )
+    bed = np.asarray(ground.level(*(part.ravel() for part in np.meshgrid(x, y, indexing="ij")))).reshape(
+        SAMPLED, SAMPLED
+    )
+    share, n = (MIXING_OF_FLUME, 0.011) if site.walls is not None else (MIXING_OF_STREAM, 0.035)
+    known = np.isfinite(bed).any(axis=1)
+    floor, found = np.nanmin(bed[known], axis=1), []
+    for flow in site.experiments.values():
+        surface = np.maximum(flow.downstream_level_m, floor + flow.downstream_level_m - floor[-1])
+        depth = np.nan_to_num(np.maximum(surface[:, None] - bed[known], 0.0))
+        if not (depth > 0.0).any():
+            continue
+        h, area = float(depth[depth > 0.0].mean()), float(depth.mean() * (north - south))
+        found.append(share * GRAVITY**0.5 * n * flow.discharge_m3_s / area * h ** (5.0 / 6.0))
+    return float(f"{np.mean(found):.2g}") if found else site.eddy_viscosity_m2_s
 
 
 def _refuse_standing_water(path: Path, site: FieldSite) -> None:

@@ -358,7 +358,7 @@ def assumptions_of_site(folder: Path) -> list[str]:
     assumed = []
     if "eddy_viscosity_m2_s" not in site.model_fields_set:
         within = f" (standard deviation: a factor of {site.viscosity_factor:g})" if site.viscosity_factor > 1 else ""
-        assumed.append(f"eddy_viscosity_m2_s {site.eddy_viscosity_m2_s:g}{within}")
+        assumed.append(f"eddy_viscosity_m2_s by depth, speed and usual roughness{within}")
     if site.patches and "canopy_height_guess_m" not in site.model_fields_set:
         assumed.append(f"canopy_height_guess_m {site.canopy_height_guess_m:g}")
     here = [one for one in site.patches if one.file is None]

@@ -31,6 +31,7 @@ from vegglue.measurements.observations import Observations
 from vegglue.progress import Progress, Watch
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.resume import ensemble_writer
+from vegglue.wording.phases import RUNNING_COMMAND
 from vegglue.wording.sentences import sentence
 
 # Share of a prediction [-] below which two are the same: what a sum in another order changes.
@@ -197,7 +198,7 @@ def run_ensemble(
     stations, sections = len(observations.table), len(section_positions(observations))
     with ensemble_writer(path, make_header(case, wanted, observations, sample.theta, chunks, None)) as writer:
         todo = left_to_do(writer, case, chunks, watch)
-        resumed, failed, phase = len(chunks) - len(todo), 0, f"running the command of {case.name}"
+        resumed, failed, phase = len(chunks) - len(todo), 0, RUNNING_COMMAND.format(case.name)
         watch(Progress(phase, resumed, len(chunks), "members", failed, resumed))
         # What effects change in the built-in solver, NaN if it finds no flow; of all: chunks decide their last digits.
         added = np.zeros((len(sample.points), stations))

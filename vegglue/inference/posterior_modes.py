@@ -24,6 +24,7 @@ from vegglue.inference.glue import fit_members, sizes_as_stated
 from vegglue.parallel import in_threads, parallel_map
 from vegglue.progress import Progress, Watch, counted
 from vegglue.results.ensemble import Ensemble
+from vegglue.wording.phases import FITTING, REFINING_MODES
 
 # Grids that fits go through: chosen. With the third the search for modes of the demo takes 24 s of one core, not 31; a
 # fourth hardly resolves a section.
@@ -104,14 +105,14 @@ def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch) ->
     starts, grids = starting_points(noise, tried.z, tried.prediction), grids_of(model)
 
     def fit_all(on: Model) -> list[MapEstimate]:
-        finished = counted(watch, "fitting the best members", len(starts), "members")
+        finished = counted(watch, FITTING, len(starts), "members")
         ends = parallel_map(partial(fit_from, on, noise), [(z,) for z in starts], finished)
         return [end for end in ends if end is not None]
 
     before: list[MapEstimate] = []
     ends = _apart(fit_all(grids[0]))
     for coarse, finer in pairwise(grids):
-        finished = counted(watch, "refining modes on finer cells", len(ends), "modes")
+        finished = counted(watch, REFINING_MODES, len(ends), "modes")
         refined = parallel_map(partial(_refine, finer, coarse, noise), [(end,) for end in ends], finished)
         found = [end for end in refined if end is not None]
         before, ends = ends, distinct_modes(found or fit_all(finer))

@@ -42,6 +42,7 @@ from vegglue.results.posterior import (
 )
 from vegglue.version import VERSION
 from vegglue.wording.numbers import so_many
+from vegglue.wording.phases import TRYING_POINTS
 
 # Effective draws that are wanted: an end of the 95 % range then rests on 25 of them.
 EFFECTIVE_DRAWS = 1000
@@ -78,7 +79,7 @@ def refine(ensemble: Ensemble | None, model: Model, watch: Watch = silent) -> Po
     """
     case, station = model.case, model.station
     if ensemble is None:
-        watch(Progress("trying points of the prior"))
+        watch(Progress(TRYING_POINTS))
         tried = points_of_prior(model)
     else:
         check_stations(ensemble, station, case.source)

@@ -102,7 +102,7 @@ def solve_ensemble(
     site = site or build_site(case)
     refuse_ranges_without_cells(case, site.grid)
     if problem := excess(case, site.grid):
-        raise InputError(f"{shown_path(case.source)}: {problem}")
+        raise InputError(f"{shown_path(case.source)}: {sentence(problem)}")
     sample = given or sobol_sample(case)
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     header = make_header(case, wanted, observations, sample.theta, chunks, window_of(case, site.grid))

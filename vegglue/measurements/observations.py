@@ -34,10 +34,14 @@ PROFILE_TYPES: dict[str, type] = {
     "fitted": float, "fitted_error": float, "within": float, "slope": float, "top": float, "scatter": float,
 }  # fmt: skip
 OUTSIDE = "it is outside the grid"
+AT_WALL = "it is nearer to a side wall than the middle of its cell, where the model has no flow"
 EXCLUDED = "the diagnosis excludes it"
 # Readings and their errors, in the SI unit of whatever kind: beyond them lies nothing that is measured in a stream, and
 # the squares of such numbers leave no digits of the others.
 SMALLEST_STATED_ERROR, LARGEST_READING = 1e-9, 1e9
+# Distance from a side wall over the width of a cell [-] below which a velocity is no reading of the cell: its middle,
+# but for rounding.
+NEAR_WALL = 0.499
 Key = tuple[str, str]  # names of experiment and section
 
 
@@ -173,6 +177,11 @@ def read_observations(case: Case) -> Observations:
     at_point = np.array([kind_of(name).at_point for name in table["kind"]], dtype=bool)
     inside = table["x"].between(*case.grid.x) & (table["y"].between(*case.grid.y) | ~at_point)
     table = table.assign(used=table["used"] & inside, reason=table["reason"].mask(table["used"] & ~inside, OUTSIDE))
+    if case.friction.walls is not None:
+        (south, north), half_cell = case.grid.y, NEAR_WALL * case.grid.cell[1]
+        beside = np.minimum(table["y"] - south, north - table["y"]) < half_cell
+        beside &= np.array([kind_of(name).velocity for name in table["kind"]], dtype=bool) & table["used"]
+        table = table.assign(used=table["used"] & ~beside, reason=table["reason"].mask(beside, AT_WALL))
     # Errors of two stations at one place of a section would count as one error.
     correlated = np.array([kind_of(name).correlated for name in table["kind"]], dtype=bool)
     twice = table.duplicated(["experiment", "section", "kind", "x", "y"]) & correlated

@@ -15,7 +15,8 @@ from vegglue.pages.posterior_figures import pictures
 from vegglue.pages.run import Run, is_synthetic
 from vegglue.pages.style import palette_css
 from vegglue.pages.tables import provenance, run_health, station_rows
-from vegglue.whole_files import MAKE_ROOM, write_file
+from vegglue.whole_files import write_file
+from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.wording.sentences import page_document
 
 

@@ -21,7 +21,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from vegglue.whole_files import MAKE_ROOM, write_file
+from vegglue.whole_files import write_file
+from vegglue.wording.remedies import MAKE_ROOM
 
 Drawing = ParamSpec("Drawing")
 # name: (light, dark). Blue for the model, vermilion for measurements: distinct in every common colour blindness.

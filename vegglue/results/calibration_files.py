@@ -23,7 +23,7 @@ from vegglue.case.text_files import read_text, write_text
 from vegglue.errors import InputError, shown_path
 from vegglue.flow.status import FAILED
 from vegglue.results.ensemble import Ensemble
-from vegglue.whole_files import MAKE_ROOM
+from vegglue.wording.remedies import MAKE_ROOM
 
 LONGEST_PARAMETER, LONGEST_OBSERVATION = 12, 20
 # Heading of the column that names members, as pyemu and PEST++ write it.

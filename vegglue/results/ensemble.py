@@ -30,7 +30,8 @@ from vegglue.results.layout import (
     stored_fields,
     table_group,
 )
-from vegglue.wording.numbers import in_short, in_short_html, so_many
+from vegglue.wording.numbers import in_short, in_short_html
+from vegglue.wording.sentences import phrase
 
 VALUE_UNIT = ", ".join(f"{kind.unit} for {kind.words}" for kind in KINDS.values())
 STATION_UNITS = dict.fromkeys(("x", "y", "depth"), "m") | dict.fromkeys(("value", "standard_error"), VALUE_UNIT)
@@ -87,11 +88,9 @@ class Ensemble:
         newton, marched, failed, run = (
             members_with(self.status, how) for how in (SOLVED_BY_NEWTON, SOLVED_BY_MARCHING, FAILED, RUN_BY_COMMAND)
         )
-        own = f"{newton:,} solved by Newton's method, {marched:,} by marching"
-        solved = f"{run:,} run by the command" if self.by_command else own
         worst = self.mass_error[np.isfinite(self.mass_error)].max(initial=0.0)
         return in_short(
-            f"Ensemble of {so_many(len(self.status), 'member')}: {solved}, {failed:,} failed",
+            phrase("ensemble_in_short", len(self.status), newton, marched, failed, run, self.by_command),
             [
                 f"parameters: {', '.join(self.parameters)}",
                 f"experiments: {', '.join(self.experiments)}",

@@ -19,7 +19,8 @@ from vegglue.case.text_files import names_in_files, write_text
 from vegglue.errors import InputError
 from vegglue.flow.sensor import FlowFields
 from vegglue.results.labelled_arrays import ENGINE, extra_library
-from vegglue.whole_files import MAKE_ROOM, failed_writes_told, write_file
+from vegglue.whole_files import failed_writes_told, write_file
+from vegglue.wording.remedies import MAKE_ROOM
 
 # Tags of GeoTIFF 1.1 (OGC 19-008): the affine way from pixels to the map, and the coordinate system; and that of GDAL
 # for what marks no data.
@@ -199,9 +200,6 @@ def _system(frame: Frame | None) -> dict[str, Any]:
     return {"long_name": frame.crs or "coordinates of the map", **of_code, "origin": origin, "angle": frame.angle}
 
 
-MAKE_ROOM_THERE = "make room and run it again"
-
-
 def write_field_table(path: Path, flow: FlowFields, grid: Grid, frame: Frame | None) -> None:
     """One row a cell: x, y, east, north of its centre [m], then the quantities with their units; nothing where dry."""
     x, y = (part.ravel() for part in np.meshgrid(flow.x, flow.y, indexing="ij"))
@@ -248,4 +246,4 @@ def _write(path: Path, heading: list[str], columns: list[Array]) -> None:
         return str(value)
 
     writer.writerows([shown(value) for value in row] for row in zip(*columns, strict=True))
-    write_text(path, text.getvalue(), MAKE_ROOM_THERE)
+    write_text(path, text.getvalue(), MAKE_ROOM)

@@ -83,18 +83,28 @@ def megabytes(case: Case, window: FieldWindow) -> float:
     return case.simulate.members * len(case.experiments) * len(QUANTITIES) * window.x.size * window.y.size * 4e-6
 
 
-def excess(case: Case, grid: Grid) -> str | None:
-    """The sentence for a window larger than its budget, None when all is well."""
+@dataclass(frozen=True)
+class FieldsTooLarge:
+    """`simulate.fields` keeps `megabytes` of `members`, beyond the budget [MB]; length of its range and one that fits
+    [m].
+    """
+
+    megabytes: float
+    members: int
+    budget: float
+    length: float
+    fitting: float
+
+
+def excess(case: Case, grid: Grid) -> FieldsTooLarge | None:
+    """A window larger than its budget, None when all is well."""
     window = window_of(case, grid)
     if window is None or (size := megabytes(case, window)) <= case.simulate.field_budget:
         return None
     columns = int(window.x.size * case.simulate.field_budget / size)
     low, high = window.range
-    return (
-        f"`simulate.fields` keeps {size:.4g} MB of {case.simulate.members:,} members, more than the "
-        f"{case.simulate.field_budget:g} MB of `simulate.field_budget`: shorten its {high - low:g} m along x to "
-        f"{max(columns - 2, 0) * grid.dx:g} m, take fewer members, or raise the budget."
-    )
+    fitting = max(columns - 2, 0) * grid.dx
+    return FieldsTooLarge(size, case.simulate.members, case.simulate.field_budget, high - low, fitting)
 
 
 def predict_at(fields: Fields, x: float, y: float, quantity: Quantity = "u") -> Array:

@@ -18,10 +18,11 @@ import h5py
 import numpy as np
 
 from vegglue.errors import InputError, StorageError
-from vegglue.results.hdf5_reading import READ_HDF5, why_foreign
+from vegglue.results.hdf5_reading import READ_HDF5, ForeignFileError, refuse_foreign
 from vegglue.results.layout import Group
 from vegglue.sandboxed_reader import why_unreadable
 from vegglue.whole_files import lock, write_file
+from vegglue.wording.remedies import REMAKE, WRITTEN_STAYS
 
 MARK = b"\nvegglue sha256 "
 LENGTH = len(MARK) + 64 + 1
@@ -89,8 +90,6 @@ def _digest_of(file: IO[bytes], size: int) -> str:
 
 # What reading a damaged file may raise, of Python or of the HDF5 library.
 UNREADABLE = (OSError, RuntimeError, ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError)
-AGAIN = "remove it and run the step that makes it again"
-WRITTEN_STAYS = "what was written before is whole: make room, then run the same command again"
 
 
 def write_whole(path: Path, groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> None:
@@ -145,10 +144,10 @@ def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
             state = state_of(path)
             if is_unchanged(*state) is False:
                 refuse_in_use(path)
-                raise StorageError(f"{path}: is broken, it has changed since it was written; {AGAIN}.")
+                raise StorageError(f"{path}: is broken, it has changed since it was written; {REMAKE}.")
             if (why := why_unreadable(*state, by=READ_HDF5)) is not None:
                 refuse_in_use(path)
-                raise StorageError(f"{path}: cannot be opened ({why}); {AGAIN}.")
+                raise StorageError(f"{path}: cannot be opened ({why}); {REMAKE}.")
         try:
             file = h5py.File(path, mode, locking=False)
         except OSError as error:
@@ -158,14 +157,14 @@ def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
     except StorageError:
         raise
     except UNREADABLE as error:
-        raise StorageError(f"{path}: cannot be opened ({error}); {AGAIN}.") from error
+        raise StorageError(f"{path}: cannot be opened ({error}); {REMAKE}.") from error
     with file:
         try:
-            foreign = why_foreign(file)
+            refuse_foreign(file)
+        except ForeignFileError as error:
+            raise StorageError(f"{path}: {error}, which vegglue never writes, and is not read; {REMAKE}.") from None
         except UNREADABLE as error:
-            raise StorageError(f"{path}: is broken ({error}); {AGAIN}.") from error
-        if foreign:
-            raise StorageError(f"{path}: {foreign}, which vegglue never writes, and is not read; {AGAIN}.")
+            raise StorageError(f"{path}: is broken ({error}); {REMAKE}.") from error
         yield file
 
 

@@ -16,34 +16,37 @@ FILTERS = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
 LARGEST_RATIO = 1100
 
 
-def why_foreign(file: h5py.File) -> str | None:
-    """What of an open file cannot be of vegglue, in words; None when all may be. Nothing is read, no link followed."""
+class ForeignFileError(Exception):
+    """A file has what vegglue never writes."""
+
+
+def refuse_foreign(file: h5py.File) -> None:
+    """Raise ForeignFileError for what of an open file cannot be of vegglue. Nothing is read, no link followed."""
     room = LARGEST_RATIO * max(file.id.get_filesize(), 1)  # for all together: one dataset may have many names
     for name in file:
         if not _is_hard(file, name):
-            return f"{name} is a link"
+            raise ForeignFileError(f"{name} is a link")
         group = file[name]
         if isinstance(group, h5py.Dataset):
-            return f"{name} is not in a group"
+            raise ForeignFileError(f"{name} is not in a group")
         if not isinstance(group, h5py.Group):
-            return f"{name} is neither group nor dataset"
+            raise ForeignFileError(f"{name} is neither group nor dataset")
         for key in group:
             if not _is_hard(group, key):
-                return f"{name}/{key} is a link"
+                raise ForeignFileError(f"{name}/{key} is a link")
             dataset = group[key]
             if not isinstance(dataset, h5py.Dataset):
-                return f"{name}/{key} is no dataset"
+                raise ForeignFileError(f"{name}/{key} is no dataset")
             made = dataset.id.get_create_plist()
             if made.get_layout() == h5d.VIRTUAL:
-                return f"{name}/{key} is put together from other files"
+                raise ForeignFileError(f"{name}/{key} is put together from other files")
             if made.get_external_count():
-                return f"{name}/{key} lies in other files"
+                raise ForeignFileError(f"{name}/{key} lies in other files")
             if {made.get_filter(number)[0] for number in range(made.get_nfilters())} - FILTERS:
-                return f"{name}/{key} is packed in a way that vegglue does not use"
+                raise ForeignFileError(f"{name}/{key} is packed in a way that vegglue does not use")
             room -= int(np.prod(dataset.shape or (), dtype=object)) * dataset.dtype.itemsize
             if room < 0:
-                return f"{name}/{key} claims more numbers than the file can hold"
-    return None
+                raise ForeignFileError(f"{name}/{key} claims more numbers than the file can hold")
 
 
 def _is_hard(group: h5py.Group, name: str) -> bool:
@@ -57,7 +60,9 @@ READ_HDF5 = f"{__name__}:read_all_values"  # as `sandboxed_reader` names it
 def read_all_values(path: str) -> None:
     """Read every value of a file, except of a foreign one, which the command itself refuses. Raises errors of h5py."""
     with h5py.File(path, "r", locking=False) as file:
-        if why_foreign(file) is not None:
+        try:
+            refuse_foreign(file)
+        except ForeignFileError:
             return
         dict(file.attrs)
         for group in file.values():

@@ -14,7 +14,7 @@ from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.plain_json import plain
 from vegglue.results.model_comparison import ModelComparison, ModelScore, comparison_from, model_score_from
 from vegglue.results.open_questions import Question, questions_from
-from vegglue.whole_files import MAKE_ROOM
+from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.wording.sentences import tagged
 
 SCORE_FORMAT, COMPARISON_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 3", "vegglue questions 4"

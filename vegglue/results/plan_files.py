@@ -18,7 +18,7 @@ from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, path_from
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL
 from vegglue.results.plan import FieldPlan, PlannedPiece, Work
-from vegglue.whole_files import MAKE_ROOM
+from vegglue.wording.remedies import MAKE_ROOM
 
 # Letters before the numbers of places, by their work.
 LETTERS = {Work.TRANSECT: "T", Work.POINT: "V", Work.GAUGE: "G", Work.DISCHARGE: "Q", Work.SURVEY_LINE: "L"}

@@ -13,7 +13,8 @@ import pandas as pd
 from vegglue.measurements.kinds import errors_in_short
 from vegglue.results.ensemble import VALUE_UNIT
 from vegglue.results.layout import IN_WORDS, WHOLE_NUMBERS, YES_OR_NO, Stored
-from vegglue.wording.numbers import in_short, in_short_html, interval_in_short, so_many
+from vegglue.wording.numbers import in_short, in_short_html, interval_in_short
+from vegglue.wording.sentences import phrase
 
 OWN_UNIT = "that of the parameter, see `unit`"
 
@@ -264,13 +265,13 @@ class Posterior:
         return in_short(
             f"Posterior of {', '.join(self.parameters)} ({self.settings.method})",
             [
-                f"{sample.members:,} members, {sample.failed:,} failed, worth {worth:.0f} of equal weight",
-                "" if self.claimed else f"no posterior is claimed from fewer than {CLAIMED_FROM}",
+                phrase("members_in_posterior", sample.members, sample.failed, worth),
+                "" if self.claimed else phrase("posterior_not_claimed", CLAIMED_FROM),
                 *(
                     interval_in_short(name, marginals.median[name], low, high, sample.unit[name])
                     for name, (low, high) in ranges.items()
                 ),
-                f"root mean square errors of the median at {so_many(self.fit.used, 'station')}: {errors}",
+                phrase("errors_of_median", self.fit.used, errors),
             ],
         )
 

@@ -22,6 +22,7 @@ from vegglue.results.layout import Group, Stored, Variable, fitting, names_of
 from vegglue.results.posterior import Posterior
 from vegglue.results.posterior_file import posterior_attributes, posterior_from, posterior_groups
 from vegglue.results.resume import part_file
+from vegglue.wording.remedies import KEEP_FIELDS
 
 # Fields at cell centres, in units of FlowFields.
 FIELD_UNITS_KEPT = {"bed": "m", "depth": "m", "level": "m", "u": "m/s", "v": "m/s"}
@@ -72,7 +73,7 @@ def read_ensemble(path: Path, expected_hash: str | None = None, config: Path | N
 def read_fields(path: Path, expected_hash: str | None = None) -> Fields:
     """Read the fields of a finished ensemble, whole; errors as those of read_ensemble."""
     if not path.exists():
-        remedy = f"say in `simulate.fields` where they are to be kept and run {shown_command('simulate', None)}"
+        remedy = KEEP_FIELDS.format(shown_command("simulate", None))
         raise InputError(f"{path}: expected fields of the members, found no file; {remedy}.")
     return _read(path, expected_hash, shown_command("simulate", None), fields_from)
 

@@ -29,7 +29,6 @@ from vegglue.results.ensemble import ROWS, Header, unsolved
 from vegglue.results.fields import QUANTITIES, FieldWindow, fields_group
 from vegglue.results.hdf5 import (
     UNREADABLE,
-    WRITTEN_STAYS,
     append_digest,
     open_hdf5,
     read_values,
@@ -38,6 +37,7 @@ from vegglue.results.hdf5 import (
     write_whole,
 )
 from vegglue.whole_files import NOT_FOLLOWED, failed_writes_told, lock
+from vegglue.wording.remedies import REMOVE_PART, WRITTEN_STAYS
 
 
 @contextmanager
@@ -233,7 +233,7 @@ def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
         kept = _kept_rows(part, header) if unfinished is None or is_reserved(unfinished) else None
         moved_to = None
         if kept is None and (part.exists() or part.is_symlink()):
-            with failed_writes_told(part, f"remove {part} and run the same command again"):
+            with failed_writes_told(part, REMOVE_PART.format(part)):
                 moved_to = part.replace(part.with_name(part.name + ".old"))
         # All room a run needs, the fields first: a part of an ensemble without its fields cannot be.
         if unfinished is not None and kept is None:

@@ -115,6 +115,15 @@ class AmplitudeBeyondPlausible:
 
 
 @dataclass(frozen=True)
+class NameHangsOnSection:
+    """Without the readings of one section another effect leads the accepted one."""
+
+    effect: str
+    section: str
+    instead: str
+
+
+@dataclass(frozen=True)
 class NeighboursExcluded:
     """Readings side by side are excluded, which one bad probe does not explain."""
 
@@ -203,6 +212,7 @@ Reason = (
     | ParameterFarFromPrior
     | AmplitudeAtBound
     | AmplitudeBeyondPlausible
+    | NameHangsOnSection
     | NeighboursExcluded
     | TooManyGroups
     | NoneLeads
@@ -301,6 +311,40 @@ class ImplausibleAmplitude:
 
     effect: str
     times: float
+
+
+@dataclass(frozen=True)
+class EstimateAtBound:
+    """A calibrated parameter within PRESSES of an end of its prior, from low to high: the bound decides its value."""
+
+    parameter: str
+    value: float
+    unit: str
+    low: float
+    high: float
+    lower: bool
+
+
+@dataclass(frozen=True)
+class BeyondHandbook:
+    """A calibrated parameter beyond low to high [unit] of a handbook; source: which one, and for what."""
+
+    parameter: str
+    value: float
+    unit: str
+    low: float
+    high: float
+    source: str
+
+
+@dataclass(frozen=True)
+class EstimateOffPrior:
+    """A calibrated parameter some standard deviations from the middle of its prior, at `value` [unit]."""
+
+    parameter: str
+    value: float
+    unit: str
+    deviations: float
 
 
 @dataclass(frozen=True)
@@ -430,6 +474,9 @@ Note = (
     DischargeMismatch
     | MisfitTooSmall
     | ImplausibleAmplitude
+    | EstimateAtBound
+    | BeyondHandbook
+    | EstimateOffPrior
     | EffectsNotExcluded
     | EffectsExcluded
     | ModelErrorUsed
@@ -598,8 +645,9 @@ class VerdictInputs:
     errors alone exceed in 5 % of cases; neighbours: whether readings side by side are excluded; strained: the
     parameter furthest off its prior, and how far [standard deviations]; between: errors between the sections over those
     of the data [-]; carried: sections that clearly carry another discharge than stated; remainder: whether all
-    significant effects may be a remainder of what was accepted; surroundings: notes on the map, the measured stretch
-    and the depth; excluded: effects that cannot act at the site, with the reason of each.
+    significant effects may be a remainder of what was accepted; surroundings: notes on the map, the measured stretch,
+    the depth and the parameters; excluded: effects that cannot act at the site, with the reason of each; hangs_on: the
+    section without which another name leads.
     """
 
     candidates: tuple[CandidateEffect, ...]
@@ -624,6 +672,7 @@ class VerdictInputs:
     remainder: bool = False
     surroundings: tuple[Note, ...] = ()
     excluded: Mapping[str, str] = by_default(default_factory=dict)
+    hangs_on: NameHangsOnSection | None = None
 
 
 def make_verdict(inputs: VerdictInputs) -> Verdict:
@@ -719,14 +768,19 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
         return AmplitudeAtBound(tuple(at_bound))
     sizes = [(one.amplitude.relative_size, one.name) for one in inputs.candidates if one.name in names]
     size, name = max(sizes, default=(0.0, ""))
-    return AmplitudeBeyondPlausible(name, float(size)) if size > constants().far_off_prior else None
+    return AmplitudeBeyondPlausible(name, float(size)) if size > constants().far_off_prior else inputs.hangs_on
 
 
 def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt: Reason | None) -> Verdict:
-    """Laws if no known effect explains the misfit; an instrument that is clearly off goes before laws that are not
-    likelier than all else, except readings side by side.
+    """Laws if no known effect explains the misfit, and if errors need not be absurdly large beside them; an instrument
+    that is clearly off goes before laws that are not likelier than all else, except readings side by side.
     """
     found = replace(plain, laws=laws)
+    used, absurd = inputs.model_error, math.sqrt(constants().absurd_misfit)
+    if inputs.errors.scale > absurd:
+        doubt = doubt or ErrorsLargerThanStated(inputs.errors.scale)
+    if used is not None and used.needed > 2.0 * absurd:
+        doubt = doubt or ModelErrorExceeded(used.needed, used.friction)
     if inputs.neighbours and not laws.likelier:
         doubt = doubt or NeighboursExcluded()
     if doubt:

@@ -41,7 +41,8 @@ from vegglue.results.result_files import (
     stored_hash,
     write_flow,
 )
-from vegglue.whole_files import MAKE_ROOM, failed_writes_told
+from vegglue.whole_files import failed_writes_told
+from vegglue.wording.remedies import ANOTHER_RUNS, MAKE_ROOM
 from vegglue.workflow.command_model import unseen_with_command, with_command
 
 # Distance of two fits [standard errors] below which they are the same minimum. Chosen, not measured.
@@ -165,7 +166,7 @@ def _measured_alike(case: Case, other: Case) -> bool:
 def folder_of(runs: Path | str, case: Case) -> Path:
     """Where the results of a case lie; made if need be. Errors: StorageError."""
     folder = Path(runs) / case.name
-    with failed_writes_told(folder, "expected a folder that can be made there; give another one by --runs"):
+    with failed_writes_told(folder, ANOTHER_RUNS):
         folder.mkdir(parents=True, exist_ok=True)
     return folder
 

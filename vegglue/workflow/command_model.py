@@ -24,7 +24,8 @@ from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.progress import Watch
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.verdict import CommandCompared, CommandDiffers, CommandNotSettled
-from vegglue.whole_files import MAKE_ROOM
+from vegglue.wording.phases import COMMAND_ONCE_MORE
+from vegglue.wording.remedies import MAKE_ROOM
 
 PLACE_FILE = "place.json"
 # Difference between the command and its linear model [standard errors, root mean square] above which sizes and chances
@@ -106,7 +107,7 @@ def with_command_compared(found: Diagnosis, model: Model, folder: Path, watch: W
     theta = {name: found.parameters.last[name][0] for name in bare.names}
     z = z_at(bare.case, {name: np.array([value]) for name, value in theta.items()})[0]
     linear = linearise(bare, z)
-    why = "running the command once more"
+    why = COMMAND_ONCE_MORE
     there, failures = command_predictions(runs, bare.case, model.station, [theta], watch, why)
     compared = command_compared(place, len(bare.names), there[0], failures[0], linear, found.predictions.error)
     verdict = replace(found.verdict, notes=(compared, *found.verdict.notes))

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from vegglue.case.config import load_case
 from vegglue.progress import Watch, silent
-from vegglue.whole_files import MAKE_ROOM, failed_writes_told
+from vegglue.whole_files import failed_writes_told
+from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.import_folder import import_folder
 from vegglue.workflow.infer import infer

@@ -38,6 +38,8 @@ from vegglue.results.posterior import Posterior
 from vegglue.results.result_files import read_ensemble, read_posterior, stored_hash
 from vegglue.version import VERSION
 from vegglue.whole_files import folder_within
+from vegglue.wording.phases import SOLVING_FLOW
+from vegglue.wording.sentences import phrase
 from vegglue.workflow.case_run import CaseRun, as_solved, case_run, excluded_in, kept_best_fit, median_flow
 
 Form = Literal["csv", "geotiff", "netcdf"]
@@ -110,7 +112,7 @@ def export(
     refuse_without_parameters(case)
     for library in (name for form in forms for name in LIBRARIES_OF_FORM[form]):  # before minutes are spent on the flow
         extra_library(library, "field", "vegglue export", "choose --only csv")
-    run.watch(Progress(with_compilation(f"solving the flow of {case.name}")))
+    run.watch(Progress(with_compilation(SOLVING_FLOW.format(case.name))))
     flows, predicted, words = flow_to_export(run)
     words += "" if case.engine is None else ", by the built-in engine"
     if not flows:
@@ -218,12 +220,10 @@ def flow_to_export(run: CaseRun) -> tuple[dict[str, FlowFields], Array | None, s
     if stored_hash(folder / "posterior.h5") == wanted:
         posterior = read_posterior(folder / "posterior.h5", wanted)
         predicted = posterior.station["value"].to_numpy(float) - posterior.fit.residual
-        return median_flow(sized, posterior), predicted, "the medians of the posterior"
+        return median_flow(sized, posterior), predicted, phrase("flow_of", "posterior", False)
     best = kept_best_fit(case, folder)
     z = np.zeros(len(case.parameters)) if best is None else best
     theta = {name: float(value[0]) for name, value in theta_at(case, z[None]).items()}
-    words = "the middle of the priors" if best is None else "the best fit that was found"
-    if (folder / "posterior.h5").exists():
-        words += ", as the posterior that is kept is of another state of the config or its data"
+    words = phrase("flow_of", "prior" if best is None else "best-fit", (folder / "posterior.h5").exists())
     point = linearise(run.model, z)
     return solve_flow(case, theta), None if point is None else point.prediction, words

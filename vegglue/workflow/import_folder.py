@@ -32,10 +32,8 @@ from vegglue.importers.confluence import (
 from vegglue.importers.field_folder import case_from_folder, case_from_sheet, case_of_sheet
 from vegglue.importers.site_file import assumptions_of_site, site_file
 from vegglue.measurements.observations import read_observations
+from vegglue.wording.remedies import ANOTHER_FILE, ROOM_FOR_TEMPORARY
 from vegglue.wording.sentences import sentence
-
-ANOTHER_FILE = "give another file by --to"
-NO_ROOM = "free some room in the folder for temporary files"
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
@@ -132,9 +130,9 @@ def refuse_unreadable_import(tree: Tree, texts: Mapping[Path, str], target: Path
     with TemporaryDirectory() as name:
         elsewhere = Path(os.path.realpath(name))
         for path, text in made.items():
-            write_text(elsewhere / path, text, NO_ROOM)
+            write_text(elsewhere / path, text, ROOM_FOR_TEMPORARY)
         home = Path(os.path.realpath(target)).parent
-        write_text(elsewhere / target.name, as_yaml(with_full_paths(tree, home, made)), NO_ROOM)
+        write_text(elsewhere / target.name, as_yaml(with_full_paths(tree, home, made)), ROOM_FOR_TEMPORARY)
         try:
             read_observations(load_case(elsewhere / target.name))
         except InputError as error:

@@ -12,12 +12,13 @@ from vegglue.errors import InputError, shown_path
 from vegglue.flow.sensor import FlowFields
 from vegglue.inference.solve_ensemble import solve_flow
 from vegglue.whole_files import failed_writes_told
+from vegglue.wording.remedies import ANOTHER_NAME
 from vegglue.wording.sentences import file_text
 
 # What the examples were made with, and their errors: the first draws of one seed, so that each time they are the same.
 TRUTH = {"n_b": 0.04, "phi": 6.0}
 VELOCITY_ERROR, LEVEL_ERROR_OF_EXAMPLE, SEED = 0.01, 0.002, 1
-OWN_FILES, ELSEWHERE = ("case.yaml", "velocities.csv", "levels.csv", "README.md"), "give another place by --folder"
+OWN_FILES = ("case.yaml", "velocities.csv", "levels.csv", "README.md")
 # Cells across the floor: as many as a first look needs.
 CELLS_OF_FLOOR = 8
 
@@ -95,17 +96,17 @@ def new(name: str, reach: Reach | None = None, *, folder: Path | str = ".") -> C
     words = {"name": case_name(Path(name).name), "plants": reach.plants, **_numbers(reach)}
     growing = into.with_name(f".{into.name}.new")
     _clear(growing)
-    write_text(growing / "case.yaml", file_text("case.yaml.j2", words), ELSEWHERE)
+    write_text(growing / "case.yaml", file_text("case.yaml.j2", words), ANOTHER_NAME)
     for file, heading in (("velocities.csv", "section,x,y,u,u_se"), ("levels.csv", "x,y,level,level_se")):
-        write_text(growing / file, f"{heading}\n", ELSEWHERE)
+        write_text(growing / file, f"{heading}\n", ANOTHER_NAME)
     case = load_case(growing / "case.yaml")
     flow = solve_flow(case, {name: TRUTH[name] for name in case.parameters}).get("first")
     if flow is None:
         _clear(growing)
         raise InputError(f"{shown_path(into)}: no steady flow is found with these numbers; try a greater --depth.")
     _write_measurements(growing, flow, reach)
-    write_text(growing / "README.md", file_text("readme.md.j2", words), ELSEWHERE)
-    with failed_writes_told(into, ELSEWHERE):
+    write_text(growing / "README.md", file_text("readme.md.j2", words), ANOTHER_NAME)
+    with failed_writes_told(into, ANOTHER_NAME):
         growing.rename(into)
     return load_case(into / "case.yaml")
 

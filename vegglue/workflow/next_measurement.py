@@ -32,6 +32,7 @@ from vegglue.results.open_questions import (
     RivalEffects,
     Subject,
 )
+from vegglue.wording.phases import WEIGHING
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run
 from vegglue.workflow.diagnose import diagnose
 
@@ -98,7 +99,7 @@ def next_measurement(
         with at_most(run.jobs):
             run.watch(Progress(with_compilation(f"calibrating {case.name}")))
             base = with_places(calibrated(run, excluded_by(found)), found)
-            run.watch(Progress("weighing what could be measured"))
+            run.watch(Progress(WEIGHING))
             worths = worth_of_measurements(base.model, base.noise, base.fitted.point, [one for _, one in asked])
         # D^2 of an effect that passes the alarm over all effects 19 times of 20.
         seen = _detected_length(found) ** 2

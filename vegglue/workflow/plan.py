@@ -13,7 +13,7 @@ from vegglue.plain_json import plain
 from vegglue.progress import Watch, silent
 from vegglue.results.plan import FieldPlan, plan_json
 from vegglue.results.plan_files import write_field_files
-from vegglue.whole_files import MAKE_ROOM
+from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.workflow.case_run import CaseRun, case_run
 
 # Folder of the plan in that of the run.

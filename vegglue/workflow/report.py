@@ -19,6 +19,7 @@ from vegglue.progress import Progress, Watch, silent
 from vegglue.results.json_store import comparison_that_fits, questions_that_fit
 from vegglue.results.result_files import diagnosis_that_fits, read_ensemble, read_posterior
 from vegglue.results.resume import begun_or_finished
+from vegglue.wording.phases import DRAWING, SOLVING_FLOW
 from vegglue.workflow.case_run import CaseRun, as_solved, case_run, excluded_in, median_flow
 
 
@@ -55,9 +56,9 @@ def report(
     run = case_run(case, runs, watch=watch)
     sized = run.of(as_solved(run.case, run.folder)) if members is None else run.sized(members)
     known = results_of(sized, run)
-    run.watch(Progress(f"solving the flow of {run.case.name} at its medians"))
+    run.watch(Progress(SOLVING_FLOW.format(run.case.name)))
     flow = median_flow(sized, known.posterior)
-    run.watch(Progress(f"drawing the figures of {run.case.name}"))
+    run.watch(Progress(DRAWING.format(run.case.name)))
     return write_report(replace(known, flow=flow))
 
 

@@ -19,7 +19,7 @@ from vegglue.results.calibration_files import ensemble_table, observation_names,
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.result_files import read_ensemble, stored_hash
 from vegglue.results.resume import remove_left_over_fields
-from vegglue.whole_files import MAKE_ROOM
+from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.workflow.case_run import CaseRun, case_run, other_size
 
 

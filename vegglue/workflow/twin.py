@@ -24,6 +24,7 @@ from vegglue.measurements.kinds import KINDS, kind_of
 from vegglue.parallel import one_thread
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import diagnosis_that_fits
+from vegglue.wording.remedies import ANOTHER_FOLDER
 from vegglue.wording.sentences import sentence
 from vegglue.workflow.case_run import case_run
 from vegglue.workflow.command_model import refuse_command
@@ -81,7 +82,7 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
     if target.resolve() == case.source:
         raise InputError(f"--to {shown_path(folder)}: holds the config that the twin is made of; give another folder.")
     named = texts | {SEAL: seal, target.name: note + as_yaml(tree)}
-    write_made({folder / file: text for file, text in named.items()}, "give another folder by --to", force)
+    write_made({folder / file: text for file, text in named.items()}, ANOTHER_FOLDER, force)
     return target
 
 

@@ -1,0 +1,250 @@
+"""Published measurements through the loop, from the files as their authors ship them: docs/measured.md.
+
+`make measured DATA=folder`, the folder with copies of the repositories (see `SETS` for their files). Nothing of them is
+kept but what the loop said and errors of the models.
+"""
+
+import argparse
+import csv
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vegglue.case.config import load_case
+from vegglue.diagnosis.comparison import excluded_by, held_out_rmse, model_score
+from vegglue.workflow.case_run import CaseRun, calibrated
+from vegglue.workflow.diagnose import diagnose
+from vegglue.workflow.extend import extend_stepwise
+from vegglue.workflow.import_folder import import_folder
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "measured.md"
+BEGIN, END = "<!-- numbers by make measured -->", "<!-- end of numbers -->"
+
+
+@dataclass(frozen=True)
+class MeasuredSet:
+    """folder: makes the folder that is imported from that of the data; known: what is known, and by whom; right:
+    effects that state it; nearly: those that state a part of it, or its place.
+    """
+
+    name: str
+    files: str
+    folder: Callable[[Path, Path], Path]
+    known: str
+    right: tuple[str, ...]
+    nearly: tuple[str, ...] = ()
+
+
+# A. Compound channel of the HHLab: 18 m by 3 m, a main channel of 1 m of glass between floodplains of artificial grass
+# 0.117 m higher, a slope of 1.1e-3; velocities over half of the width.
+COMPOUND = "data/data-raw/HHLab/compound_single_friction/case_08"
+STEP, COMPOUND_SLOPE, COMPOUND_LENGTH = 0.117, 1.1e-3, 18.0
+
+
+def _rows(path: Path) -> list[list[float]]:
+    """Rows of numbers of a table whose first line is a title and whose second names the columns."""
+    with path.open(encoding="utf-8") as file:
+        found = list(csv.reader(file))[2:]
+    return [[float(word) for word in row[:3]] for row in found if row]
+
+
+def compound_discharge(data: Path) -> float:
+    """Q = 2 sum over half of the width of u h dy, the mean of the sections from x = 4 m on, where the flow has settled
+    [m3/s].
+    """
+    velocity = _rows(data / COMPOUND / "Mean_Velocity_Qf_08_at_z_star_0p94_x_star_various.csv")
+    found = []
+    for x in sorted({row[0] for row in velocity if row[0] > 4.0}):
+        y, u = np.array([row[1:] for row in velocity if row[0] == x and np.isfinite(row[2])]).T
+        at = np.linspace(0.0, 1.5, 601)
+        depth = np.where(at < 1.0, 0.0306, 0.148)
+        speed = np.interp(at, np.concatenate([[0.0], y / 1000.0]), np.concatenate([[0.0], u / 100.0]))
+        found.append(2.0 * float(np.trapezoid(speed * depth, at)))
+    return float(np.mean(found))
+
+
+def compound_channel(surfaces: int) -> Callable[[Path, Path], Path]:
+    """The folder of the compound channel; surfaces: 1 as one bed, 2 with a class of its own for the grass."""
+
+    def folder(data: Path, to: Path) -> Path:
+        shutil.rmtree(to, ignore_errors=True)
+        to.mkdir(parents=True)
+        shutil.copy(data / COMPOUND / "Mean_Velocity_Qf_08_at_z_star_0p94_x_star_various.csv", to / "velocities.csv")
+        rows = []
+        for name, above in (
+            ("Flowdepth_FP_Qf_08_at_y_star_0p3_and_0p7.csv", STEP),
+            ("Flowdepth_MC_Qf_08_at_y_star_1p2_1p5_1p8.csv", 0.0),
+        ):
+            found = np.array(_rows(data / COMPOUND / name))
+            for x in np.unique(found[:, 1]):
+                there = found[found[:, 1] == x]
+                # All positions across together: single depths stray by 1 mm of standing waves.
+                rows.append((x, there[:, 2].mean() / 1000.0 + above - COMPOUND_SLOPE * x, above))
+        # One gauge every metre, from main channel and floodplain together.
+        lines = ["section,x,y,level,level_se"]
+        for x in range(2, 18):
+            near = [level for at, level, _ in rows if abs(at - x) <= 0.5]
+            lines.append(f"gauge{x},{x},1.5,{np.mean(near):.5f},0.0004")
+        (to / "levels.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        bed = ["x,y,z"]
+        across = ((0.0, STEP), (0.99, STEP), (1.01, 0.0), (1.99, 0.0), (2.01, STEP), (3.0, STEP))
+        for x in np.arange(0.0, COMPOUND_LENGTH + 0.1, 1.0):
+            bed += [f"{x:g},{y:g},{z - COMPOUND_SLOPE * x:.5f}" for y, z in across]
+        (to / "bed.csv").write_text("\n".join(bed) + "\n", encoding="utf-8")
+        outlet = float(np.mean([level for at, level, _ in rows if at > 17.0])) - COMPOUND_SLOPE * 0.5
+        grass = ""
+        if surfaces == 2:
+            grass = "classes: {file: grass.csv}\n"
+            lines = ["name,class,x,y"]
+            for name, low, high in (("right", 0.0, 1.0), ("left", 2.0, 3.0)):
+                lines += [f"{name},grass,{x},{y}" for x, y in ((0, low), (18, low), (18, high), (0, high))]
+            (to / "grass.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        (to / "site.yaml").write_text(
+            "bed: {file: bed.csv, sections: true}\nwalls: 0.010\n"
+            "grid: {x: [0, 18], y: [0, 3], cell: [0.25, 0.1]}\n"
+            f"experiments: {{'08': {{discharge: {compound_discharge(data):.4f}, level: {outlet:.4f}}}}}\n"
+            'files: {velocities.csv: {standard_error: 1 cm/s, columns: {x: "x* (m)"}}}\n' + grass,
+            encoding="utf-8",
+        )
+        return to
+
+    return folder
+
+
+# B. Smooth rectangular flume of the HHLab, 2 m wide, 1.04e-3: mean velocity of either half and its depth at nine
+# sections, four discharges.
+SMOOTH, SMOOTH_SLOPE, SMOOTH_LENGTH = "data/data-raw/HHLab/smooth_bed", 1.04e-3, 18.0
+SMOOTH_FLOWS = ("07_07", "15_15", "30_30", "60_60")
+
+
+def smooth_flume(data: Path, to: Path) -> Path:
+    """The folder of the smooth flume."""
+    shutil.rmtree(to, ignore_errors=True)
+    to.mkdir(parents=True)
+    velocity, level, flows = ["experiment,section,x,y,u,u_se"], ["experiment,section,x,y,level,level_se"], []
+    for case in SMOOTH_FLOWS:
+        path = data / SMOOTH / f"case_{case}" / f"case_{case}_mixing_layer_mean_flow_parameters.csv"
+        table = {}
+        for row in csv.reader(path.read_text(encoding="utf-8").splitlines(), delimiter=";"):
+            if row and row[1:] and row[1] != "ND":
+                table[row[0]] = np.array([float(word) for word in row[1:]])
+        # U1 and U2 are those between the layers of the walls, 10 % above Q / (B h): what they carry is taken for Q.
+        carried = [np.mean(table[f"U{side} (cm/s)"][1:] * table[f"h{side} (mm)"][1:]) / 1e5 for side in "12"]
+        x, name = table["x (m)"], f"q{case[:2]}"
+        for side, y in (("1", -0.5), ("2", 0.5)):
+            for at, u, h in zip(x, table[f"U{side} (cm/s)"], table[f"h{side} (mm)"], strict=True):
+                if at > 0.5:
+                    velocity.append(f"{name},x{at:g},{at:g},{y},{u / 100.0:.5f},0.008")
+                    level.append(f"{name},x{at:g},{at:g},{y},{h / 1000.0 - SMOOTH_SLOPE * at:.5f},0.0004")
+        last = float(np.mean([table["h1 (mm)"][-1], table["h2 (mm)"][-1]])) / 1000.0
+        flows.append(f"  {name}: {{discharge: {sum(carried):.5f}, level: {last - SMOOTH_SLOPE * SMOOTH_LENGTH:.5f}}}")
+    (to / "velocities.csv").write_text("\n".join(velocity) + "\n", encoding="utf-8")
+    (to / "levels.csv").write_text("\n".join(level) + "\n", encoding="utf-8")
+    (to / "site.yaml").write_text(
+        f"channel: {{length_m: {SMOOTH_LENGTH:g}, bottom_width_m: 2.0, bed_slope: {SMOOTH_SLOPE:g}}}\nwalls: 0.010\n"
+        "experiments:\n" + "\n".join(flows) + "\n",
+        encoding="utf-8",
+    )
+    return to
+
+
+HYDROBAYES = "Felipemendezrios/Hydrobayes @ ecd7947e, d83c12f9, 316ddab5"
+SETS = (
+    MeasuredSet(
+        "A1 compound channel, one roughness",
+        f"{HYDROBAYES}: {COMPOUND}",
+        compound_channel(1),
+        "glass and grass, two surfaces (Proust and Nikora 2020)",
+        ("bank_roughness",),
+        ("depth_dependent_bed", "depth_dependent_bank"),
+    ),
+    MeasuredSet(
+        "A2 compound channel, grass with its own roughness",
+        f"{HYDROBAYES}: {COMPOUND}",
+        compound_channel(2),
+        "a shear layer with large eddies, cells of secondary current (Proust and Nikora 2020)",
+        ("coherent_structures",),
+        ("mixing_length", "smagorinsky", "secondary_current", "panel_current"),
+    ),
+    MeasuredSet(
+        "B smooth flume, four discharges",
+        f"{HYDROBAYES}: {SMOOTH}",
+        smooth_flume,
+        "hydraulically smooth, n falls by some 10 % with Reynolds number (Proust et al. 2022)",
+        ("depth_dependent_bed",),
+        ("bed_reynolds",),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the loop said of a set, and errors along [m/s] before, after and with one section left out each time."""
+
+    name: str
+    known: str
+    verdict: str
+    said: str
+    judged: str
+    errors: tuple[float, float, float, float]
+
+
+def outcome_of(one: MeasuredSet, data: Path, runs: Path, jobs: int) -> Outcome:
+    """Import, diagnose and extend a set."""
+    key = one.name.split()[0].lower()
+    folder = one.folder(data, runs / key)
+    case = import_folder(folder, runs / f"{key}.yaml", force=True)
+    found = diagnose(case, runs=runs / "runs", jobs=jobs, force=True, watch=lambda _: None)
+    grown = extend_stepwise(case, runs=runs / "runs", jobs=jobs, force=True, watch=lambda _: None)
+    first, last = (
+        model_score(calibrated(CaseRun(load_case(path.source), runs / "runs"), excluded_by())[0])
+        if isinstance(calibrated(CaseRun(load_case(path.source), runs / "runs"), excluded_by()), tuple)
+        else model_score(calibrated(CaseRun(load_case(path.source), runs / "runs"), excluded_by()))
+        for path in (grown.cases[0], grown.cases[-1])
+    )
+    names = {effect.name.split("[")[0] for effect in found.verdict.effects}
+    judged = "right" if names & set(one.right) else "partly" if names & set(one.nearly) else "wrong"
+    if found.verdict.kind == "cannot-tell":
+        judged = "undecided"
+    errors = (
+        first.in_sample.rmse["velocity"], last.in_sample.rmse["velocity"], held_out_rmse(first), held_out_rmse(last)
+    )  # fmt: skip
+    return Outcome(one.name, one.known, found.verdict.kind, found.verdict.sentence, judged, errors)
+
+
+def page(found: list[Outcome]) -> str:
+    """The table of the page."""
+    lines = [
+        "| set | known | verdict | judged | error before | after | held out before | after |",
+        "|---|---|---|---|---:|---:|---:|---:|",
+    ]
+    for one in found:
+        numbers = " | ".join(f"{value:.4f}" for value in one.errors)
+        lines.append(f"| {one.name} | {one.known} | {one.verdict} | {one.judged} | {numbers} |")
+    lines += ["", *(f"- {one.name}: {one.said}" for one in found)]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    ask = argparse.ArgumentParser(description=__doc__)
+    ask.add_argument("data", type=Path)
+    ask.add_argument("--runs", type=Path, default=ROOT / "runs" / "measured")
+    ask.add_argument("--jobs", type=int, default=1)
+    ask.add_argument("--only", default="", help="letters of the sets, such as A1,B")
+    given = ask.parse_args()
+    chosen = [one for one in SETS if not given.only or one.name.split()[0] in given.only.split(",")]
+    found = [outcome_of(one, given.data, given.runs, given.jobs) for one in chosen]
+    print(page(found))
+    if len(chosen) == len(SETS):
+        text = PAGE.read_text(encoding="utf-8")
+        before, after = text[: text.index(BEGIN) + len(BEGIN)], text[text.index(END) :]
+        PAGE.write_text(f"{before}\n\n{page(found)}\n\n{after}", encoding="utf-8")
+        print(f"Written to {PAGE.relative_to(ROOT)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""Doubts about calibrated parameters: at a bound of their priors, beyond handbooks, or far off what was stated."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from vegglue.calibration.baseline import Baseline
+from vegglue.calibration.fit import interval95
+from vegglue.case.case_effects import parameters_of_effects
+from vegglue.case.channel_geometry import site_scales
+from vegglue.case.parameter_space import probability
+from vegglue.case.schema import Case, Parameter
+from vegglue.effects.scales import SiteScales
+from vegglue.results.verdict import BeyondHandbook, EstimateAtBound, EstimateOffPrior
+
+# Share of the prior beyond an estimate [-] below which its bound decides it. Chosen, not measured.
+PRESSES = 0.02
+# Standard deviations of a prior that states something, off which an estimate is told. Chosen: one in 80 by chance.
+OFF_STATED = 2.5
+# Widest a stream may be at its surface [m] that Chow (1959) calls minor.
+MINOR_STREAM = 30.0
+
+
+@dataclass(frozen=True)
+class HandbookRange:
+    """What a handbook gives for a quantity, low to high [its unit]."""
+
+    low: float
+    high: float
+    source: str
+
+
+# Manning's n [s m^(-1/3)], Chow (1959), table 5-6: glass 0.009 to cobbles and plastic grass in a flume; minor streams
+# up to sluggish weedy reaches; major streams.
+OF_FLUME = HandbookRange(0.008, 0.035, "Chow (1959) for linings, from glass to stones")
+OF_MINOR_STREAM = HandbookRange(0.01, 0.15, "Chow (1959) for minor streams, from concrete to weedy pools")
+OF_MAJOR_STREAM = HandbookRange(0.01, 0.06, "Chow (1959) for streams wider than 30 m of regular section")
+OF_WALLS = HandbookRange(0.008, 0.018, "Chow (1959) for glass to rough timber and mortar")
+
+
+def parameter_doubts(base: Baseline) -> Iterator[EstimateAtBound | BeyondHandbook | EstimateOffPrior]:
+    """One for each parameter that is at an end of its prior, beyond handbooks, or off what was stated; of amplitudes of
+    effects none, which have doubts of their own.
+    """
+    model, case = base.model, base.model.case
+    scales, of_effects = site_scales(case, model.site), parameters_of_effects(case)
+    for name in model.names:
+        if name in of_effects:
+            continue
+        prior, value = case.parameters[name], interval95(model, base.fitted, name)[0]
+        yield from _at_bound(name, prior, value)
+        known = _handbook(case, scales, name)
+        if known is not None and not known.low <= value <= known.high:
+            yield BeyondHandbook(name, value, prior.unit, known.low, known.high, known.source)
+        far = abs(float(base.fitted.point.z[model.names.index(name)]))
+        if prior.distribution in ("normal", "lognormal") and far > OFF_STATED:
+            yield EstimateOffPrior(name, value, prior.unit, far)
+
+
+def _at_bound(name: str, prior: Parameter, value: float) -> Iterator[EstimateAtBound]:
+    if prior.low is None or prior.high is None:
+        return
+    below = float(probability(prior, value))
+    if min(below, 1.0 - below) < PRESSES and prior.distribution in ("uniform", "loguniform"):
+        yield EstimateAtBound(name, value, prior.unit, prior.low, prior.high, below < 0.5)
+
+
+def _handbook(case: Case, scales: SiteScales, name: str) -> HandbookRange | None:
+    """The range of what a parameter stands for in the case; None for what no handbook knows."""
+    walls = case.friction.walls
+    if walls is not None and walls.n == name:
+        return OF_WALLS
+    if case.eddy_viscosity == name:
+        eddy = scales.of("eddy")
+        return HandbookRange(0.05 * eddy, 3.5 * eddy, "0.05 to 3.5 h u*, Rutherford (1994) for flumes to sharp bends")
+    of_classes = [one for one in case.friction.classes.values() if one.coefficient == name]
+    if any(one.law == "manning" for one in of_classes):
+        width = scales.discharge / (scales.speed * scales.mean_depth)
+        of_stream = OF_MINOR_STREAM if width < MINOR_STREAM else OF_MAJOR_STREAM
+        return OF_FLUME if walls is not None else of_stream
+    if any(one.law == "keulegan" for one in of_classes):
+        high = scales.mean_depth
+        return HandbookRange(0.0, high, "Keulegan (1938), whose roughness is no higher than the water is deep")
+    return None
