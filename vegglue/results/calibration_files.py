@@ -106,8 +106,9 @@ def write_pest(
     for name, prior in case.parameters.items():
         low, high = bounds_of(prior)
         transform = "log" if prior.distribution in LOG_PRIORS else "none"
+        change = "factor" if low > 0.0 else "relative"  # a factor never changes the sign
         middle = float(quantile(prior, 0.5))
-        rows.append(f"{names[name]} {transform} factor {middle!r} {low!r} {high!r} parameters 1.0 0.0 1")
+        rows.append(f"{names[name]} {transform} {change} {middle!r} {low!r} {high!r} parameters 1.0 0.0 1")
         spread.append(f"{names[name]} {standard_deviation(prior)!r}")
     data = [
         f"{name} {float(value)!r} {float(weight)!r} {groups[kind]}"
