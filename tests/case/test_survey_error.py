@@ -14,6 +14,7 @@ from vegglue.case.survey_error import (
     correlation_of_bed,
     fitted_covariances,
     left_out,
+    line_offsets,
     lines_left_out,
     mean_level,
     read_bed_survey,
@@ -196,3 +197,22 @@ def test_a_survey_is_read_as_it_was_written(tmp_path: Path) -> None:
 )
 def test_few_points_or_lines_and_very_many_points_state_no_error(count: int, line: Array, tells: bool) -> None:
     assert BedSurvey(np.random.default_rng(1).uniform(size=(count, 3)), line).tells_its_error is tells
+
+
+def test_a_line_that_was_levelled_wrongly_is_that_line() -> None:
+    """Its offset is that of generalised least squares with one more column for the line."""
+    survey, _ = drawn(9.0, SMOOTH, seed=4)
+    rows = survey.lines[3]
+    wrong = survey.points.copy()
+    wrong[rows, 2] += 0.18
+    off, error = line_offsets(BedSurvey(wrong, survey.line), [SMOOTH])
+    own = np.zeros((len(wrong), 1))
+    own[rows] = 1.0
+    basis = np.hstack([survey.basis(wrong), own])
+    covariance = SMOOTH.sd**2 * correlation_of_bed(wrong, wrong, SMOOTH.along, SMOOTH.across, False)
+    inverse = np.linalg.inv(covariance + SMOOTH.point_error**2 * np.eye(len(wrong)))
+    whole = np.linalg.pinv(basis.T @ inverse @ basis)
+    assert off[3] == pytest.approx((whole @ basis.T @ inverse @ wrong[:, 2])[-1], rel=1e-3)
+    assert error[3] == pytest.approx(np.sqrt(whole[-1, -1]), rel=1e-3)
+    assert int(np.abs(off / error).argmax()) == 3
+    assert np.abs(off / error)[3] > 3.0

@@ -208,6 +208,9 @@ class LinesLeftOut(Part):
     straight: Positive = Field(description="the same of straight lines between the neighbours [m]")
     most: Positive = Field(description="largest error of a line over its stated one [-]")
     most_at: Number = Field(description="x of that line [m]")
+    offset: Number = Field(default=0.0, description="by how much the line that is furthest off lies too high [m]")
+    offset_error: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="its standard error [m]")
+    offset_at: Number = Field(default=0.0, description="x of that line [m]")
 
 
 class SurveyOfBed(Part):

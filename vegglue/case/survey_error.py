@@ -186,12 +186,35 @@ def lines_left_out(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], st
     own = [rows for rows in own if rows.size]
     error_of, stated_of = (np.array([_rms(values[rows]) for rows in own]) for values in (error, stated))
     most = int((error_of / stated_of).argmax())
+    off, of_off = line_offsets(survey, covariances)
+    furthest = int(np.abs(off / of_off).argmax()) if off.size else -1
     rounded = [float(f"{_rms(values[judged]):.4g}") for values in (error, stated, straight)]
     return LinesLeftOut(
         count=len(own), error=rounded[0], stated=rounded[1], straight=rounded[2],
         most=round(float(error_of[most] / stated_of[most]), 3),
         most_at=round(float(survey.points[own[most], 0].mean()), 3),
+        offset=float(f"{off[furthest]:.3g}") if off.size else 0.0,
+        offset_error=float(f"{of_off[furthest]:.3g}") if off.size else 0.0,
+        offset_at=round(float(survey.points[survey.lines[furthest], 0].mean()), 3) if off.size else 0.0,
     )  # fmt: skip
+
+
+def line_offsets(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array]:
+    """d = 1'(Q z)_i / 1' Q_ii 1 and its standard error (1' Q_ii 1)^(-1/2) of each line i (lines,) [m]: by how much the
+    whole line is too high.
+    """
+    basis, z, lines = survey.basis(survey.points), survey.points[:, 2], survey.lines
+    off, squares = np.zeros((len(covariances), len(lines))), np.zeros((len(covariances), len(lines)))
+    for index, one in enumerate(covariances):
+        inverse = np.linalg.inv(_of_readings(survey, one))
+        projected = inverse @ basis
+        q = inverse - projected @ np.linalg.solve(basis.T @ projected, projected.T)
+        for number, rows in enumerate(lines):
+            weight = float(q[np.ix_(rows, rows)].sum())
+            off[index, number], squares[index, number] = float((q[rows] @ z).sum()) / weight, 1.0 / weight
+    chance = np.array([one.chance for one in covariances])
+    mean = chance @ off
+    return mean, np.sqrt(chance @ (squares + (off - mean) ** 2))
 
 
 def mean_level(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array) -> Array:

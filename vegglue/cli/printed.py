@@ -313,9 +313,10 @@ def show_ladder(found: Comparison) -> None:
         and any(np.isfinite(one.in_sample.rmse[kind.name]) for one in scores)
     ]  # fmt: skip
     validated = ["validation"] if any(np.isfinite(one.validation) for one in scores) else []
+    banded = ["validation in 95 %"] if any(np.isfinite(one.validation_inside95) for one in scores) else []
     headings = ("model", "parameters", "RMSE", "levels", *(f"{kind.words} [{kind.unit}]" for kind in others),
                 "chi2 / n", "section left out", "reduction", "exp. left out", "log score", "in 50 %", "in 95 %",
-                *validated)  # fmt: skip
+                *validated, *banded)  # fmt: skip
     rows, heterogeneous = [], []
     for before, one in zip([None, *scores[:-1]], scores, strict=True):
         seen, held = one.in_sample, one.predictive
@@ -328,6 +329,7 @@ def show_ladder(found: Comparison) -> None:
             error(held_out_rmse(one)), "" if np.isnan(gain) else f"{in_digits(gain, 2)} ± {known}",
             error(held_out_rmse(one, "experiments")), error(held.log_score, ".2f"), error(held.inside50, ".0%"),
             error(held.inside95, ".0%"), *([error(one.validation)] if validated else []),
+            *([error(one.validation_inside95, ".0%")] if banded else []),
         ))  # fmt: skip
         if moves := differing(one.homogeneity):
             heterogeneous.append((one.name, {name: p for name, p in one.homogeneity.items() if name in moves}))

@@ -22,13 +22,16 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
 from vegglue.calibration.learned_bed import changed_by, learned_bed
+from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import covariance_of
+from vegglue.case.bed_error import without_surveys
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
 from vegglue.measurements.observations import EXCLUDED
+from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
 from vegglue.wording.sentences import phrase
@@ -92,7 +95,7 @@ def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
     density = -0.5 * error**2 - np.log(spread[velocity]) - 0.5 * np.log(2.0 * np.pi)
     known = surprise[np.isfinite(surprise)]
     inside = [float(np.mean(known < ndtri(0.5 + 0.5 * level))) if known.size else float("nan") for level in (0.5, 0.95)]
-    validated = float("nan")
+    validated = within = float("nan")
     if validation is not None and (there := linearise(validation, point.z)) is not None:
         rows, predicted, learned = leading_velocities(validation.station), there.prediction, learned_bed(base)
         if learned is not None:  # the bed is calibrated, too
@@ -100,7 +103,18 @@ def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
             cells = validation if same else coarser(validation)
             on_cells = there if same or cells is None else linearise(cells, point.z)
             if cells is not None and on_cells is not None:
-                predicted = predicted + changed_by(learned, cells, on_cells)[0]
+                change, of_bed = changed_by(learned, cells, on_cells)
+                predicted = predicted + change
+                # What the bed still leaves, with the errors of friction, sides, parameters, grid and reading.
+                allowed = cells.case.model_error.model_copy(update={"probes": 0.0})
+                plain = replace(cells, case=without_surveys(cells.case))
+                of_model = model_error_columns(plain, on_cells, allowed)
+                of_parameters = on_cells.slope @ np.linalg.cholesky(base.fitted.covariance)
+                variance = sum((one[rows] ** 2).sum(axis=1) for one in (of_bed, of_model, of_parameters))
+                stated = np.nan_to_num(validation.station["standard_error"].to_numpy(float)[rows])
+                variance = variance + stated**2 + float(np.mean(noise.grid_error[velocity] ** 2))
+                missed = validation.station["value"].to_numpy(float)[rows] - predicted[rows]
+                within = float(np.mean(np.abs(missed) < NORMAL95 * np.sqrt(variance)))
         validated = root_mean_square(validation.station["value"].to_numpy(float)[rows] - predicted[rows])
     return ModelScore(
         name=model.case.name,
@@ -124,6 +138,7 @@ def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
         ),
         homogeneity=homogeneity(base),
         validation=validated,
+        validation_inside95=within,
     )
 
 
@@ -150,6 +165,7 @@ def model_score_json(score: ModelScore) -> dict[str, Any]:
         "values": score.values,
         "homogeneity": score.homogeneity,
         "validation": score.validation,
+        "validation_inside95": score.validation_inside95,
         "held_out_sections": held_out_rmse(score),
         "held_out_experiments": held_out_rmse(score, "experiments"),
     }

@@ -92,6 +92,8 @@ class ModelScore:
         Chance that a parameter is the same in all experiments, by name [-].
     validation
         Root mean square error of velocities that no calibration used [m/s], NaN without them.
+    validation_inside95
+        Share of them within the 95 % band, of a bed whose survey states its error [-]; else NaN.
     """
 
     name: str
@@ -103,6 +105,7 @@ class ModelScore:
     predictive: PredictiveScores
     homogeneity: dict[str, float]
     validation: float
+    validation_inside95: float = float("nan")
 
 
 def model_score_from(tree: Mapping[str, Any]) -> ModelScore:
@@ -131,6 +134,7 @@ def model_score_from(tree: Mapping[str, Any]) -> ModelScore:
         predictive=PredictiveScores(**{name: number_kept(value) for name, value in tree["predictive"].items()}),
         homogeneity={name: number_kept(p) for name, p in tree["homogeneity"].items()},
         validation=number_kept(tree["validation"]),
+        validation_inside95=number_kept(tree.get("validation_inside95")),
     )
 
 
