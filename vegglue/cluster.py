@@ -39,7 +39,7 @@ EACH_CORE = 16  # processes of local:N for each core at most; more than one only
 # Tasks under way [-]: for each thread of a worker one at work and one that waits; and a least number for new workers.
 EACH_THREAD, AT_LEAST = 2, 16
 DECIDING = ("numpy", "scipy", "numba")  # libraries that decide the last digits
-Work = Callable[..., Any]
+TaskWork = Callable[..., Any]
 DASK_SETTINGS = {
     # What tasks share is sent once and may be large: the warning against large graphs does not apply.
     "distributed.admin.large-graph-warning-threshold": "1 TB",
@@ -160,7 +160,7 @@ def refuse_version(wanted: Mapping[str, str], there: Mapping[str, str], worker: 
             )
 
 
-def results_of_tasks(client: "Client", work: Work, tasks: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+def results_of_tasks(client: "Client", work: TaskWork, tasks: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
     """Yield the position and the result of each task as they end; few are under way at once, to bound the memory.
 
     Raises what a task raises, and InputError if workers died of it, or the scheduler is gone.
@@ -222,14 +222,14 @@ def results_of_tasks(client: "Client", work: Work, tasks: Iterable[tuple[Any, ..
         client.cancel([*under_way, shared])
 
 
-def _unpacked(packed: bytes) -> Work:
+def _unpacked(packed: bytes) -> TaskWork:
     from distributed.protocol.pickle import loads
 
-    work: Work = loads(packed)
+    work: TaskWork = loads(packed)
     return work
 
 
-def _at_work(wanted: Mapping[str, str], work: Work, packed: bytes) -> Any:
+def _at_work(wanted: Mapping[str, str], work: TaskWork, packed: bytes) -> Any:
     """Compute one task on a worker, with one thread."""
     from distributed import get_worker
     from distributed.protocol.pickle import loads

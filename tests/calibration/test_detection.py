@@ -15,7 +15,7 @@ from vegglue.calibration.detection import (
     information,
     own_and_shared,
     single_threshold,
-    squared_distances,
+    trace_distances,
 )
 from vegglue.calibration.score_test import alarm_level, alarm_p, kind_of_hypotheses, project
 
@@ -107,7 +107,7 @@ def test_distances_are_those_of_traces_with_another_one_free() -> None:
     traces = random.standard_normal((20, 2))
     gram = traces.T @ traces
     left = traces[:, 0] - traces[:, 1] * (traces[:, 1] @ traces[:, 0]) / (traces[:, 1] @ traces[:, 1])
-    assert squared_distances(gram)[0, 1] == pytest.approx(float(left @ left))
+    assert trace_distances(gram)[0, 1] == pytest.approx(float(left @ left))
 
 
 def test_many_shared_errors_are_few_with_the_variance_of_each_station() -> None:

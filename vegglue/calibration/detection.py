@@ -32,7 +32,7 @@ PLANNED_POWER = 0.9
 # Largest score that is looked for [standard errors]: no data have more, and a longer fingerprint hides nothing.
 LARGEST_SCORE = 1e6
 # Halvings of an interval of lengths or of scores, which leave 1e-12 of it.
-HALVINGS = 40
+ROOT_HALVINGS = 40
 # Shared errors whose standard deviation is below this share of a station's own error count as its own [-].
 SMALL_SHARE = 0.05
 # Independent patterns of shared errors that are kept at most. Chosen: those left out are counted as own errors.
@@ -66,7 +66,7 @@ def detected_length(threshold: Array, chance: float = PLANNED_POWER, only_sign: 
     """l at which `detection_chance` is `chance` [standard errors], by halving."""
     threshold = np.asarray(threshold, dtype=float)
     low, high = np.zeros_like(threshold), threshold + 10.0
-    for _ in range(HALVINGS):
+    for _ in range(ROOT_HALVINGS):
         middle = 0.5 * (low + high)
         enough = detection_chance(middle, threshold, only_sign) >= chance
         low, high = np.where(enough, low, middle), np.where(enough, middle, high)
@@ -98,7 +98,7 @@ def alarm_thresholds(kind: HypothesisKind, columns: Sequence[np.ndarray], level:
         cosine = units[:, own].T @ units[:, own]
         size, prior = kind.size[own], kind.log_prior[own]
         low, high = np.zeros(own.size), found[own]  # others only add
-        for _ in range(HALVINGS):
+        for _ in range(ROOT_HALVINGS):
             middle = 0.5 * (low + high)
             evidence = log_factors(middle[:, None] * cosine, size) + prior
             enough = np.logaddexp.reduce(evidence, axis=1) >= level
@@ -180,7 +180,7 @@ def information(own_variance: Array, nuisances: Array, traces: Array, rows: np.n
     return Information(columns.T @ columns, nuisances.shape[1])
 
 
-def squared_distances(visible: Array) -> Array:
+def trace_distances(visible: Array) -> Array:
     """D^2 (c, c) of each trace from what is left when another one may have any size: G_ii - G_ij^2 / G_jj [-]."""
     own = np.maximum(np.diag(visible), 1e-300)
     return np.asarray(np.maximum(own[:, None] - visible**2 / own[None], 0.0))

@@ -11,7 +11,7 @@ from vegglue.case.site_schema import Value
 from vegglue.effects.active_effect import ActiveEffect
 from vegglue.effects.definition import Effect, Stage
 from vegglue.effects.library import library
-from vegglue.effects.scales import has_scales, sized
+from vegglue.effects.scales import at_site, has_scales
 
 Theta = Mapping[str, Array]
 
@@ -26,7 +26,7 @@ def value_of(value: Value, theta: Theta, members: int) -> Array:
 def effect_named(case: Case, name: str) -> Effect:
     """The effect of this name in the library, with sizes made of the scales of the case."""
     effect = library(case.effect_file)[name]
-    return sized(effect, site_scales(case)) if has_scales(effect) else effect
+    return at_site(effect, site_scales(case)) if has_scales(effect) else effect
 
 
 def effect_of(case: Case, name: str) -> Effect:

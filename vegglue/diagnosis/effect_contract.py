@@ -20,7 +20,7 @@ from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.schema import Case
 from vegglue.effects.active_effect import applied
 from vegglue.effects.definition import Effect
-from vegglue.effects.scales import sized
+from vegglue.effects.scales import at_site
 from vegglue.effects.surroundings import PlantCells
 from vegglue.errors import InputError
 from vegglue.flow.closures import closures
@@ -160,7 +160,7 @@ def trial(effect: Effect, own: Path | None = None, scale: float = 1.0) -> Trial:
     case = Case.model_validate(channel_at(scale) | {"source": Path("contract"), "effect_file": own, "effects": works})
     site = build_site(case)
     stations = TRIAL_STATIONS.assign(x=scale * TRIAL_STATIONS["x"], y=scale * TRIAL_STATIONS["y"])
-    return Trial(sized(effect, site_scales(case, site)), case, site, stations)
+    return Trial(at_site(effect, site_scales(case, site)), case, site, stations)
 
 
 def at_rest(problem: Problem) -> Array:

@@ -41,7 +41,7 @@ from vegglue.calibration.detection import (
     information,
     own_and_shared,
     single_threshold,
-    squared_distances,
+    trace_distances,
 )
 from vegglue.calibration.fingerprints import Fingerprints, Places, places_of
 from vegglue.calibration.model_error import (
@@ -77,7 +77,7 @@ from vegglue.effects.definition import Amplitude
 from vegglue.engine.interface import Model, Point, linearise, linearise_from, responses
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
-from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL
+from vegglue.measurements.kinds import KINDS, STREAMWISE
 from vegglue.measurements.observations import section_places, station_table
 from vegglue.normal_range import NORMAL95
 from vegglue.parallel import in_threads
@@ -99,17 +99,18 @@ from vegglue.results.plan import (
     Work,
     hours_of,
 )
+from vegglue.results.plan_files import KIND_OF_WORK
 
 # Places of the prior at which a plan is computed [-]. Chosen: each costs the flows and all fingerprints.
-DRAWS = 3
+PRIOR_PLACES = 3
 # Other discharges that are thought of, relative to the lowest one of the case; above the highest one HIGHER.
-LOWER = (0.5,)
+LOWER_DISCHARGES = (0.5,)
 # Depth below which no velocity is measured [m]: a propeller is covered.
-LEAST_DEPTH = 0.1
+LEAST_PLANNED_DEPTH = 0.1
 # Verticals in the water of the middle experiment where no spacing is given [-].
-VERTICALS = 10
+VERTICALS_ACROSS = 10
 # Places of transects that are thought of, those at patches among them, and patches in whose middle a vertical is.
-MOST_PLACES, MOST_PATCHES = 20, 8
+MOST_ADDED_PLACES, MOST_PATCHES = 20, 8
 # |cosine| from which another effect is listed as similar [-]: half of the squares of a trace are then the same.
 SIMILAR_FROM = 0.7
 SIMILAR_SHOWN = 3
@@ -119,12 +120,9 @@ USUAL_ALARM = 0.6
 # Draws of errors alone for the alarm [-]: 50 lie beyond the 95 % point.
 ALARM_DRAWS = 1000
 # Proposals that are shown, those that are looked at again in an exchange, and rounds of exchange at most.
-SHOWN, LOOKED_AT, ROUNDS = 6, 12, 2
+ADDITIONS_SHOWN, ADDITIONS_WEIGHED, ADDING_ROUNDS = 6, 12, 2
 # Rise of the answer to a question below which a piece adds nothing [-].
-LEAST_GAIN = 1e-3
-KIND_OF_WORK = {
-    Work.TRANSECT: STREAMWISE, Work.POINT: STREAMWISE, Work.GAUGE: WATER_LEVEL, Work.DISCHARGE: "discharge",
-}  # fmt: skip
+LEAST_PLAN_GAIN = 1e-3
 
 
 @dataclass(frozen=True)
@@ -229,7 +227,7 @@ def plan_measurements(
         parameters=_parameters(model.case, shown),
         question=question,
         answer=search.start.mean,
-        further=further[:SHOWN],
+        further=further[:ADDITIONS_SHOWN],
         extended=extended,
         chances_of_places=_chances_of_drag(shown),
     )
@@ -253,7 +251,7 @@ def verticals_at(
     start = low if within is not None else 0.5 * (low + high)
     steps = np.arange(np.ceil((low - start) / spacing - 1e-9), np.floor((high - start) / spacing + 1e-9) + 1.0)
     places = np.round(start + spacing * steps, 3)
-    deep = np.interp(places, y, depth) >= LEAST_DEPTH
+    deep = np.interp(places, y, depth) >= LEAST_PLANNED_DEPTH
     return tuple(float(one) for one in places[deep])
 
 
@@ -265,7 +263,7 @@ def planned_pieces(model: Model, planned: Planned) -> list[PlannedPiece]:
             piece = _piece(model, planned, one, experiment)
             if piece is None:
                 raise InputError(
-                    f"{model.case.name}: `planned` expected water of {LEAST_DEPTH:g} m at x = {one.x:g} m in "
+                    f"{model.case.name}: `planned` expected water of {LEAST_PLANNED_DEPTH:g} m at x = {one.x:g} m in "
                     f"{experiment}, got none; correct the place, or name the `experiments` it is for."
                 )
             found.append(piece)
@@ -288,12 +286,12 @@ def _piece(
             return PlannedPiece(Work.TRANSECT, experiment, one.x, places, hours, new, again) if places else None
         case PlannedPoint():
             y, depth = water_across(model, experiment, one.x)
-            deep = float(np.interp(one.y, y, depth)) >= LEAST_DEPTH
+            deep = float(np.interp(one.y, y, depth)) >= LEAST_PLANNED_DEPTH
             point = PlannedPiece(Work.POINT, experiment, one.x, (one.y,), costs.vertical, new, again)
             return point if deep else None
         case PlannedGauge():
             y, depth = water_across(model, experiment, one.x)
-            wet = y[depth >= LEAST_DEPTH]
+            wet = y[depth >= LEAST_PLANNED_DEPTH]
             if one.y is None and not wet.size:
                 return None
             middle = round(float(0.5 * (wet[0] + wet[-1])), 2) if one.y is None else one.y
@@ -325,7 +323,7 @@ def possible_pieces(
     places = list(measured)
     for x in (*along, *beside):
         x = round(float(x), digits)
-        if low < x < high and len(places) < MOST_PLACES and all(abs(x - other) > near for other in places):
+        if low < x < high and len(places) < MOST_ADDED_PLACES and all(abs(x - other) > near for other in places):
             places.append(x)
     spacing = _usual_spacing(wide, planned, velocity)
     found: list[PlannedPiece | None] = []
@@ -352,7 +350,7 @@ def possible_pieces(
 
 
 def _usual_spacing(model: Model, planned: Planned, velocity: pd.DataFrame) -> float:
-    """Of the planned transects, else of the measured ones, else for VERTICALS in the water."""
+    """Of the planned transects, else of the measured ones, else for VERTICALS_ACROSS in the water."""
     if planned.transects:
         return float(np.median([one.spacing for one in planned.transects]))
     if not velocity.empty:
@@ -363,12 +361,12 @@ def _usual_spacing(model: Model, planned: Planned, velocity: pd.DataFrame) -> fl
     experiments = list(model.case.experiments)
     grid = model.site.grid
     y, depth = water_across(model, experiments[len(experiments) // 2], float(grid.x[grid.x.size // 2]))
-    wet = y[depth >= LEAST_DEPTH]
+    wet = y[depth >= LEAST_PLANNED_DEPTH]
     width = float(np.ptp(wet)) if wet.size > 1 else float(np.ptp(y))
-    return float(f"{width / VERTICALS:.1g}")
+    return float(f"{width / VERTICALS_ACROSS:.1g}")
 
 
-def _with_flows(model: Model, lower: Sequence[float] = LOWER) -> Model:
+def _with_flows(model: Model, lower: Sequence[float] = LOWER_DISCHARGES) -> Model:
     """The model with the flows that could be measured besides."""
     case = with_other_discharges(model, lower) if lower or HIGHER else model.case
     return model if case is model.case else replace(model, case=case, site=build_site(case))
@@ -448,7 +446,7 @@ def _plan_model(
     other = here if search is on_coarse else on_coarse
     candidates = candidates_of(model.case, stations)
     causes = [cause_of(search.case, one, shapes) for one in candidates for shapes in one.settings()]
-    middle, *others = places_of_prior(len(model.names))[:DRAWS]
+    middle, *others = places_of_prior(len(model.names))[:PRIOR_PLACES]
     coarsest = None if search is here else coarser(search)
 
     def settled(z: Array, near: Point | None = None) -> Point | None:
@@ -854,7 +852,7 @@ class PlanSearch:
     def _answer(self, known: Information) -> float:
         if isinstance(self.question, TwoEffects):
             visible = known.visible()
-            distance = squared_distances(visible)
+            distance = trace_distances(visible)
             first, second = (np.flatnonzero(self.owner == self.names.index(name)) for name in
                              (self.question.first, self.question.second))  # fmt: skip
             return float(chance_to_separate(np.minimum(distance, distance.T)[np.ix_(first, second)].min()))
@@ -903,7 +901,7 @@ class PlanSearch:
         found = []
         for move in self.moves(()):
             after = self.answer(self.with_pieces(self.base, move))
-            if after.mean - self.start.mean > LEAST_GAIN:
+            if after.mean - self.start.mean > LEAST_PLAN_GAIN:
                 found.append(self._proposed(move, after))
         return tuple(sorted(found, key=lambda one: -one.per_hour))
 
@@ -919,12 +917,12 @@ class PlanSearch:
     def best_set(self, budget: float, chosen: Sequence[int]) -> list[int]:
         """Pieces that fit a budget [h]: greedy by gain for an hour, then exchanged one by one while that helps."""
         chosen = self._greedy(budget, list(chosen))
-        for _ in range(ROUNDS):
+        for _ in range(ADDING_ROUNDS):
             before = self.answer(self.with_pieces(self.base, chosen)).mean
             for j in list(chosen):
                 rest = [k for k in chosen if k != j]
                 again = self._greedy(budget, rest)
-                if self.answer(self.with_pieces(self.base, again)).mean > before + LEAST_GAIN:
+                if self.answer(self.with_pieces(self.base, again)).mean > before + LEAST_PLAN_GAIN:
                     chosen, before = again, self.answer(self.with_pieces(self.base, again)).mean
                     break
             else:
@@ -943,9 +941,9 @@ class PlanSearch:
             possible = {move: hours for move, hours in possible.items() if spent + hours <= budget + 1e-9}
             # What a piece adds hardly ever grows: those that added less before are looked at last (lazy greedy).
             order = sorted(possible, key=lambda move: -promised.get(move, np.inf) / possible[move])
-            best, best_rate = None, LEAST_GAIN / budget
+            best, best_rate = None, LEAST_PLAN_GAIN / budget
             for looked, move in enumerate(order):
-                if move in promised and (promised[move] / possible[move] <= best_rate or looked >= LOOKED_AT):
+                if move in promised and (promised[move] / possible[move] <= best_rate or looked >= ADDITIONS_WEIGHED):
                     break
                 promised[move] = self.answer(self.with_pieces(known, move)).mean - now
                 if promised[move] / possible[move] > best_rate:

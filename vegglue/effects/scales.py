@@ -82,7 +82,7 @@ def has_scales(effect: Effect) -> bool:
     return bool(effect.amplitude.of or effect.amplitude.low_of or any(shape.of for shape in effect.shapes))
 
 
-def sized(effect: Effect, scales: SiteScales) -> Effect:
+def at_site(effect: Effect, scales: SiteScales) -> Effect:
     """The effect with its numbers in their units: multiples of the scales that `of` names are multiplied by these."""
     if not has_scales(effect):
         return effect

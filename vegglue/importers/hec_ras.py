@@ -27,7 +27,7 @@ from vegglue.importers.model_result import (
 AREAS = "Geometry/2D Flow Areas"
 SERIES = "Results/Unsteady/Output/Output Blocks/Base Output/Unsteady Time Series"
 # Smallest eigenvalue of the normals of a cell over the largest [-], below which its faces give one component only.
-ONE_DIRECTION = 1e-3
+ONE_HEADING = 1e-3
 
 
 def read_hec_ras(path: Path) -> ModelResult:
@@ -153,6 +153,6 @@ def _vectors(
             here = used[:, side]
             sums[key] += np.bincount(cells[here, side], (weight * value)[here], count)
     matrix = np.stack([np.stack([sums["xx"], sums["xy"]], -1), np.stack([sums["xy"], sums["yy"]], -1)], -2)
-    inverse = np.linalg.pinv(matrix, rcond=ONE_DIRECTION, hermitian=True)
+    inverse = np.linalg.pinv(matrix, rcond=ONE_HEADING, hermitian=True)
     found = (inverse @ np.stack([sums["x"], sums["y"]], -1)[..., None])[..., 0]
     return found[:, 0], found[:, 1]

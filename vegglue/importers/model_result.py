@@ -25,7 +25,7 @@ DRY_DEPTH = 0.005
 FOOT, US_SURVEY_FOOT = 0.3048, 1200.0 / 3937.0
 LENGTHS = {"m": 1.0, "meters": 1.0, "meter": 1.0, "metre": 1.0, "feet": FOOT, "ft": FOOT, "foot": FOOT}
 LENGTHS |= {"m/s": 1.0, "m s-1": 1.0, "ms-1": 1.0, "ft/s": FOOT, "ft s-1": FOOT}
-FILL_VALUES = (-999.0, -999.999, -9999.0, -99999.0)  # that codes write without declaring them
+FILLS_OF_CODES = (-999.0, -999.999, -9999.0, -99999.0)  # that codes write without declaring them
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ class NetcdfVariable:
         named = [self.attributes[one] for one in ("_FillValue", "missing_value") if one in self.attributes]
         marks = [float(np.ravel(one)[0]) for one in named]
         with np.errstate(invalid="ignore"):
-            raw = np.where(np.isin(raw, [*marks, *FILL_VALUES]) | (np.abs(raw) > 1e30), np.nan, raw)
+            raw = np.where(np.isin(raw, [*marks, *FILLS_OF_CODES]) | (np.abs(raw) > 1e30), np.nan, raw)
         scale = float(np.ravel(self.attributes.get("scale_factor", 1.0))[0])
         offset = float(np.ravel(self.attributes.get("add_offset", 0.0))[0])
         return (raw * scale + offset) * LENGTHS.get(self.text("units").strip().lower(), 1.0)

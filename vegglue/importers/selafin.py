@@ -18,7 +18,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.model_result import ModelResult, model_result
 
 # Names of variables, English and French, without their units.
-NAMES = {
+SELAFIN_NAMES = {
     "bed": ("BOTTOM", "FOND"), "depth": ("WATER DEPTH", "HAUTEUR D'EAU", "HAUTEUR D EAU"),
     "level": ("FREE SURFACE", "SURFACE LIBRE"), "u": ("VELOCITY U", "VITESSE U"), "v": ("VELOCITY V", "VITESSE V"),
     "friction": ("BOTTOM FRICTION", "FROTTEMENT"),
@@ -97,12 +97,12 @@ def _result(path: Path, file: BinaryIO, order: str) -> ModelResult:
     seconds = float(np.frombuffer(_record(file, order, size), real)[0])
     values = {name: np.frombuffer(_record(file, order, size), real).astype(np.float64) for name in names}
     found: dict[str, Array] = {}
-    for key, known in NAMES.items():
+    for key, known in SELAFIN_NAMES.items():
         if (name := next((name for name in names if name in known), None)) is not None:
             found[key] = values[name]
-    missing = [NAMES[key][0] for key in ("u", "v") if key not in found]
+    missing = [SELAFIN_NAMES[key][0] for key in ("u", "v") if key not in found]
     if len({"bed", "depth", "level"} & found.keys()) < 2:
-        missing += [NAMES[key][0] for key in ("bed", "depth", "level") if key not in found]
+        missing += [SELAFIN_NAMES[key][0] for key in ("bed", "depth", "level") if key not in found]
     if missing:
         raise InputError(
             f"{shown_path(path)}: expected the variables {', '.join(missing)}, got {', '.join(names) or 'none'}; add "

@@ -61,7 +61,7 @@ def _one_or_more(experiments: dict[str, Any]) -> dict[str, Any]:
 PrintableName = Annotated[str, AfterValidator(_printable)]
 Length = Annotated[Number, Field(gt=0, le=1e6)]
 Level = Annotated[Number, Field(ge=-1e4, le=1e4), AfterValidator(_measured)]
-Discharge = Annotated[Number, Field(gt=0, le=1e6), AfterValidator(_measured)]
+MeasuredDischarge = Annotated[Number, Field(gt=0, le=1e6), AfterValidator(_measured)]
 
 
 class _SitePart(BaseModel):
@@ -131,7 +131,7 @@ class _Rectangle(_SitePart):
 class MeasuredFlow(_SitePart):
     """One experiment; its numbers may go by the names without a unit, and then hold one, such as 42 l/s."""
 
-    discharge_m3_s: Annotated[Discharge, BeforeValidator(_with_unit("discharge"))]
+    discharge_m3_s: Annotated[MeasuredDischarge, BeforeValidator(_with_unit("discharge"))]
     downstream_level_m: Annotated[Level, BeforeValidator(_with_unit("length"))]
 
     @model_validator(mode="before")

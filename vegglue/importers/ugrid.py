@@ -24,7 +24,7 @@ from vegglue.importers.model_result import (
 )
 
 # Of each quantity: names of D-Flow FM without the mesh, and standard names.
-NAMES = {
+UGRID_NAMES = {
     "bed": (("flowelem_bl", "bl"), ("altitude", "sea_floor_altitude", "bed_level")),
     "level": (("s1",), ("sea_surface_height", "sea_surface_elevation", "water_surface_height_above_reference_datum")),
     "depth": (("waterdepth",), ("sea_floor_depth_below_sea_surface", "water_depth", "depth")),
@@ -66,7 +66,7 @@ def read_ugrid(path: Path) -> ModelResult:
         nodes = np.column_stack([node_x.values(), node_y.values()])
         corners = _corners_of_faces(variables[topology.text("face_node_connectivity")])
         faces, times = corners.shape[0], max(variables["time"].shape[0], 1) if "time" in variables else 0
-        found = {key: _field(variables, mesh, key, (faces, len(nodes)), times) for key in NAMES}
+        found = {key: _field(variables, mesh, key, (faces, len(nodes)), times) for key in UGRID_NAMES}
         missing = [key for key in ("u", "v") if found[key] is None]
         if sum(found[key] is not None for key in ("bed", "level", "depth")) < 2:
             missing += [key for key in ("bed", "level", "depth") if found[key] is None]
@@ -117,7 +117,7 @@ def _field(
     variables: dict[str, NetcdfVariable], mesh: str, key: str, sizes: tuple[int, int], times: int
 ) -> Array | None:
     """A quantity at faces or nodes, by its name, else by its standard name; None if there is none without layers."""
-    names, standard = NAMES[key]
+    names, standard = UGRID_NAMES[key]
     of_mesh = {name: one for name, one in variables.items() if one.text("mesh") in (mesh, "")}
     by_name = [of_mesh[f"{mesh}_{name}"] for name in names if f"{mesh}_{name}" in of_mesh]
     by_standard = [one for one in of_mesh.values() if one.text("standard_name") in standard]

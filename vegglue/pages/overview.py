@@ -29,7 +29,7 @@ from vegglue.whole_files import folder_within
 from vegglue.wording.sentences import page_document, page_phrase, phrase, sentence
 
 # The picture [px], legible on a telephone of 360 px; the height of a row, of its words in it, and of the foot.
-INTERVALS_WIDTH, INTERVALS_LETTERS, ROW, WORDS, FOOT = 460.0, 13.0, 40.0, 18.0, 28.0
+INTERVALS_WIDTH, INTERVALS_LETTERS, ROW, WORDS, INTERVALS_FOOT = 460.0, 13.0, 40.0, 18.0, 28.0
 START, END = 12.0, 440.0
 # Share of the range that stays free beyond its ends.
 FREE_BEYOND = 0.06
@@ -86,7 +86,7 @@ def draw_interval_rows(rows: Mapping[str, DrawnInterval], logarithmic: bool, tit
             parts.append(svg_element("path", d=diamond, fill=COLOUR["paper"], stroke=COLOUR[colour], stroke_width=2))
         else:
             parts.append(svg_element("circle", cx=centre, cy=level, r=6.0, fill=COLOUR[colour]))
-    return svg_document(INTERVALS_WIDTH, foot + FOOT, parts, title, INTERVALS_LETTERS)
+    return svg_document(INTERVALS_WIDTH, foot + INTERVALS_FOOT, parts, title, INTERVALS_LETTERS)
 
 
 # Standard deviations on both sides that hold some 95 %, for values of others that are stated with one.

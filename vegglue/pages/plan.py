@@ -19,10 +19,10 @@ from vegglue.results.plan_files import FieldFiles, FieldPlace, field_places
 from vegglue.wording.sentences import page_document, phrase
 
 # The map [px]: its width, letters, and room beside it; its height over its width is between these.
-MAP_WIDTH, MAP_LETTERS, BESIDE, FOOT, HEAD = 960.0, 13.0, 44.0, 34.0, 22.0
-FLATTEST, STEEPEST = 0.22, 0.5
+MAP_WIDTH, PLAN_LETTERS, BESIDE, MAP_FOOT, MAP_HEAD = 960.0, 13.0, 44.0, 34.0, 22.0
+FLATTEST, STEEPEST_LABEL = 0.22, 0.5
 # Chances are drawn for so many cells along and across at most, in steps of a third.
-CELLS_ALONG, CELLS_ACROSS, SHADES = 80, 24, 3
+MAP_CELLS_ALONG, MAP_CELLS_ACROSS, BED_SHADES = 80, 24, 3
 # Hours of a day in the field, after which the next one begins [h].
 DAY = 8.0
 
@@ -140,8 +140,9 @@ def draw_plan_map(
     if wet.size:
         south, north = max(south, float(wet[0]) - site.grid.dy), min(north, float(wet[-1]) + site.grid.dy)
     inner = MAP_WIDTH - BESIDE - 8.0
-    height = float(np.clip((north - south) / (east - west), FLATTEST, STEEPEST)) * inner
-    along, across = linear_scale(west, east, BESIDE, MAP_WIDTH - 8.0), linear_scale(south, north, HEAD + height, HEAD)
+    height = float(np.clip((north - south) / (east - west), FLATTEST, STEEPEST_LABEL)) * inner
+    along = linear_scale(west, east, BESIDE, MAP_WIDTH - 8.0)
+    across = linear_scale(south, north, MAP_HEAD + height, MAP_HEAD)
 
     def path(x: Iterable[float], y: Iterable[float]) -> str:
         points = [f"{float(along(a)):.1f},{float(across(b)):.1f}" for a, b in zip(x, y, strict=True)]
@@ -175,24 +176,24 @@ def draw_plan_map(
         elif place.work is Work.DISCHARGE:
             parts.append(svg_element("path", d=f"M{at - 5:.1f},{ends[0] - 5:.1f}h10v10h-10z", fill=COLOUR["model"]))
         if place.work in (Work.TRANSECT, Work.SURVEY_LINE):
-            parts.append(svg_words(at, HEAD - 6.0, place.name, text_anchor="middle", font_weight="bold"))
+            parts.append(svg_words(at, MAP_HEAD - 6.0, place.name, text_anchor="middle", font_weight="bold"))
         else:
             parts.append(svg_words(at + 7.0, ends[0] - 6.0, place.name, text_anchor="start"))
-    foot = HEAD + height
+    foot = MAP_HEAD + height
     for tick, words in zip(ticks := round_ticks(west, east, 9), tick_labels(ticks), strict=True):
         parts.append(svg_element("path", d=f"M{float(along(tick)):.1f},{foot:.1f}v5", stroke=COLOUR["muted"]))
         parts.append(svg_words(float(along(tick)), foot + 18.0, words, "muted", text_anchor="middle"))
     for tick, words in zip(ticks := round_ticks(south, north, 5), tick_labels(ticks), strict=True):
         parts.append(svg_words(BESIDE - 8.0, float(across(tick)) + 4.0, words, "muted", text_anchor="end"))
     parts.append(svg_words(MAP_WIDTH - 8.0, foot + 32.0, phrase("label", "along"), "muted", text_anchor="end"))
-    parts.append(svg_words(0.0, HEAD - 6.0, phrase("label", "y_in_metres"), "muted"))
-    return svg_document(MAP_WIDTH, foot + FOOT + 4.0, parts, title, MAP_LETTERS)
+    parts.append(svg_words(0.0, MAP_HEAD - 6.0, phrase("label", "y_in_metres"), "muted"))
+    return svg_document(MAP_WIDTH, foot + MAP_FOOT + 4.0, parts, title, PLAN_LETTERS)
 
 
 def _shading(chances: PlaceChances, along: Scale, across: Scale) -> list[str]:
-    """Rectangles where an object is likely to be detected, in SHADES steps; bins of equal size."""
+    """Rectangles where an object is likely to be detected, in BED_SHADES steps; bins of equal size."""
     x, y, chance = (np.array(part) for part in (chances.x, chances.y, chances.chance))
-    counts = min(np.unique(x).size, CELLS_ALONG), min(np.unique(y).size, CELLS_ACROSS)
+    counts = min(np.unique(x).size, MAP_CELLS_ALONG), min(np.unique(y).size, MAP_CELLS_ACROSS)
     edges = [
         np.linspace(part.min() - half, part.max() + half, count + 1)
         for part, half, count in ((x, 0.5 * chances.length, counts[0]), (y, 0.5 * chances.width, counts[1]))
@@ -201,10 +202,10 @@ def _shading(chances: PlaceChances, along: Scale, across: Scale) -> list[str]:
     number, _, _ = np.histogram2d(x, y, bins=edges)
     mean = sums / np.maximum(number, 1)
     found = []
-    for i, j in zip(*np.nonzero(mean >= 1.0 / SHADES), strict=True):
+    for i, j in zip(*np.nonzero(mean >= 1.0 / BED_SHADES), strict=True):
         left, right = (float(along(edges[0][k])) for k in (i, i + 1))
         below, above = (float(across(edges[1][k])) for k in (j, j + 1))
-        shade = min(int(mean[i, j] * SHADES), SHADES - 1)
+        shade = min(int(mean[i, j] * BED_SHADES), BED_SHADES - 1)
         found.append(
             svg_element("path", d=f"M{left:.1f},{above:.1f}H{right:.1f}V{below:.1f}H{left:.1f}z",
                         fill=COLOUR["narrow"], fill_opacity=0.28 * shade + 0.1)

@@ -27,7 +27,7 @@ KIND_OF_WORK = {
 }  # fmt: skip
 # Folder of the sheet in that of the plan, and key of its site file that names the case.
 SHEET, OF_CASE = "sheet", "case"
-IN_DEGREES = "EPSG:4326"
+WGS84 = "EPSG:4326"
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def field_stations(case: Case, plan: FieldPlan) -> tuple[tuple[FieldStation, ...
         try:
             import pyproj  # of the extra `field`: late, as it is not always there
 
-            way = pyproj.Transformer.from_crs(case.frame.crs, IN_DEGREES, always_xy=True)
+            way = pyproj.Transformer.from_crs(case.frame.crs, WGS84, always_xy=True)
             longitude, latitude = way.transform(east, north)
         except ImportError:
             without = "pyproj"

@@ -2,7 +2,7 @@
 or the case and its ensembles as PEST++ and SPOTPY read them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -85,6 +85,9 @@ def export(
     forms : sequence of str
         `csv` writes stations.csv and flow-<experiment>.csv; `geotiff` one file for each quantity and experiment, none
         on a grid along a centreline; `netcdf` flow.nc, a UGRID mesh.
+    to : {"pest", "spotpy"}, optional
+        Write the case for this calibration program instead, into export/pest or export/spotpy: a control file with its
+        prior and posterior as ensembles, or a database of the members that were solved.
     watch : callable
         Gets a `Progress` at each step.
 
@@ -183,33 +186,25 @@ def export_to_spotpy(run: CaseRun) -> Exported:
             f"{shown_path(case.source)}: expected an ensemble or a posterior of this case, found none; run "
             f"{shown_command('simulate', case.source)} or {shown_command('infer', case.source)} first."
         )
-    table, names = (
-        without_stations(run.observations.table, excluded_in(run)),
-        pest_names(case.parameters, LONGEST_IN_FILES),
-    )
-    valued = table["value"].notna().to_numpy()
-    table, into = table[valued], folder_within(run.folder, "export/spotpy")
-    files, words = [into / "evaluation.csv"], list[str]()
-    write_evaluation(files[0], table)
+    members: dict[str, tuple[Mapping[str, Array], Array, Array]] = {}
     if ensemble is not None:
         solved = solved_rows(ensemble)
-        theta, prediction = {name: ensemble.parameters[name][solved] for name in names}, ensemble.prediction[solved]
-        files.append(into / "ensemble.csv")
-        like = log_likelihood(table, prediction[:, valued])
-        write_spotpy(files[-1], names, theta, prediction[:, valued], like, np.ones(len(solved)))
-        words.append("the prior")
+        theta = {name: values[solved] for name, values in ensemble.parameters.items()}
+        members["ensemble"] = theta, ensemble.prediction[solved], np.ones(len(solved))
     if posterior is not None:
         chains, draws = posterior.predicted.draws.shape
         drawn = posterior.predicted.draws.ravel()
-        theta, prediction = (
-            {name: posterior.sample.theta[name][drawn] for name in names},
-            posterior.sample.prediction[drawn],
-        )
-        files.append(into / "posterior.csv")
-        like = log_likelihood(table, prediction[:, valued])
-        write_spotpy(files[-1], names, theta, prediction[:, valued], like, np.repeat(np.arange(1, chains + 1), draws))
-        words.append("the posterior")
-    return Exported(tuple(files), " and ".join(words))
+        theta = {name: values[drawn] for name, values in posterior.sample.theta.items()}
+        members["posterior"] = theta, posterior.sample.prediction[drawn], np.repeat(np.arange(1, chains + 1), draws)
+    table = without_stations(run.observations.table, excluded_in(run))
+    valued = table["value"].notna().to_numpy()
+    names, into = pest_names(case.parameters, LONGEST_IN_FILES), folder_within(run.folder, "export/spotpy")
+    files = [into / "evaluation.csv", *(into / f"{name}.csv" for name in members)]
+    write_evaluation(files[0], table[valued])
+    for path, (theta, prediction, chain) in zip(files[1:], members.values(), strict=True):
+        like = log_likelihood(table[valued], prediction[:, valued])
+        write_spotpy(path, names, theta, prediction[:, valued], like, chain)
+    return Exported(tuple(files), " and ".join(f"the {name}" for name in members))
 
 
 def flow_to_export(run: CaseRun) -> tuple[dict[str, FlowFields], Array | None, str]:
