@@ -1,5 +1,6 @@
 """The bed between surveyed lines: kriging against dense formulas, against fields that are drawn, and as a file."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from vegglue.case.survey_error import (
     lines_left_out,
     mean_level,
     read_bed_survey,
+    with_wrong_line_loose,
 )
 from vegglue.errors import InputError
 
@@ -216,3 +218,15 @@ def test_a_line_that_was_levelled_wrongly_is_that_line() -> None:
     assert error[3] == pytest.approx(np.sqrt(whole[-1, -1]), rel=1e-3)
     assert int(np.abs(off / error).argmax()) == 3
     assert np.abs(off / error)[3] > 3.0
+    loose = with_wrong_line_loose(BedSurvey(wrong, survey.line), [SMOOTH])
+    assert loose.loose == (3,)
+    assert with_wrong_line_loose(survey, [SMOOTH]) == survey
+    # Its shape counts, its level does not: the mean on the line is that of the survey without the error.
+    there = wrong[rows]
+    assert mean_level(loose, [SMOOTH], there) == pytest.approx(
+        mean_level(replace(survey, loose=(3,)), [SMOOTH], there), abs=2e-3
+    )
+    before, after = (
+        np.mean(mean_level(one, [SMOOTH], there) - survey.points[rows, 2]) for one in (replace(loose, loose=()), loose)
+    )
+    assert abs(after) < 0.5 * abs(before)

@@ -51,7 +51,7 @@ def bed_error_columns(case: Case, grid: Grid, experiment: str = "") -> Array:
 
 def _columns_of_survey(survey: SurveyOfBed, grid: Grid, level: Array, there: Mask) -> Array:
     """Those of the layer that gives the levels (nx ny,) [m] of some cells, zero in others."""
-    read = read_bed_survey(survey.file)
+    read = read_bed_survey(survey.file, survey.loose)
     digest = hashlib.sha256(survey.model_dump_json(exclude={"file"}).encode())
     for values in (read.points, read.line, grid.x, grid.y, level, there):
         digest.update(values.tobytes())

@@ -219,6 +219,9 @@ class SurveyOfBed(Part):
         description="of the bed around its mean cross-section, see case/survey_error.py"
     )
     left_out: LinesLeftOut | None = Field(default=None, description="how well lines are predicted that are left out")
+    loose: tuple[Annotated[int, Field(strict=True, ge=0)], ...] = Field(
+        default=(), description="numbers of lines whose level counts as unknown, only their shape as surveyed"
+    )
 
 
 class BedLayer(Part):

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.special import ndtri
 
 from vegglue.case.bed_error import beds_of
 from vegglue.case.case_effects import effect_of
@@ -26,9 +25,6 @@ from vegglue.results.fields import FieldsTooLarge, excess
 # Share of the wet cells from which it matters that they are steep [-]: with banks twice as rough as the floor, a tenth
 # of the width changes its friction by a tenth, which is twice what imported cases allow the model for.
 MANY_STEEP = 0.1
-# Share of surveys in which errors alone make a line look levelled wrongly. Taken for all lines together after river-h,
-# whose wrong line is off by 2.97 standard errors.
-SUSPECT_LINE = 0.05
 # Share of the area of a patch [-] by which its cells may miss it, chosen, not measured: the drag of a patch goes with
 # its area, and a tenth of it is less than the stems counted in a few frames show.
 LARGEST_MISS = 0.1
@@ -340,8 +336,7 @@ def remarks_on_survey(case: Case) -> Iterator[SurveyLeftOut]:
     """What the surveys of the bed say about their own error."""
     for layer in beds_of(case):
         if layer.survey is not None and (found := layer.survey.left_out) is not None:
-            least = float(ndtri(1.0 - 0.5 * SUSPECT_LINE / found.count))
-            suspect = abs(found.offset) > least * found.offset_error
+            suspect = bool(layer.survey.loose)
             off = found.offset_at, found.offset, found.offset_error
             yield SurveyLeftOut(found.count, found.error, found.stated, found.straight, *off, suspect)
 

@@ -51,6 +51,7 @@ from vegglue.results.diagnosis import Diagnosis, FirstScreening, Misfit, Paramet
 from vegglue.results.verdict import (
     BedCorrected,
     EstimatedErrors,
+    LineLevelledWrongly,
     MeasuredStretch,
     NameHangsOnSection,
     Note,
@@ -204,12 +205,12 @@ def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]
     learned = learned_bed(base)
     if learned is None:
         return None, []
+    found: list[BedCorrected] = []
     grid, change, error = learned.grid, learned.correction, learned.error
     kept = FieldMapKept(grid.x, grid.y, change, error)
     clear = np.where(wet_cells(base) & (np.abs(change) > NORMAL95 * error), np.abs(change), 0.0)
     surveys = [read_bed_survey(one.survey.file) for one in base.model.case.bed if one.survey is not None]
     lines = [float(one.points[rows, 0].mean()) for one in surveys for rows in one.lines]
-    found = []
     for low, high in itertools.pairwise([-np.inf, *sorted(lines), np.inf]):
         own = np.where(((grid.x >= low) & (grid.x < high))[:, None], clear, 0.0)
         if own.any():
@@ -218,7 +219,12 @@ def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]
             between = (low, high) if np.isfinite([low, high]).all() else (float("nan"), float("nan"))
             place = float(grid.x[i]), float(grid.y[j])
             found.append(BedCorrected(*place, value, (value - half, value + half), between))
-    return kept, sorted(found, key=lambda one: -abs(one.change))[:BED_CORRECTIONS]
+    wrong = [one.survey.left_out for one in base.model.case.bed if one.survey is not None and one.survey.loose]
+    levelled = [
+        LineLevelledWrongly(one.offset_at, one.offset, (one.offset - half, one.offset + half))
+        for one in wrong if one is not None for half in (NORMAL95 * one.offset_error,)
+    ]  # fmt: skip
+    return kept, [*levelled, *sorted(found, key=lambda one: -abs(one.change))[:BED_CORRECTIONS]]
 
 
 def _verdict(

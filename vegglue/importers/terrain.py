@@ -17,7 +17,14 @@ from vegglue.case.grid import Grid, centres
 from vegglue.case.resolved_config import Tree
 from vegglue.case.site_schema import CovarianceOfBed, Frame, LinesLeftOut
 from vegglue.case.size_limits import MOST_CELLS
-from vegglue.case.survey_error import BedSurvey, bed_survey_text, fitted_covariances, lines_left_out, mean_level
+from vegglue.case.survey_error import (
+    BedSurvey,
+    bed_survey_text,
+    fitted_covariances,
+    lines_left_out,
+    mean_level,
+    with_wrong_line_loose,
+)
 from vegglue.case.text_files import case_name
 from vegglue.case.zones import beyond_slope_break, slope
 from vegglue.errors import InputError, shown_path
@@ -126,6 +133,7 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
             "file": f"{data_folder(target).name}/survey.csv",
             "covariances": [one.model_dump() for one in terrain.survey.covariances],
             "left_out": terrain.survey.left_out.model_dump(),
+            **({"loose": list(terrain.survey.survey.loose)} if terrain.survey.survey.loose else {}),
         }
     taken = f"bed: {terrain.taken}"
     if beyond > 0.0:
@@ -327,10 +335,11 @@ def _between_points(terrain: Terrain, survey: BedSurvey, without: Callable[[NDAr
     try:
         covariances = tuple(fitted_covariances(survey))
         left_out = lines_left_out(survey, covariances, straight)
+        survey = with_wrong_line_loose(survey, covariances)
     except np.linalg.LinAlgError:  # points too much alike for a covariance
         return terrain
     fitted = FittedSurvey(survey, covariances, left_out)
-    if left_out.error > left_out.straight:
+    if left_out.error > left_out.straight and not survey.loose:
         return replace(terrain, survey=fitted)
 
     def level(x: Array, y: Array) -> Array:

@@ -428,6 +428,15 @@ class BedCorrected:
 
 
 @dataclass(frozen=True)
+class LineLevelledWrongly:
+    """A surveyed line at x [m] that lies too high by `offset` with its 95 % interval [m]; its level was not used."""
+
+    x: float
+    offset: float
+    interval95: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class MeasuredStretch:
     """Velocities lie between x = low and high in a model of some length [m]; effects: that act along the channel."""
 
@@ -486,6 +495,7 @@ Note = (
     | InstrumentExcluded
     | EffectsUntestable
     | BedCorrected
+    | LineLevelledWrongly
     | PlacesOnMap
     | MeasuredStretch
     | TooShallow
