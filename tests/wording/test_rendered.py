@@ -28,6 +28,7 @@ from diagnoses import (
 from model_scores import a_model_score
 from posteriors import a_posterior, a_refinement, changed
 
+from vegglue.case.safe_yaml import YamlProblem
 from vegglue.cli.printed import (
     TERMINAL_WIDTH,
     posterior_lines,
@@ -38,6 +39,7 @@ from vegglue.cli.printed import (
     verdict_lines,
 )
 from vegglue.diagnosis.comparison import MEASUREMENT
+from vegglue.diagnosis.stepwise_choice import HeldOutErrorsDidNotFall, UnclearFall
 from vegglue.effects.library import SHIPPED
 from vegglue.inference.statements import (
     CalibrationDiffers,
@@ -80,6 +82,7 @@ from vegglue.pages.headline import WorstZone
 from vegglue.pages.parameters import PosteriorVerdict, ResidualCompared
 from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival
 from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.fields import FieldsTooLarge
 from vegglue.results.open_questions import HiddenEffect, OneOfRivals, ProposedMeasurement, Question, RivalEffects
 from vegglue.results.plan import (
     Confusion,
@@ -131,6 +134,7 @@ from vegglue.results.verdict import (
 )
 from vegglue.wording.sentences import layout, page_sentence, sentence
 from vegglue.workflow.compare import Comparison
+from vegglue.workflow.extend import ExtensionReason
 
 HERE = Path(__file__).parent
 COMMAND = "vegglue diagnose brook.yaml --details"
@@ -275,6 +279,28 @@ FINDINGS = (
 )  # fmt: skip
 
 
+YAML = (
+    *(YamlProblem(kind) for kind in (
+        "tab", "second-colon", "no-colon", "further-text", "list-in-line", "closed-early", "second-document",
+        "special-sign",
+    )),
+    YamlProblem("sign", "@"), YamlProblem("closes-nothing", "}"), YamlProblem("indentation", "<block mapping start>"),
+    YamlProblem("no-value", "-"), YamlProblem("escape", "d"), YamlProblem("reference", "x"),
+    YamlProblem("no-letter", "'\\x07'"), YamlProblem("open-bracket", "<stream end>", "{", "}", 3),
+    YamlProblem("open-quote", begun=2), YamlProblem("other", "is not valid YAML"),
+)  # fmt: skip
+EXTENSIONS = (
+    *(ExtensionReason((), kind) for kind in (
+        "law", "nothing-missing", "instrument", "none-of-these", "cannot-tell", "one-of",
+    )),
+    ExtensionReason(
+        ("wind", "unlisted_bed[x4,y1]"), "", (("unlisted_bed[x4,y1]", 4.62, 0.45),),
+        {"wind": UnclearFall((("sections", 2e-5, 4e-4),))}, {"waves": HeldOutErrorsDidNotFall()},
+    ),
+)  # fmt: skip
+BUDGET = (FieldsTooLarge(123.456, 5000, 100.0, 30.0, 12.5),)
+
+
 def three_days(value: float) -> ProposedMeasurement:
     return ProposedMeasurement("section 0", "June", 1.0, 3, 1.5, 2.0, value)
 
@@ -343,6 +369,7 @@ def page() -> str:
 
 
 RENDERED: dict[str, Callable[[], str]] = {
+    "files": lambda: wrapped((*YAML, *EXTENSIONS, *BUDGET)),
     "verdicts": lambda: "\n\n".join(
         "\n".join([f"## {name}", *verdict_lines(found, COMMAND, 13), "", wrapped([found.verdict])])
         for name, found in VERDICTS.items()
