@@ -114,6 +114,17 @@ def test_map_programs_find_texts_vectors_and_the_system(done: Done) -> None:
     assert "\nparameters:" in mesh.attrs["config"]
 
 
+def test_the_mesh_states_its_system_as_cf_has_it(done: Done) -> None:
+    """A reader of CF makes the system of the case of it: the oblique Mercator of Switzerland."""
+    pyproj, xarray = pytest.importorskip("pyproj"), pytest.importorskip("xarray")
+    attributes = xarray.load_dataset(done[2] / "flow.nc", engine="h5netcdf")["map"].attrs
+    assert attributes["grid_mapping_name"] == "oblique_mercator"
+    assert pyproj.CRS.from_cf(attributes).to_epsg() == 2056
+    assert pyproj.CRS.from_wkt(attributes["crs_wkt"]).to_epsg() == 2056
+    east, north = pyproj.Transformer.from_crs(attributes["crs_wkt"], 4326).transform(2683120.0, 1247480.0)
+    assert (east, north) == pytest.approx((47.37, 8.54), abs=0.02)
+
+
 def test_without_a_map_the_velocity_along_the_grid_is_the_vector(done: Done, tmp_path: Path) -> None:
     xarray, grid = pytest.importorskip("xarray"), build_grid(done[0])
     flow = FlowFields(grid.x, grid.y, *(np.full((grid.x.size, grid.y.size), one) for one in (0.0, 1.0, 1.0, 0.4, 0.1)))

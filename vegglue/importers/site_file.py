@@ -34,6 +34,8 @@ def _with_unit(quantity: str) -> Callable[[Any], Any]:
     """A text such as `42 l/s` as a number in SI; what is no text is left to the checks of numbers."""
 
     def converted(value: Any) -> Any:
+        if isinstance(value, list | dict) and quantity == "discharge":
+            raise ValueError("one number, of the inflow upstream (add others by `inflows` in the config made of it)")
         if not isinstance(value, str):
             return value
         try:
