@@ -299,7 +299,7 @@ with h5py.File("runs/brook/ensemble.h5.part") as file:
     solved = members["status"][:] >= 0
     print(solved.sum(), "of", solved.size, "members", members["prediction"][:][solved].mean(axis=0))
 ```
-"""
+"""  # noqa: E501  (rows of tables)
 
 
 def main() -> None:
