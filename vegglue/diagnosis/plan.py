@@ -119,8 +119,8 @@ SIMILAR_SHOWN = 3
 USUAL_ALARM = 0.6
 # Draws of errors alone for the alarm [-]: 50 lie beyond the 95 % point.
 ALARM_DRAWS = 1000
-# Proposals that are shown, those that are looked at again in an exchange, and rounds of exchange at most.
-ADDITIONS_SHOWN, ADDITIONS_WEIGHED, ADDING_ROUNDS = 6, 12, 2
+# Proposals of one kind that are shown, and of all; those that are looked at again in a search, and rounds of exchange.
+OF_A_KIND, ADDITIONS_SHOWN, ADDITIONS_WEIGHED, ADDING_ROUNDS = 2, 8, 12, 2
 # Rise of the answer to a question below which a piece adds nothing [-].
 LEAST_PLAN_GAIN = 1e-3
 
@@ -897,13 +897,17 @@ class PlanSearch:
         return found
 
     def ranked(self) -> tuple[ProposedPieces, ...]:
-        """Every single addition to the plan by what it adds in an hour, those that add something."""
+        """Single additions to the plan by what they add in an hour: the best few of each kind of work, of repeats, and
+        of flows that the case does not have, as far as they add something.
+        """
         found = []
         for move in self.moves(()):
             after = self.answer(self.with_pieces(self.base, move))
             if after.mean - self.start.mean > LEAST_PLAN_GAIN:
                 found.append(self._proposed(move, after))
-        return tuple(sorted(found, key=lambda one: -one.per_hour))
+        found.sort(key=lambda one: -one.per_hour)
+        kinds = [(one.pieces[0].work, one.pieces[0].again, one.pieces[0].new, len(one.pieces) > 1) for one in found]
+        return tuple(one for j, one in enumerate(found) if kinds[:j].count(kinds[j]) < OF_A_KIND)
 
     def _proposed(self, move: Sequence[int], after: PlanAnswer) -> ProposedPieces:
         pieces = tuple(self.wide.pieces[j] for j in move)
