@@ -127,6 +127,7 @@ from vegglue.results.verdict import (
     NeighboursCorrelated,
     NoneLeads,
     ParameterFarFromPrior,
+    ResultCompared,
     StatedErrorsTooSmall,
     TooManyGroups,
     TooShallow,
@@ -230,6 +231,8 @@ NOTES = (
     EffectsUntestable((("k_s", ("wind", "waves")), ("", ("weir",))), 3, 3, False),
     MeasuredStretch(10.0, 30.0, 200.0, ("bed_trend", "wind")), TooShallow(0.02),
     MisfitRemains(ChiSquare(260.0, 150, 1e-8)), CommandCompared(2, 3, 0.4, "", ("k_s",), True, False),
+    ResultCompared("HEC-RAS", 0.065, 0.001, 0.02, 0.029, 0.0007, 0.0, 0.003, 0.023, True, (0.15, 0.05, 0.15)),
+    ResultCompared("", 0.21, 0.03, 0.3, 0.1, 0.02, 0.2, 0.3, np.nan, False, (0.15, 0.05, 0.15)),
 )  # fmt: skip
 STATEMENTS = (
     ModeFound(1, ((N_B, 0.031), (PHI, 8.1)), 61.5, 0.7), ErrorsEstimated(((VELOCITY, 0.02),), (kind_of("level"),)),
