@@ -469,3 +469,38 @@ def test_exponents_of_fortran_are_levels_of_a_bed(tmp_path: Path) -> None:
     points.write_text("x,y,z\n0,0,1.0D-01\n1,0,2D-1\n0,1,0.3\n", encoding="utf-8")
     assert read_raster(grid).values.tolist() == [[0.3, 0.1], [0.4, 0.2]]
     assert read_points(points)[:, 2].tolist() == [0.1, 0.2, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("size", "nothing", "level"),
+    [("cellsize 2", "null", "null"), ("cellsize 2", "nan", "nan"), ("dx 2\ndy 2", "-9999", "-9999"),
+     ("cellsize 2,0", "-9999,0", "-9999,0"), ("dx 2\ndy 2", "-3.4e38", "-3.4e38")],
+)  # fmt: skip
+def test_grids_as_other_programs_write_them(tmp_path: Path, size: str, nothing: str, level: str) -> None:
+    (tmp_path / "bed.asc").write_text(
+        f"ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\n{size}\nNODATA_value {nothing}\n{level} 1,5\n1.0 2.0\n", "utf-8"
+    )
+    raster = read_raster(tmp_path / "bed.asc")
+    assert raster.size == 2.0
+    np.testing.assert_array_equal(raster.values, [[1.0, np.nan], [2.0, 1.5]])
+
+
+def test_a_grid_of_oblong_cells_is_refused(tmp_path: Path) -> None:
+    text = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ndx 2\ndy 3\n1 1\n1 1\n"
+    (tmp_path / "bed.asc").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"bed\.asc"):
+        read_raster(tmp_path / "bed.asc")
+
+
+def test_a_transect_with_decimal_commas_is_read(tmp_path: Path) -> None:
+    text = winriver(*BOAT, 2.0, (0.64, -0.48), 0.05)
+    found = []
+    for name, content in (("a_ASC.TXT", text), ("b_ASC.TXT", text.replace(".", ","))):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+        found.append(reader_of(tmp_path / name)(tmp_path / name, START).numbers)
+    assert found[0]["u_se"].tolist() == found[1]["u_se"].tolist()
+
+
+def test_a_raw_record_that_begins_with_something_else_has_its_reader(tmp_path: Path) -> None:
+    (tmp_path / "t.000").write_bytes(b"\x7f\x79" + pd0(*BOAT, 2.0, (0.64, -0.48), 0.0))
+    assert reader_of(tmp_path / "t.000") is read_pd0

@@ -205,7 +205,8 @@ def is_winriver(text: str) -> bool:
 
 def read_winriver(path: Path, options: FileOptions) -> MeasuredRows:
     """Stations of a transect. InputError."""
-    lines = [line for line in readable_text(path).splitlines() if line.strip()]
+    text = readable_text(path).replace(",", ".")  # decimal commas: spaces part the fields
+    lines = [line for line in text.splitlines() if line.strip()]
     profiles, at = [], 3
     while at + 6 <= len(lines):
         try:
