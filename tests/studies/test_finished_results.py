@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 from blind_truth import perfect_site, true_values
-from result_files import GridFlow, write_flow_fm, write_hec_ras, write_selafin
+from result_files import GridFlow, write_hec_ras, write_selafin
 from second_channel import SHORT
 from site_reach import EDDY_VISCOSITY, bed_level, centres, steady_flow
 from test_second_engine import CELLS, HIDDEN, small_twin
@@ -28,7 +28,6 @@ STATED = {"n_b": 0.03, "k_s": 0.5, "phi": 2.0, "canopy_height": 0.7, "eddy_visco
 WRITERS = {
     "HEC-RAS": (write_hec_ras, "p01.hdf", {}),
     "TELEMAC": (write_selafin, "slf", {"law": "manning"}),
-    "D-Flow FM": (write_flow_fm, "map.nc", {}),
 }
 ORIGIN, ANGLE = (683000.0, 247000.0), 30.0
 

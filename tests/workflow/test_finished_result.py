@@ -150,3 +150,15 @@ def test_a_damaged_result_is_refused_or_read(tmp_path: Path) -> None:
         path.write_bytes(bytes(bad[: int(random.integers(len(bad) // 2, len(bad)))]))
         with suppress(InputError):  # and nothing else
             read_result(path)
+
+
+def test_theirs_is_set_beside_ours_and_has_a_posterior(tmp_path: Path) -> None:
+    """One config is enough: its parameters are calibrated with predictions of either."""
+    case = imported(folder_with(tmp_path / "reach", uniform()))
+    run = CaseRun(case, tmp_path / "runs", jobs=1)
+    ours, theirs = vegglue.compare([run]).model_scores
+    assert (ours.name, theirs.name) == ("reach-built-in", "reach")
+    assert theirs.in_sample.velocity < 0.002
+    posterior = vegglue.infer(run)
+    low, high = (np.quantile(posterior.sample.theta["n_b"], q) for q in (0.0, 1.0))
+    assert low < N < high
