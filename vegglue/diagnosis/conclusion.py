@@ -218,7 +218,7 @@ def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]
             between = (low, high) if np.isfinite([low, high]).all() else (float("nan"), float("nan"))
             place = float(grid.x[i]), float(grid.y[j])
             found.append(BedCorrected(*place, value, (value - half, value + half), between))
-    return kept, sorted(found, key=lambda one: -abs(one.change))[:BED_CORRECTIONS]
+    return kept, list(sorted(found, key=lambda one: -abs(one.change))[:BED_CORRECTIONS])
 
 
 def _verdict(

@@ -439,8 +439,8 @@ def _plan_model(
 ) -> PlanModel | None:
     stations = station_table(at_hand, stations_of(wide, planned, base, at_hand)[0])
     # A transect with every second vertical is made of stations of the whole one.
-    whole = {(one.work, one.experiment, one.x): one for one in reversed(possible) if one.work is Work.TRANSECT}
-    own = [one for one in possible if whole.get((one.work, one.experiment, one.x), one) is one]
+    whole = {(one.experiment, one.x): one for one in reversed(possible) if one.work is Work.TRANSECT}
+    own = [one for one in possible if one.work is not Work.TRANSECT or whole[one.experiment, one.x] is one]
     further, counts = stations_of(wide, planned, own, at_hand)
     here = replace(wide, station=station_table(stations, further.assign(used=False)))
     # Bed levels stand behind all stations, those of the plan first.
@@ -456,7 +456,7 @@ def _plan_model(
         elif id(piece) in first:
             rows.append(first[id(piece)] + np.arange(max(len(piece.y), 1)))
         else:
-            dense = whole[piece.work, piece.experiment, piece.x]
+            dense = whole[piece.experiment, piece.x]
             rows.append(first[id(dense)] + np.array([dense.y.index(y) for y in piece.y]))
     on_coarse = coarser(here)
     search = on_coarse if on_coarse is not None and cells_across(on_coarse.site) >= FEWEST_CELLS_ACROSS else here

@@ -171,7 +171,7 @@ def _refuse_larger_matlab(path: Path) -> None:
 
 def unpack_matlab(path: str) -> None:
     """Write the arrays of a MATLAB file into an .npz beside it, with a tree of its structures and cells."""
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, Any] = {}
 
     def kept(value: Any) -> Any:
         if isinstance(value, mat_struct):
