@@ -262,6 +262,30 @@ kept.
 - Configs that `import`, `extend` and `twin` write end with checksums of what was written: files that you edited are
   replaced with `--force` only.
 
+## What other people's files hold
+
+Each row is either read rightly, with a remark of `import` that counts what was left out, or refused with code 2 and
+nothing written. Tests are in `tests/importers/` if no folder is given.
+
+| kind | what is done | test |
+|---|---|---|
+| any field marked as missing, in every format | as without its row or cell, a remark, or a refusal | `test_any_field_missing.py` |
+| lost bottom track, ranges or ensembles of a boat | the ensemble has no place and is left out; a leap of the boat is refused | `test_marks_of_no_value.py` |
+| raw ensembles with a wrong check sum or size, or cut short; cells of two sizes; a lost beam of four | the ensemble alone is left out; each cell keeps its place; three beams do if the file allows it | `test_any_field_missing.py` |
+| velocities against the boat (reference NONE) | refused | `test_marks_of_no_value.py` |
+| edges of gaugings; verticals without method, samples or time | left out | `test_marks_of_no_value.py` |
+| a velocity of 0 between moving neighbours | refused until `missing` decides | `test_marks_of_no_value.py` |
+| -999, zeros or constants as predictions of a command | failed members; refused if none is left, or if no parameter has an effect | `tests/inference/test_command_doubts.py` |
+| another system, datum or unit of a map; scale and offset of a raster | refused; applied | `test_maps.py` |
+| undeclared fill values in a raster | no level there | `test_maps.py`, `test_any_field_missing.py` |
+| rows of means and totals, flagged or hidden rows, a second copy | left out; a copy is refused | `test_marks_of_no_value.py` |
+| words of gauging offices (Ice, Eqp), a row of types, -999999, 3.7D-01 | no value; read | `test_marks_of_no_value.py` |
+| marks in flows of the site file, stems and corners | refused | `test_any_field_missing.py` |
+| damaged MATLAB files and files that unpack to much | read by a process of its own; refused | `test_files_of_strangers.py` |
+| a mesh for map programs | vectors, system and numbers as GDAL, xugrid and QGIS read them | `tests/workflow/test_export.py` |
+| results beside ArviZ 0.x and 1.x | both open them | `tests/workflow/` |
+| no worker of a cluster lives for 30 s | code 3; finished chunks are kept | `tests/test_cluster.py` |
+
 ## Following a run
 
 The growing file may be read at any time, also with HDF5's locks on. `progress/finished` lists the finished chunks;
@@ -275,7 +299,7 @@ with h5py.File("runs/brook/ensemble.h5.part") as file:
     solved = members["status"][:] >= 0
     print(solved.sum(), "of", solved.size, "members", members["prediction"][:][solved].mean(axis=0))
 ```
-"""
+"""  # noqa: E501  (rows of tables)
 
 
 def main() -> None:

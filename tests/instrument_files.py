@@ -109,11 +109,14 @@ def pd0(
     noise: float,
     lost: tuple[int, ...] = (),
     unranged: tuple[int, ...] = (),
+    cell: int = 10,
+    first: int = 35,
 ) -> bytes:
     """A raw transect as a Rio Grande writes it: the boat of `winriver`, one ensemble a second, 0.2 m deep in the water.
 
-    lost, unranged: ensembles, from 0, whose bottom track and whose ranges to the bottom are marked as lost. Each has
-    header, fixed and variable leader, velocities against the boat, three blocks of quality, bottom track, check sum.
+    cell, first: size of the cells, and range of the first one [cm]; lost, unranged: ensembles, from 0, whose bottom
+    track and whose ranges to the bottom are marked as lost. Each has header, fixed and variable leader, velocities
+    against the boat, three blocks of quality, bottom track, check sum.
     """
     random, cells, draft = np.random.default_rng(3), np.arange(30), 0.2
     boats = np.gradient(np.column_stack([east, north]), axis=0)
@@ -121,21 +124,21 @@ def pd0(
     for number, boat in enumerate(boats):
         own = noise * random.standard_normal((cells.size, 2))
         marks = number in lost, number in unranged
-        ensembles.append(_pd0_ensemble(number + 1, boat, depth, draft, cells, velocity, own, marks))
+        ensembles.append(_pd0_ensemble(number + 1, boat, depth, draft, cells, velocity, own, marks, cell, first))
     return b"".join(ensembles)
 
 
-def _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise, marks) -> bytes:
+def _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise, marks, cell, first) -> bytes:
     minute, second = divmod(number, 60)
     clock = (20, 6, 3, 10, minute, second, 0)
-    # Rio Grande 10.16; beams of 20 degrees; cells of 10 cm from 35 cm on; the frame of the earth, tilts used.
+    # Rio Grande 10.16; beams of 20 degrees; the frame of the earth, tilts used.
     fixed = struct.pack("<H8B3H4BH4Bhh2BHH4BH",
-                        0, 10, 16, 0x41, 0x41, 0, 13, 4, cells.size, 1, 10, 25, 1, 64, 5, 0, 1500,
-                        0, 1, 0, 0x1F, 0, 0, 0x7D, 0x3D, 35, 15, 1, 5, 50, 0, 5)  # fmt: skip
+                        0, 10, 16, 0x41, 0x41, 0, 13, 4, cells.size, 1, cell, 25, 1, 64, 5, 0, 1500,
+                        0, 1, 0, 0x1F, 0, 0, 0x7D, 0x3D, first, 15, 1, 5, 50, 0, 5)  # fmt: skip
     fixed += struct.pack("<8xHBBIB", 0, 255, 0, 12345, 20)
     leader = struct.pack("<HH7BBHHHHhhhh3B3B8BIHIIB8B", 0x80, number, *clock, 0, 0, 1480, round(10 * draft), 0, 0, 0, 0,
                          1450, 0, 1, 0, 0, 0, 0, *[0] * 8, 0, 0, 0, 0, 0, 20, *clock)  # fmt: skip
-    below = draft + 0.35 + 0.1 * cells
+    below = draft + 0.01 * (first + cell * cells)
     shape = 7.0 / 6.0 * (np.clip(depth - below, 0.0, None) / depth) ** (1.0 / 6.0)
     water = 1000.0 * (shape[:, None] * np.array(velocity) + noise - boat)
     rows = np.column_stack([water, np.zeros((cells.size, 2))]).round().astype("<i2")

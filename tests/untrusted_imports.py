@@ -14,9 +14,11 @@ import shapefile
 import tifffile
 from instrument_files import VECTRINO_HEADING, flowtracker, riversurveyor, vectrino, winriver
 from matlab_files import profiler_mat, qrev_mat, riversurveyor_mat
+from result_files import GridFlow, write_flow_fm, write_hec_ras, write_selafin, write_trim
 from scipy.io import savemat
 
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.finished_results import read_result
 from vegglue.importers.instruments import reader_of
 from vegglue.importers.library_files import load_matlab
 from vegglue.importers.measured_rows import Placement, read_rows
@@ -105,6 +107,9 @@ def _beside(path: Path) -> object:
 
 
 SHAPES = _shapes()
+# Three by two cells of water at 1 m/s.
+ONES = np.ones((3, 2))
+FLUME = GridFlow(np.arange(4.0), np.arange(3.0), 0.0 * ONES, ONES, ONES, 0.0 * ONES, 0.03 * ONES)
 EAST, NORTH = np.linspace(0.0, 8.0, 20), np.zeros(20)
 IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("table.xlsx", _workbook(), lambda path: read_rows(path, OF_TABLES)),
@@ -130,5 +135,10 @@ IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("probe.dat", vectrino((0.3, 0.0, 0.0), 0.02, 40, 2).encode(), _measured),
     ("gauging.ft", _gauging(), _measured),
     ("line.geojson", LINE, read_line),
+    ("plan.hdf", _made(lambda path: write_hec_ras(path, FLUME)), read_result),
+    ("reach.slf", _made(lambda path: write_selafin(path, FLUME)), read_result),
+    ("map.nc", _made(lambda path: write_flow_fm(path, FLUME)), read_result),
+    ("map4.nc", _made(lambda path: write_flow_fm(path, FLUME, classic=False)), read_result),
+    ("trim.nc", _made(lambda path: write_trim(path, FLUME)), read_result),
     ("boat.txt", winriver(EAST, NORTH, 1.0, (0.1, 0.4), 0.01).encode(), _measured),
 )

@@ -46,6 +46,7 @@ def water() -> SimpleNamespace:
     away = random.uniform(-2.0, 2.0, (7, 5, 1))
     there |= {"share_along": np.linspace(-0.5, 0.5, 7)[:, None, None], "offset": away, "edge": away}
     there["relative_stems"] = random.uniform(0.5, 2.0, (7, 5, 1))
+    there["depth_scale"] = 1.0
     there["front"] = np.where(away > 1.6, np.inf, np.abs(away))
     return SimpleNamespace(**values, geometry=SimpleNamespace(**there))
 

@@ -32,6 +32,7 @@ from vegglue.diagnosis.flow_check import (
     remarks_on_discharges,
     remarks_on_outlet_levels,
     remarks_on_steep_flow,
+    remarks_on_turned_probes,
     remarks_on_turned_velocities,
 )
 from vegglue.measurements.observations import read_observations
@@ -266,3 +267,22 @@ def test_a_section_measures_what_has_entered_above_it(tmp_path, enters, main, st
     )
     assert [one.sections[0].stated for one in found] == ([] if stated is None else [(stated, stated)])
     assert all(one.ratios[0] == pytest.approx(1.6, rel=0.02) for one in found)
+
+
+@pytest.mark.parametrize(("turn", "found"), [(5.0, 1), (0.0, 0), (1.5, 0)])
+def test_a_probe_that_is_turned_at_every_section(tmp_path, turn, found):
+    """The same angle beside both neighbours at four sections; noise of 0.3 degrees, and a profile that bends."""
+    random = np.random.default_rng(3)
+    rows = {"u": [], "v": []}
+    for i in range(4):
+        for y in np.linspace(-2.0, 2.0, 9):
+            angle = np.radians(1.5 * y + random.normal(0.0, 0.3) + (turn if y == 0.5 else 0.0))
+            for column, part in (("u", np.cos), ("v", np.sin)):
+                rows[column].append(f"low,s{i},{5 + 8 * i},{y},{0.5 * part(angle):.5f}\n")
+    for column, some in rows.items():
+        (tmp_path / f"{column}.csv").write_text(f"experiment,section,x,y,{column}\n" + "".join(some), encoding="utf-8")
+    files = "{kind: velocity, file: u.csv}\n  - {kind: velocity_across, file: v.csv}"
+    _, _, observations = read_case(tmp_path, SOUND.replace("{kind: velocity, file: velocities.csv}", files))
+    told = [one for one in remarks_on_turned_probes(observations) if abs(one.y - 0.5) < 1e-9]
+    assert len(told) == found
+    assert all(one.side == "left" and one.angle == pytest.approx(turn, abs=0.5) for one in told)

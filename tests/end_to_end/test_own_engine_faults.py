@@ -88,9 +88,7 @@ def test_where_all_fail_it_is_said_why(
     done = shell(tmp_path, "simulate", "brook.yaml", "--trust", succeed=False)
     assert "8 members, run by the command, 8 failed; 8 of them: the command ended with exit code 1" in done.stdout
     assert done.returncode == 2
-    assert (
-        "brook.yaml: expected members with a solution, got none of 8; 8 of them say: the command ended" in done.stderr
-    )
+    assert "brook.yaml: expected members with a solution, got none of 8; 8 of them: the command ended" in done.stderr
     for command in ("infer", "diagnose"):
         code, said = said_to(monkeypatch, capsys, command, "brook.yaml", "--trust", "--quiet")
         assert code == 2

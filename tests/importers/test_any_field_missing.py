@@ -24,7 +24,7 @@ from scipy.io import savemat
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.instruments import reader_of
-from vegglue.importers.measured_rows import Placement, in_the_channel
+from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel
 from vegglue.importers.stations import KnownExperiments, station_tables
 from vegglue.importers.teledyne import read_pd0
 from vegglue.importers.terrain import read_terrain
@@ -366,9 +366,9 @@ def test_a_field_marked_as_missing_is_no_number(tmp_path: Path, name: str, data:
         assert marked[1] != whole[1], f"{column} = {mark!r} without a remark"
 
 
-def _pd0_rows() -> list[bytes]:
+def _pd0_rows(content: bytes | None = None) -> list[bytes]:
     """Ensembles of a raw transect, each for itself."""
-    content, found = pd0(0.0 * ALONG, ALONG, 1.5, (0.6, 0.02), 0.02), []
+    content, found = content or pd0(0.0 * ALONG, ALONG, 1.5, (0.6, 0.02), 0.02), []
     while content:
         size = int.from_bytes(content[2:4], "little") + 2
         found.append(content[:size])
@@ -380,6 +380,70 @@ def _block(ensemble: bytes, name: int) -> int:
     """Where a block of an ensemble begins, by its number."""
     starts = struct.unpack(f"<{ensemble[5]}H", ensemble[6 : 6 + 2 * ensemble[5]])
     return next(one for one in starts if struct.unpack("<H", ensemble[one : one + 2])[0] == name)
+
+
+def _with_sum(ensemble: bytes) -> bytes:
+    """The ensemble with the check sum that belongs to it."""
+    return ensemble[:-2] + struct.pack("<H", sum(ensemble[:-2]) & 0xFFFF)
+
+
+def _raw_stations(path: Path, content: bytes) -> MeasuredRows:
+    pytest.importorskip("mhkit")
+    path.write_bytes(content)
+    return read_pd0(path, FileOptions(start=(10.0, -1.5)))
+
+
+@pytest.mark.parametrize("damage", ["sum", "size", "cut", "before", "between"])
+def test_a_damaged_ensemble_costs_itself_alone(tmp_path: Path, damage: str) -> None:
+    """A wrong check sum made the whole file unreadable, and a wrong size loses what comes after it."""
+    rows = _pd0_rows()
+    bad = {"sum": rows[8][:-1] + bytes([rows[8][-1] ^ 1]), "size": rows[8][:2] + b"\xff\x70" + rows[8][4:],
+           "cut": rows[8][:200]}  # fmt: skip
+    changed = [b"$GPGGA,\x7f\x7f"] * (damage == "before") + rows[:8] + [b"\x7f\x7f\x10"] * (damage == "between")
+    changed += [bad.get(damage, rows[8]), *rows[9:]]
+    found = _raw_stations(tmp_path / "t.000", b"".join(changed))
+    whole = _raw_stations(
+        tmp_path / "t.000", b"".join(rows if damage in ("before", "between") else rows[:8] + rows[9:])
+    )
+    for role, values in whole.numbers.items():
+        assert found.numbers[role] == pytest.approx(values, nan_ok=True), role
+    assert found.notes != whole.notes
+
+
+def test_cells_of_two_sizes_stand_where_they_were_measured(tmp_path: Path) -> None:
+    fine, coarse = (
+        _pd0_rows(pd0(0.0 * ALONG, ALONG, 1.5, (0.6, 0.02), 0.0, cell=cell, first=first))
+        for cell, first in ((10, 35), (25, 50))
+    )
+    found = _raw_stations(tmp_path / "t.PD0", b"".join([*fine[:15], *coarse[15:]]))
+    apart = [_raw_stations(tmp_path / "t.PD0", b"".join(rows)) for rows in (fine, coarse)]
+    for role in ("y", "east_velocity"):
+        wanted = np.concatenate([apart[0].numbers[role][:15], apart[1].numbers[role][15:]])
+        assert found.numbers[role] == pytest.approx(wanted, abs=2e-3), role
+
+
+@pytest.mark.parametrize(("block", "place"), [(0x100, 2), (0x600, 24)])
+def test_a_lost_beam_of_four_is_known_by_the_others(tmp_path: Path, block: int, place: int) -> None:
+    """In coordinates of the beams, if the file allows it: the velocity that has no error."""
+    of_beams = []
+    for ensemble in _pd0_rows():
+        changed = bytearray(ensemble)
+        changed[_block(ensemble, 0) + 25] = 0x07
+        cells = np.frombuffer(ensemble, "<i2", 4 * 30, _block(ensemble, 0x100) + 2).reshape(-1, 4).copy()
+        cells[cells[:, 0] != -32768] = [200, -100, 140, -40]
+        at = _block(ensemble, 0x100) + 2
+        changed[at : at + cells.nbytes] = cells.tobytes()
+        struct.pack_into("<4h", changed, _block(ensemble, 0x600) + 24, -30, 20, -40, 30)
+        of_beams.append(_with_sum(bytes(changed)))
+    lost = []
+    for ensemble in of_beams:
+        changed = bytearray(ensemble)
+        for cell in range(6 if block == 0x100 else 1):
+            struct.pack_into("<h", changed, _block(ensemble, block) + place + 8 * cell + 2, -32768)
+        lost.append(_with_sum(bytes(changed)))
+    whole, less = (_raw_stations(tmp_path / "t.PD0", b"".join(rows)) for rows in (of_beams, lost))
+    for role in ("x", "y", "east_velocity", "north_velocity"):
+        assert less.numbers[role] == pytest.approx(whole.numbers[role], abs=1e-6), role
 
 
 # Fields of an ensemble: the block, the place in it [bytes], and the mark of the format.
@@ -397,21 +461,18 @@ PD0_FIELDS = {
 @given(number=st.integers(0, ALONG.size - 1), name=st.sampled_from(sorted(PD0_FIELDS)))
 def test_a_field_marked_as_missing_in_a_raw_record_is_no_number(tmp_path: Path, number: int, name: str) -> None:
     """The ensemble is left out, or its velocity is that of its other cells, 0.02 m/s apart."""
-    pytest.importorskip("mhkit")
     ensembles = _pd0_rows()
     block, place, mark = PD0_FIELDS[name]
     changed = bytearray(ensembles[number])
     at = _block(ensembles[number], block) + place
     changed[at : at + 2] = mark
-    changed[-2:] = struct.pack("<H", sum(changed[:-2]) & 0xFFFF)
 
     def stations(rows: Sequence[bytes]) -> Stations:
-        (tmp_path / "t.PD0").write_bytes(b"".join(rows))
-        taken = read_pd0(tmp_path / "t.PD0", FileOptions(start=(10.0, -1.5)))
+        taken = _raw_stations(tmp_path / "t.PD0", b"".join(rows))
         roles = ("x", "y", "east_velocity", "north_velocity")
         return list(zip(*(taken.numbers[role].tolist() for role in roles), strict=True))
 
-    marked = stations([*ensembles[:number], bytes(changed), *ensembles[number + 1 :]])
+    marked = stations([*ensembles[:number], _with_sum(bytes(changed)), *ensembles[number + 1 :]])
     known = [*stations(ensembles), *stations([*ensembles[:number], *ensembles[number + 1 :]])]
     assert len(marked) >= ALONG.size - 1
     assert all(any(np.allclose(one, other, atol=0.025) for other in known) for one in marked)

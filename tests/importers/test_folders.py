@@ -18,7 +18,7 @@ from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
-from vegglue.measurements.observations import read_observations
+from vegglue.measurements.observations import AT_WALL, read_observations
 from vegglue.workflow.import_folder import assumptions_of
 
 FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0)
@@ -204,6 +204,27 @@ def test_a_flume_has_walls_and_no_banks(tmp_path: Path, walls: str, median: floa
     assert list(case.parameters) == ["n_b", "eddy_viscosity", "n_w"]
     assert getattr(case.parameters["n_w"], "median", None) == median
     assert case.model_error.bed == 0.001
+
+
+@pytest.mark.parametrize(("scale", "low", "high"), [(0.04, 3e-5, 3e-4), (1.0, 5e-3, 5e-2), (12.0, 0.2, 2.0)])
+def test_an_unstated_viscosity_follows_depth_and_speed(tmp_path: Path, scale: float, low: float, high: float) -> None:
+    """A flume of 4 cm of water, a brook, a river of 10 m: by Froude's law, and 0.15 h u* between walls."""
+    site = (
+        f"channel: {{length_m: {30 * scale}, bottom_width_m: {3 * scale}, bank_slope_v_per_h: 0.5, bed_slope: 0.001}}\n"
+        f"experiments: {{June: {{discharge: {2.0 * scale**2.5:.6g}, level: {0.95 * scale:.4g}}}}}\n"
+    ) + ("walls: true\n" if scale < 1.0 else "")
+    prior = import_of(tmp_path, site, a__csv=f"x,y,u\n{4 * scale},0,{0.4 * scale**0.5}\n").case.parameters[
+        "eddy_viscosity"
+    ]
+    assert prior.median is not None
+    assert low < prior.median < high
+
+
+def test_a_velocity_beside_a_wall_is_no_reading_of_its_cell(tmp_path: Path) -> None:
+    """Cells of 0.19 m have their middles 0.09 m from the wall; at 0.02 m the wall holds the water back."""
+    found = import_of(tmp_path, CHANNEL + JUNE + "walls: true\n", a__csv="x,y,u\n4,0,0.4\n4,1.48,0.2\n4,-1.4,0.3\n")
+    assert found.table.set_index("y")["used"].to_dict() == {0.0: True, 1.48: False, -1.4: True}
+    assert found.table.set_index("y")["reason"][1.48] == AT_WALL
 
 
 def test_walls_leave_no_room_for_banks(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from reach import here
 
 import vegglue
 from vegglue.case.bed import read_points, read_raster
+from vegglue.case.gridded_site import build_site
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.gaugings import read_flowtracker2, read_gauging
@@ -41,23 +42,39 @@ def imported(tmp_path: Path, site: str = CHANNEL + JUNE, **files: str) -> tuple[
     return read_observations(case).table, (case.imported or ())[-1].taken
 
 
+# Of each folder: how many values are used of each kind, their mean, and the range of levels of the bed; None for exit
+# code 2, and nothing written.
+OF_OTHERS: dict[str, tuple[dict[str, tuple[int, float]], tuple[float, float]] | None] = {
+    "classes_bed": ({"velocity": (2, 0.25)}, (-0.010, 0.0)), "classes_only": ({"velocity": (2, 0.25)}, (-0.010, 0.0)),
+    "dem_pit": ({"velocity": (20, 0.40)}, (-0.040, 1.43)), "dem_scale": ({"velocity": (20, 0.40)}, (-0.040, 1.43)),
+    "depths": ({"velocity": (2, 0.25), "level": (3, 0.095)}, (-0.010, 0.0)),
+    "flag": ({"velocity": (14, 0.3957)}, (-0.04, 1.453)), "hidden": ({"velocity": (14, 0.3957)}, (-0.04, 1.453)),
+    "meanrow2": ({"velocity": (8, 0.4321), "velocity_across": (8, 0.0)}, (-0.04, 1.453)),
+    "odd_floor": ({"velocity": (21, 0.3402)}, (-0.019, 0.875)), "write_table": ({"velocity": (2, 0.25)}, (-0.010, 0.0)),
+    "z_bed": ({"velocity": (2, 0.25)}, (-0.010, 0.0)),
+    "pd0min": ({"velocity": (14, 0.40), "velocity_across": (14, 0.02)}, (-0.039, 2.062)),
+    "gda": None, "gda_json": None, "pol_bow": None, "wr_none": None, "zeros": None,
+}  # fmt: skip
+
+
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no folder `shared/cases/files` beside the repository")
-@pytest.mark.parametrize(
-    ("name", "stations"),
-    [
-        ("classes_bed", 2), ("classes_only", 2), ("dem_pit", 20), ("dem_scale", 20), ("depths", 5), ("flag", 14),
-        ("gda", None), ("gda_json", None), ("hidden", 14), ("meanrow2", 16), ("odd_floor", 21), ("pol_bow", None),
-        ("wr_none", None), ("write_table", 2), ("z_bed", 2), ("zeros", None),
-    ],
-)  # fmt: skip
-def test_files_of_others_are_read_rightly_or_refused(tmp_path: Path, name: str, stations: int | None) -> None:
-    """stations: in use afterwards; None for exit code 2, and nothing written."""
+@pytest.mark.parametrize("name", OF_OTHERS)
+def test_files_of_others_are_read_rightly_or_refused(tmp_path: Path, name: str) -> None:
+    if name == "pd0min":
+        pytest.importorskip("mhkit")
+    wanted = OF_OTHERS[name]
     done = here(tmp_path, "import", SHARED / name, "--to", "made.yaml", succeed=False)
-    assert done.returncode == (2 if stations is None else 0), done.stderr
-    assert (tmp_path / "made.yaml").exists() == (stations is not None)
-    if stations is not None:
+    assert done.returncode == (2 if wanted is None else 0), done.stderr
+    assert (tmp_path / "made.yaml").exists() == (wanted is not None)
+    if wanted is not None:
         case = vegglue.load_case(tmp_path / "made.yaml")
-        assert int(read_observations(case).table["used"].sum()) == stations
+        table = read_observations(case).table
+        used = table[table["used"]].groupby("kind")["value"]
+        assert dict(used.count()) == {kind: count for kind, (count, _) in wanted[0].items()}
+        for kind, (_, mean) in wanted[0].items():
+            assert used.mean()[kind] == pytest.approx(mean, abs=2e-3)
+        bed = build_site(case).bed
+        assert (np.nanmin(bed), np.nanmax(bed)) == pytest.approx(wanted[1], abs=5e-3)
 
 
 def test_lost_bottom_track_costs_its_ensemble_only(tmp_path: Path) -> None:
@@ -452,3 +469,38 @@ def test_exponents_of_fortran_are_levels_of_a_bed(tmp_path: Path) -> None:
     points.write_text("x,y,z\n0,0,1.0D-01\n1,0,2D-1\n0,1,0.3\n", encoding="utf-8")
     assert read_raster(grid).values.tolist() == [[0.3, 0.1], [0.4, 0.2]]
     assert read_points(points)[:, 2].tolist() == [0.1, 0.2, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("size", "nothing", "level"),
+    [("cellsize 2", "null", "null"), ("cellsize 2", "nan", "nan"), ("dx 2\ndy 2", "-9999", "-9999"),
+     ("cellsize 2,0", "-9999,0", "-9999,0"), ("dx 2\ndy 2", "-3.4e38", "-3.4e38")],
+)  # fmt: skip
+def test_grids_as_other_programs_write_them(tmp_path: Path, size: str, nothing: str, level: str) -> None:
+    (tmp_path / "bed.asc").write_text(
+        f"ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\n{size}\nNODATA_value {nothing}\n{level} 1,5\n1.0 2.0\n", "utf-8"
+    )
+    raster = read_raster(tmp_path / "bed.asc")
+    assert raster.size == 2.0
+    np.testing.assert_array_equal(raster.values, [[1.0, np.nan], [2.0, 1.5]])
+
+
+def test_a_grid_of_oblong_cells_is_refused(tmp_path: Path) -> None:
+    text = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ndx 2\ndy 3\n1 1\n1 1\n"
+    (tmp_path / "bed.asc").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"bed\.asc"):
+        read_raster(tmp_path / "bed.asc")
+
+
+def test_a_transect_with_decimal_commas_is_read(tmp_path: Path) -> None:
+    text = winriver(*BOAT, 2.0, (0.64, -0.48), 0.05)
+    found = []
+    for name, content in (("a_ASC.TXT", text), ("b_ASC.TXT", text.replace(".", ","))):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+        found.append(reader_of(tmp_path / name)(tmp_path / name, START).numbers)
+    assert found[0]["u_se"].tolist() == found[1]["u_se"].tolist()
+
+
+def test_a_raw_record_that_begins_with_something_else_has_its_reader(tmp_path: Path) -> None:
+    (tmp_path / "t.000").write_bytes(b"\x7f\x79" + pd0(*BOAT, 2.0, (0.64, -0.48), 0.0))
+    assert reader_of(tmp_path / "t.000") is read_pd0

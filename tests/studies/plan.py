@@ -24,6 +24,7 @@ from vegglue.case.schema import Case, Planned, PlannedGauge, PlannedTransect
 from vegglue.case.zones import corners_of
 from vegglue.diagnosis.plan import plan_measurements, planned_pieces
 from vegglue.errors import InputError
+from vegglue.plain_json import plain
 from vegglue.results.plan import FieldPlan, PlannedEffect, hours_of
 from vegglue.workflow.case_run import CaseRun
 
@@ -144,15 +145,13 @@ def made_by_hand(case: Case, hours: float, beside_plants: bool) -> list[Planned]
     return found
 
 
-def compare(config: Path, hours: float) -> str:
-    """A plan proposed for some hours against plans made by hand, each with the number of flows that is best for it."""
+def compare(config: Path, hours: float) -> None:
+    """Print a plan proposed for some hours against plans made by hand, in one flow and in more."""
     case = vegglue.load_case(config).model_copy(update={"observations": (), "planned": Planned(hours=hours)})
-    lines = []
     began = time.process_time()
     plan = plan_measurements(CaseRun(case).model)
-    lines.append(
-        f"proposed: {counted(plan)} testable in {plan.hours:.1f} h ({time.process_time() - began:.1f} s of CPU)"
-    )
+    seconds = time.process_time() - began
+    print(f"proposed: {counted(plan)} testable in {plan.hours:.1f} h ({seconds:.1f} s of CPU)", flush=True)
     for beside in (False, True):
         shown = []
         for planned in made_by_hand(case, hours, beside):
@@ -162,8 +161,7 @@ def compare(config: Path, hours: float) -> str:
             shown.append(
                 f"{counted(plan)} with {len(planned.transects)} transects in {flows} flows, {plan.hours:.1f} h"
             )
-        lines.append(f"{'beside the plants' if beside else 'equally spaced'}: {'; '.join(shown)}")
-    return "\n".join(lines)
+        print(f"{'beside the plants' if beside else 'equally spaced'}: {'; '.join(shown)}", flush=True)
 
 
 def main() -> None:
@@ -175,7 +173,7 @@ def main() -> None:
     parser.add_argument("--compare", type=float, help="hours: compare a proposed plan with plans made by hand instead")
     given = parser.parse_args()
     if given.compare is not None:
-        print(compare(given.config, given.compare))
+        compare(given.config, given.compare)
         return
     case = vegglue.load_case(given.config)
     path = given.folder / f"{case.name}.jsonl"
@@ -191,7 +189,7 @@ def main() -> None:
         if record is not None:
             records.append(record)
             with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(record) + "\n")
+                file.write(json.dumps(plain(record), allow_nan=False) + "\n")
     print(figures(records))
 
 

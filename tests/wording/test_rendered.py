@@ -28,6 +28,7 @@ from diagnoses import (
 from model_scores import a_model_score
 from posteriors import a_posterior, a_refinement, changed
 
+from vegglue.case.safe_yaml import YamlProblem
 from vegglue.cli.printed import (
     TERMINAL_WIDTH,
     posterior_lines,
@@ -38,6 +39,7 @@ from vegglue.cli.printed import (
     verdict_lines,
 )
 from vegglue.diagnosis.comparison import MEASUREMENT
+from vegglue.diagnosis.stepwise_choice import HeldOutErrorsDidNotFall, UnclearFall
 from vegglue.effects.library import SHIPPED
 from vegglue.inference.statements import (
     CalibrationDiffers,
@@ -80,6 +82,7 @@ from vegglue.pages.headline import WorstZone
 from vegglue.pages.parameters import PosteriorVerdict, ResidualCompared
 from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival
 from vegglue.results.diagnosis import Diagnosis
+from vegglue.results.fields import FieldsTooLarge
 from vegglue.results.open_questions import HiddenEffect, OneOfRivals, ProposedMeasurement, Question, RivalEffects
 from vegglue.results.plan import (
     Confusion,
@@ -125,6 +128,7 @@ from vegglue.results.verdict import (
     NeighboursCorrelated,
     NoneLeads,
     ParameterFarFromPrior,
+    ResultCompared,
     StatedErrorsTooSmall,
     TooManyGroups,
     TooShallow,
@@ -132,6 +136,7 @@ from vegglue.results.verdict import (
 )
 from vegglue.wording.sentences import layout, page_sentence, sentence
 from vegglue.workflow.compare import Comparison
+from vegglue.workflow.extend import ExtensionReason
 
 HERE = Path(__file__).parent
 COMMAND = "vegglue diagnose brook.yaml --details"
@@ -228,6 +233,8 @@ NOTES = (
     EffectsUntestable((("k_s", ("wind", "waves")), ("", ("weir",))), 3, 3, False),
     MeasuredStretch(10.0, 30.0, 200.0, ("bed_trend", "wind")), TooShallow(0.02),
     MisfitRemains(ChiSquare(260.0, 150, 1e-8)), CommandCompared(2, 3, 0.4, "", ("k_s",), True, False),
+    ResultCompared("HEC-RAS", 0.065, 0.001, 0.02, 0.029, 0.0007, 0.0, 0.003, 0.023, True, (0.15, 0.05, 0.15)),
+    ResultCompared("", 0.21, 0.03, 0.3, 0.1, 0.02, 0.2, 0.3, np.nan, False, (0.15, 0.05, 0.15)),
 )  # fmt: skip
 STATEMENTS = (
     ModeFound(1, ((N_B, 0.031), (PHI, 8.1)), 61.5, 0.7), ErrorsEstimated(((VELOCITY, 0.02),), (kind_of("level"),)),
@@ -275,6 +282,28 @@ FINDINGS = (
     DischargeMeasured("D3", "high", 2.1, 0.1, 1.7, "", 4.0), DischargeMeasured("D3", "high", 2.1, 0.1, None, "", 0.0),
     MembersSolved(2044, 1, 3, None, (2048, 0)), MassError(2e-6), FlowOfBuiltInEngine(),
 )  # fmt: skip
+
+
+YAML = (
+    *(YamlProblem(kind) for kind in (
+        "tab", "second-colon", "no-colon", "further-text", "list-in-line", "closed-early", "second-document",
+        "special-sign",
+    )),
+    YamlProblem("sign", "@"), YamlProblem("closes-nothing", "}"), YamlProblem("indentation", "<block mapping start>"),
+    YamlProblem("no-value", "-"), YamlProblem("escape", "d"), YamlProblem("reference", "x"),
+    YamlProblem("no-letter", "'\\x07'"), YamlProblem("open-bracket", "<stream end>", "{", "}", 3),
+    YamlProblem("open-quote", begun=2), YamlProblem("other", "is not valid YAML"),
+)  # fmt: skip
+EXTENSIONS = (
+    *(ExtensionReason((), kind) for kind in (
+        "law", "nothing-missing", "instrument", "none-of-these", "cannot-tell", "one-of",
+    )),
+    ExtensionReason(
+        ("wind", "unlisted_bed[x4,y1]"), "", (("unlisted_bed[x4,y1]", 4.62, 0.45),),
+        {"wind": UnclearFall((("sections", 2e-5, 4e-4),))}, {"waves": HeldOutErrorsDidNotFall()},
+    ),
+)  # fmt: skip
+BUDGET = (FieldsTooLarge(123.456, 5000, 100.0, 30.0, 12.5),)
 
 
 def three_days(value: float) -> ProposedMeasurement:
@@ -345,6 +374,7 @@ def page() -> str:
 
 
 RENDERED: dict[str, Callable[[], str]] = {
+    "files": lambda: wrapped((*YAML, *EXTENSIONS, *BUDGET)),
     "verdicts": lambda: "\n\n".join(
         "\n".join([f"## {name}", *verdict_lines(found, COMMAND, 13), "", wrapped([found.verdict])])
         for name, found in VERDICTS.items()

@@ -165,7 +165,7 @@ def test_a_place_that_is_added_by_name_is_as_the_diagnosis_found_it(tmp_path: Pa
     given = extend(case, name, shapes={"length": 0.7}, to=tmp_path / "given.yaml", runs=tmp_path).effects[key].values
     unknown = extend(case, name, to=tmp_path / "unknown.yaml", runs=tmp_path / "none").effects[key].values
     assert [(one["length"], one["width"]) for one in (known, given)] == [(1.8, 0.45), (0.7, 0.45)]
-    assert unknown["length"] == 0.5
+    assert unknown["length"] == 0.45, "0.3 half widths of the floor"
 
 
 @pytest.mark.parametrize("turn", [1, -1])

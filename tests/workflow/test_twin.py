@@ -109,10 +109,10 @@ def test_a_linear_effect_has_the_size_of_its_fingerprint(ground: TwinBase) -> No
 
 
 def test_a_size_that_is_given_is_kept(ground: TwinBase) -> None:
-    station, answer = measured_twin(ground, ["gauge_datum=0.5", "bad_probe=-8"], 6.0, "white", 4)
+    station, answer = measured_twin(ground, ["gauge_datum=0.4", "bad_probe=-8"], 6.0, "white", 4)
     level = (station["kind"] == "level").to_numpy()
     above = (station["value"] - ground.there.prediction).to_numpy()
-    assert above[level] == pytest.approx(0.5, abs=0.015)
+    assert above[level] == pytest.approx(0.4, abs=0.015)
     assert [one.name for one in answer.hidden] == ["gauge_datum", "bad_probe"]
     row = answer.hidden[1].station
     assert above[row] / station["standard_error"][row] == pytest.approx(-8.0, abs=4.0)
@@ -132,7 +132,7 @@ def test_a_patch_that_is_named_is_the_one_that_hides_it(ground: TwinBase, patch:
 def test_something_unlisted_at_a_named_place_stands_there(ground: TwinBase) -> None:
     _, answer = measured_twin(ground, ["unlisted_object[x15,y0.5]"], 6.0, "white", 4)
     (hidden,) = answer.hidden
-    assert hidden.shapes == {"x": 15.0, "y": 0.5, "length": 0.5, "width": 0.5}
+    assert hidden.shapes == {"x": 15.0, "y": 0.5, "length": 0.45, "width": 0.45}, "0.3 half widths of the floor"
     assert hidden.signal == pytest.approx(6.0, rel=0.1)
 
 

@@ -20,7 +20,9 @@ from vegglue.errors import InputError, shown_path
 
 FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")  # 3.7D-01
 # Keys of the header of an ESRI ASCII grid, in lower case.
-HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "nodata_value")
+HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
+# Words for no level, as some programs write into the header and among the values.
+NO_LEVEL = re.compile(r"\b(null|nodata|na|nan)\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,12 @@ def read_raster(path: Path) -> Raster:
     while first < len(lines) and (words := lines[first].split()) and words[0].lower() in HEADER:
         if len(words) != 2:
             raise InputError(f"{path}, line {first + 1}: expected `{words[0]}` and one number, got {lines[first]!r}.")
-        header[words[0].lower()] = _number(path, first + 1, words[1], words[0])
+        key, of_nothing = words[0].lower(), NO_LEVEL.fullmatch(words[1])
+        nothing = key == "nodata_value" and of_nothing
+        header[key] = math.nan if nothing else _number(path, first + 1, words[1].replace(",", "."), words[0])
         first += 1
+    if "cellsize" not in header and header.get("dx") == header.get("dy"):
+        header["cellsize"] = header.get("dx", 0.0)
     for key in ("ncols", "nrows", "cellsize"):
         if header.get(key, 0.0) <= 0:
             raise InputError(
@@ -73,7 +79,11 @@ def read_raster(path: Path) -> Raster:
     found = [np.empty(0)]  # a line at a time, so that a large file takes little more than its numbers do
     for number, line in enumerate(lines[first:], first + 1):
         try:
-            found.append(np.array(FORTRAN_EXPONENT.sub("e", line).split(), dtype=np.float64))
+            found.append(
+                np.array(
+                    NO_LEVEL.sub("nan", FORTRAN_EXPONENT.sub("e", line.replace(",", "."))).split(), dtype=np.float64
+                )
+            )
         except ValueError as error:
             word = str(error).rpartition(": ")[2]
             raise InputError(f"{path}, line {number}: expected numbers, got {word}.") from None

@@ -217,10 +217,10 @@ def _scales(case: Case, site: Site) -> SiteScales:
     banks = beyond_floor(site)
     for name, experiment in case.experiments.items():
         here = in_experiment(site, name)
-        depth = np.maximum(expected_depth(case, here, experiment), 0.0)
-        floor = np.where(beyond_floor(here), 0.0, depth)
-        wet = (depth > 0.0).sum(axis=1)
-        area, columns = depth.sum(axis=1) * site.grid.dy, wet > 0
+        of_cells = np.maximum(expected_depth(case, here, experiment), 0.0)
+        floor = np.where(beyond_floor(here), 0.0, of_cells)
+        wet = (of_cells > 0.0).sum(axis=1)
+        area, columns = of_cells.sum(axis=1) * site.grid.dy, wet > 0
         on_floor = floor[floor > 0.0]
         if not columns.any() or not on_floor.size:
             continue

@@ -394,6 +394,19 @@ def _agree_on_values(case: Case) -> None:
             ("infer", "behavioural"),
             "goes with an informal likelihood, not with gaussian: remove it",
         )
+    if (result := case.finished_result) is not None:
+        known = {*case.experiments, *(case.validation.experiments if case.validation is not None else ())}
+        for name in sorted(known - result.files.keys()):
+            raise CaseError(("finished_result", "files"), f"expected the flow of {name}, got none: add its file")
+        for name, path in result.files.items():
+            if name not in known:
+                complaint = f"expected an experiment among {', '.join(sorted(known))}: correct its name"
+                raise CaseError(("finished_result", "files", name), complaint)
+            if not os.path.isfile(path):
+                complaint = f"expected an existing file, got {shown_path(path)}: put it there or correct the path"
+                raise CaseError(("finished_result", "files", name), complaint)
+        for name in result.parameters:
+            _declared(("finished_result", "parameters", name), name, case.parameters, "parameter")
     if case.engine is None:
         return
     for name, path in case.engine.files.items():

@@ -75,6 +75,18 @@ class CommandEngine(Part):
         return tuple(_PLACEHOLDER.sub(lambda found: paths[found[1]], word) for word in shlex.split(self.command))
 
 
+class FinishedResult(Part):
+    """A finished run of another model: its flow predicts instead of the solver's, see docs/own_engine.md."""
+
+    code: str = Field(default="", description="program that made it")
+    files: dict[str, Path] = Field(
+        min_length=1, description="by experiment, a CSV with x, y, bed, depth [m], u, v [m/s] on the grid of the case"
+    )
+    parameters: dict[str, Number] = Field(
+        default_factory=dict, description="values that it was run with; of others the median of the prior is taken"
+    )
+
+
 # Numbers of a prior lie between 10^-30 and 10^30, whatever their unit: their squares and products are still numbers.
 SMALLEST_IN_PRIOR, LARGEST_IN_PRIOR = 1e-30, 1e30
 # Width of a prior over its size [-]: a thinner one is a number, whose digits end at 10^-16.
@@ -374,6 +386,7 @@ class Case(Part):
     )
     effect_file: Path | None = Field(default=None, description="Python file with effects of your own, needs --trust")
     engine: CommandEngine | None = Field(default=None, description="a command instead of the solver, needs --trust")
+    finished_result: FinishedResult | None = Field(default=None, description="a finished run of another model")
     parameters: dict[str, Parameter] = Field(default_factory=dict, description="unknowns and their priors")
     observations: tuple[Observation, ...] = Field(default=(), description="measurements")
     planned: Planned | None = Field(default=None, description="measurements that `plan` judges and adds to")
@@ -387,6 +400,11 @@ class Case(Part):
     validation: Validation | None = Field(default=None, description="measurements to judge a finished model by")
     reference: Reference | None = Field(default=None, description="values of others, printed beside ours")
     canopy_correction: CanopyCorrection | None = Field(default=None, description="phi for another canopy height")
+
+    @property
+    def of_another_model(self) -> bool:
+        """Whether predictions are those of a command or of a finished result, not of the built-in engine."""
+        return self.engine is not None or self.finished_result is not None
 
     def __repr__(self) -> str:
         (west, east), (south, north), (dx, dy) = self.grid.x, self.grid.y, self.grid.cell

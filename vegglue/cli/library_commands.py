@@ -80,15 +80,24 @@ def effects_command(
     runs: Runs = RUNS,
 ) -> None:
     """List the physical effects that can be added, or show one of them."""
+    from vegglue.wording.sentences import layout, phrase, sentences
+
     if check is not None:
-        _check(check, as_object, trust)
+        from vegglue.workflow.check import check_effects
+
+        found = {effect: sentences(broken) for effect, broken in check_effects(check, trust=trust).items()}
+        if as_object:
+            print_object(found)
+        else:
+            print("\n".join(layout("effect_checked", effect, broken) for effect, broken in found.items()))
+        if broken := [effect for effect, breaches in found.items() if breaches]:
+            raise InputError(f"{check}: {len(broken)} of {len(found)} effects break the contract: {', '.join(broken)}.")
         return
     case = vegglue.load_case(config, trust) if config is not None else None
     from vegglue.case.case_effects import effect_named
     from vegglue.case.messages import nearest_effect
     from vegglue.effects.definition import STAGES
     from vegglue.effects.library import library
-    from vegglue.wording.sentences import layout, phrase
 
     known = library(case.effect_file if case is not None else None)
     if name is None:
@@ -121,21 +130,6 @@ def effects_command(
         with progress_reporter(quiet, as_object=False) as watch:
             picture = draw_fingerprint_of(case, effect, runs=runs, watch=watch)
         print(f"Fingerprint drawn in {picture}")
-
-
-def _check(file: Path, as_object: bool, trust: bool) -> None:
-    from vegglue.wording.sentences import layout, sentences
-    from vegglue.workflow.check import check_effects
-
-    found = {name: sentences(broken) for name, broken in check_effects(file, trust=trust).items()}
-    if as_object:
-        print_object(found)
-    else:
-        for name, breaches in found.items():
-            print(layout("effect_checked", name, breaches))
-    broken = [name for name, breaches in found.items() if breaches]
-    if broken:
-        raise InputError(f"{file}: {len(broken)} of {len(found)} effects break the contract: {', '.join(broken)}.")
 
 
 def effect_json(effect: "Effect") -> dict[str, object]:

@@ -121,7 +121,7 @@ LAWS_HELD = 0.95
 
 def laws_beside(screening: Screening) -> LawScreening | None:
     """Laws screened beside all that is listed; None if there can be none: `discover` refuses a command."""
-    if screening.base.model.case.engine is not None:
+    if screening.base.model.case.of_another_model:
         return None
     traces = law_fingerprints(screening.base, (), screening.fingerprints)
     return screen_laws(screening.base, traces, screening.flagged) if traces.laws else None

@@ -66,6 +66,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[objec
         *vertical_check.remarks_on_heights(observations),
         *flow_check.remarks_on_directions(case, possible),
         *flow_check.remarks_on_turned_velocities(case, observations),
+        *flow_check.remarks_on_turned_probes(observations),
         *flow_check.remarks_on_outlet_levels(case, site, possible),
         *vertical_check.remarks_on_lost_points(observations, doubted),
         *channel_check.remarks_on_ensemble(case, observations),

@@ -220,7 +220,7 @@ def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]
             place = float(grid.x[i]), float(grid.y[j])
             found.append(BedCorrected(*place, value, (value - half, value + half), between))
     wrong = [one.survey.left_out for one in base.model.case.bed if one.survey is not None and one.survey.loose]
-    levelled = [
+    levelled: list[Note] = [
         LineLevelledWrongly(one.offset_at, one.offset, (one.offset - half, one.offset + half))
         for one in wrong if one is not None for half in (NORMAL95 * one.offset_error,)
     ]  # fmt: skip

@@ -43,6 +43,8 @@ UNEVENNESS = 1.5
 # Angle [degrees] of turned velocities, and over its standard error over the sections [-]. Chosen: declinations in
 # Europe reach some degrees; a section beside the end of a patch in a flume was off by 1.6.
 LEAST_ANGLE, SURE_OF_AN_ANGLE = 3.0, 3.0
+# The same of one probe beside its neighbours: many positions are tried.
+SURE_OF_A_PROBE = 6.0
 # Fewest sections that show a turn: two may both stand where a patch drives water aside. Share of them on one side [-].
 FEWEST_CROSSED, MOST_ON_ONE_SIDE = 3, 0.9
 # Fewest places of a section whose mean is that of the section.
@@ -372,6 +374,39 @@ def _rising(case: Case, observations: Observations) -> dict[str, tuple[float, fl
         if rise > max(RISE, head, SURE * float(np.hypot(error[i], error[j]))):
             found[name] = (float(x[i]), float(x[j]), rise)
     return found
+
+
+@dataclass(frozen=True)
+class ProbeTurned:
+    """A position across whose velocities point to one side of those of both neighbours, by an angle [degrees] that is
+    the same at all its sections and experiments; y [m].
+    """
+
+    y: float
+    side: str
+    angle: float
+    sections: int
+
+
+def remarks_on_turned_probes(observations: Observations) -> Iterator[ProbeTurned]:
+    """Positions whose v/u is off that of their neighbours, alike in FEWEST_CROSSED sections or more."""
+    used = observations.table[observations.table["used"]]
+    place = ["experiment", "section", "x", "y"]
+    along, across = (used.loc[used["kind"] == kind, [*place, "value"]] for kind in (STREAMWISE, TRANSVERSE))
+    both = along.merge(across, on=place, suffixes=("_along", "_across")).sort_values("y")
+    if both.empty:
+        return
+    both["angle"] = np.degrees(np.arctan2(both["value_across"], both["value_along"]))
+    angle = both.groupby(["experiment", "section"])["angle"]
+    both["off"] = both["angle"] - 0.5 * (angle.shift(1) + angle.shift(-1))
+    for y, rows in both.dropna(subset="off").groupby(both["y"].round(3)):
+        off = rows["off"].to_numpy(float)
+        if len(off) < FEWEST_CROSSED or rows["section"].nunique() < 2:
+            continue
+        mean, error = float(off.mean()), float(off.std(ddof=1)) / float(np.sqrt(len(off)))
+        # Both neighbours of a turned probe look turned by half of it the other way.
+        if abs(mean) > max(LEAST_ANGLE, SURE_OF_A_PROBE * error) and (np.sign(off) == np.sign(mean)).all():
+            yield ProbeTurned(float(y), "left" if mean > 0.0 else "right", abs(mean), len(off))
 
 
 def remarks_on_turned_velocities(case: Case, observations: Observations) -> Iterator[VelocitiesTurned]:

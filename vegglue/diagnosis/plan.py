@@ -12,7 +12,7 @@ that field, and make no other difference. Pieces are added by their gain for an 
 that helps (Fedorov 1972; not checked against it).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -109,6 +109,8 @@ LOWER_DISCHARGES = (0.5,)
 LEAST_PLANNED_DEPTH = 0.1
 # Verticals in the water of the middle experiment where no spacing is given [-].
 VERTICALS_ACROSS = 10
+# Verticals of a transect from which every second of them is thought of as well.
+FEWEST_DIVIDED = 5
 # Places of transects that are thought of, those at patches among them, and patches in whose middle a vertical is.
 MOST_ADDED_PLACES, MOST_PATCHES = 20, 8
 # |cosine| from which another effect is listed as similar [-]: half of the squares of a trace are then the same.
@@ -119,8 +121,8 @@ SIMILAR_SHOWN = 3
 USUAL_ALARM = 0.6
 # Draws of errors alone for the alarm [-]: 50 lie beyond the 95 % point.
 ALARM_DRAWS = 1000
-# Proposals that are shown, those that are looked at again in an exchange, and rounds of exchange at most.
-ADDITIONS_SHOWN, ADDITIONS_WEIGHED, ADDING_ROUNDS = 6, 12, 2
+# Proposals of one kind that are shown, and of all; those that are looked at again in a search, and rounds of exchange.
+OF_A_KIND, ADDITIONS_SHOWN, ADDITIONS_WEIGHED, ADDING_ROUNDS = 2, 8, 12, 2
 # Rise of the answer to a question below which a piece adds nothing [-].
 LEAST_PLAN_GAIN = 1e-3
 
@@ -199,7 +201,12 @@ def plan_measurements(
                 f"{model.case.name}: no measurement fits {planned.hours:g} hours of field work; raise `planned.hours`."
             )
         base = [wide.pieces[j] for j in chosen]
-        others = [one for j, one in enumerate(wide.pieces) if j not in chosen]
+        taken = {(one.work, one.experiment, one.x) for one in base if one.work is Work.TRANSECT}
+        others = [
+            one
+            for j, one in enumerate(wide.pieces)
+            if j not in chosen and (one.work, one.experiment, one.x) not in taken
+        ]
         wide = plan_model(model, planned, at_hand, base, others, wide)
         question = _question(wide.candidates, about, size, between)
     watch(Progress("weighing what they show"))
@@ -331,7 +338,11 @@ def possible_pieces(
         new = experiment not in model.case.experiments
         for x in sorted(places):
             again = experiment in measured.get(x, ())
-            found.append(_piece(wide, planned, PlannedTransect(x=x, spacing=spacing), experiment, new, again))
+            piece = _piece(wide, planned, PlannedTransect(x=x, spacing=spacing), experiment, new, again)
+            found.append(piece)
+            if piece is not None and not again and len(piece.y) >= FEWEST_DIVIDED:  # every second vertical
+                some = piece.y[(len(piece.y) // 2) % 2 :: 2]
+                found.append(replace(piece, y=some, hours=planned.costs.transect + len(some) * planned.costs.vertical))
         if not new:
             middle = 0.5 * (low + high)
             for x in sorted(places)[::2]:
@@ -427,20 +438,26 @@ def _plan_model(
     known: Sequence[PlanDraw],
 ) -> PlanModel | None:
     stations = station_table(at_hand, stations_of(wide, planned, base, at_hand)[0])
-    further, counts = stations_of(wide, planned, possible, at_hand)
+    # A transect with every second vertical is made of stations of the whole one.
+    whole = {(one.experiment, one.x): one for one in reversed(possible) if one.work is Work.TRANSECT}
+    own = [one for one in possible if one.work is not Work.TRANSECT or whole[one.experiment, one.x] is one]
+    further, counts = stations_of(wide, planned, own, at_hand)
     here = replace(wide, station=station_table(stations, further.assign(used=False)))
     # Bed levels stand behind all stations, those of the plan first.
     places = [(one.x, y) for one in (*base, *possible) if one.work is Work.SURVEY_LINE for y in one.y]
     station = len(stations)
     level = len(here.station) + sum(len(one.y) for one in base if one.work is Work.SURVEY_LINE)
+    first = dict(zip(map(id, own), station + np.cumsum([0, *counts[:-1]]), strict=True)) if own else {}
     rows = list[np.ndarray]()
-    for piece, count in zip(possible, counts, strict=True):
+    for piece in possible:
         if piece.work is Work.SURVEY_LINE:
             rows.append(np.arange(level, level + len(piece.y)))
             level += len(piece.y)
+        elif id(piece) in first:
+            rows.append(first[id(piece)] + np.arange(max(len(piece.y), 1)))
         else:
-            rows.append(np.arange(station, station + count))
-            station += count
+            dense = whole[piece.experiment, piece.x]
+            rows.append(first[id(dense)] + np.array([dense.y.index(y) for y in piece.y]))
     on_coarse = coarser(here)
     search = on_coarse if on_coarse is not None and cells_across(on_coarse.site) >= FEWEST_CELLS_ACROSS else here
     other = here if search is on_coarse else on_coarse
@@ -880,7 +897,13 @@ class PlanSearch:
     def moves(self, chosen: Sequence[int]) -> list[tuple[int, ...]]:
         """What could be added at once: each piece, and for each flow without measurements the places of the others."""
         pieces = self.wide.pieces
-        free = [j for j in range(len(pieces)) if j not in chosen]
+        taken = {(pieces[j].work, pieces[j].experiment, pieces[j].x, pieces[j].y[:1]) for j in chosen}
+        taken |= {(*one[:3], ()) for one in taken if one[0] is Work.TRANSECT}
+        free = [
+            j
+            for j, one in enumerate(pieces)
+            if (one.work, one.experiment, one.x, () if one.work is Work.TRANSECT else one.y[:1]) not in taken
+        ]
         found: list[tuple[int, ...]] = [(j,) for j in free]
         present = self.present | {pieces[j].experiment for j in chosen}
         known = self.wide.model.station.iloc[: self.wide.count]
@@ -897,13 +920,17 @@ class PlanSearch:
         return found
 
     def ranked(self) -> tuple[ProposedPieces, ...]:
-        """Every single addition to the plan by what it adds in an hour, those that add something."""
+        """Single additions to the plan by what they add in an hour: the best few of each kind of work, of repeats, and
+        of flows that the case does not have, as far as they add something.
+        """
         found = []
         for move in self.moves(()):
             after = self.answer(self.with_pieces(self.base, move))
             if after.mean - self.start.mean > LEAST_PLAN_GAIN:
                 found.append(self._proposed(move, after))
-        return tuple(sorted(found, key=lambda one: -one.per_hour))
+        found.sort(key=lambda one: -one.per_hour)
+        kinds = [(one.pieces[0].work, one.pieces[0].again, one.pieces[0].new, len(one.pieces) > 1) for one in found]
+        return tuple(one for j, one in enumerate(found) if kinds[:j].count(kinds[j]) < OF_A_KIND)
 
     def _proposed(self, move: Sequence[int], after: PlanAnswer) -> ProposedPieces:
         pieces = tuple(self.wide.pieces[j] for j in move)
@@ -915,21 +942,29 @@ class PlanSearch:
         return self._proposed(chosen, self.answer(self.with_pieces(self.base, chosen))) if chosen else None
 
     def best_set(self, budget: float, chosen: Sequence[int]) -> list[int]:
-        """Pieces that fit a budget [h]: greedy by gain for an hour, then exchanged one by one while that helps."""
-        chosen = self._greedy(budget, list(chosen))
+        """Pieces that fit a budget [h]: greedy by gain for an hour, in any flows and in each flow alone, of which the
+        best is exchanged piece by piece while that helps.
+        """
+
+        def worth(pieces: Sequence[int]) -> float:
+            return self.answer(self.with_pieces(self.base, pieces)).mean
+
+        flows = [one for one in self.wide.model.case.experiments if one not in self.present]
+        starts = [None, *({*self.present, one} for one in flows if len(flows) > 1)]
+        best = max((self._greedy(budget, list(chosen), start) for start in starts), key=worth)
+        before = worth(best)
         for _ in range(ADDING_ROUNDS):
-            before = self.answer(self.with_pieces(self.base, chosen)).mean
-            for j in list(chosen):
-                rest = [k for k in chosen if k != j]
-                again = self._greedy(budget, rest)
-                if self.answer(self.with_pieces(self.base, again)).mean > before + LEAST_PLAN_GAIN:
-                    chosen, before = again, self.answer(self.with_pieces(self.base, again)).mean
+            for j in list(best):
+                again = self._greedy(budget, [k for k in best if k != j])
+                if (now := worth(again)) > before + LEAST_PLAN_GAIN:
+                    best, before = again, now
                     break
             else:
                 break
-        return chosen
+        return best
 
-    def _greedy(self, budget: float, chosen: list[int]) -> list[int]:
+    def _greedy(self, budget: float, chosen: list[int], flows: Set[str] | None = None) -> list[int]:
+        """flows: in which alone work is done, beside that which is of no flow; None for all."""
         known = self.with_pieces(self.base, chosen)
         now = self.answer(known).mean
         promised: dict[tuple[int, ...], float] = {}
@@ -937,6 +972,9 @@ class PlanSearch:
             spent = self.hours(chosen, self.present)
             # A flow that the case does not have cannot be ordered: it is shown, and not planned.
             moves = [move for move in self.moves(chosen) if not any(self.wide.pieces[j].new for j in move)]
+            if flows is not None:
+                allowed = {*flows, ""}
+                moves = [move for move in moves if all(self.wide.pieces[j].experiment in allowed for j in move)]
             possible = {move: self.hours([*chosen, *move], self.present) - spent for move in moves}
             possible = {move: hours for move, hours in possible.items() if spent + hours <= budget + 1e-9}
             # What a piece adds hardly ever grows: those that added less before are looked at last (lazy greedy).

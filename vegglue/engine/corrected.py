@@ -67,12 +67,32 @@ class Correction:
         columns = [model.names.index(name) for name in self.names]
         of_stations = np.vstack([self.slope, np.zeros((1, len(columns)))])[rows]
         slope = np.zeros((rows.size, z.size))
-        slope[:, columns] = of_stations
+        slope[:, columns] = of_stations  # no column, if the correction has no slopes
         return np.append(self.value, 0.0)[rows] + of_stations @ (z[columns] - self.z), slope
 
 
 class InsensitiveCommandError(InputError):
     """A command that predicts the same whatever its parameters are."""
+
+
+def with_correction(correction: Correction, name: str) -> Engine:
+    """F(z) and what is added there: the built-in engine corrected at one place; name: of the engine."""
+
+    def linearise_corrected(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
+        value, slope = correction.at(model, z)
+        point = NEWTON.linearise(model, z, near, lambda prediction: wanted(prediction + value))
+        if point is None:
+            return None
+        return replace(point, prediction=point.prediction + value, slope=point.slope + slope)
+
+    def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
+        return NEWTON.predict(model, points, z) + np.stack([correction.at(model, one)[0] for one in z])
+
+    def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
+        value, _ = correction.at(model, point.z)
+        return NEWTON.responses(model, replace(point, prediction=point.prediction - value), causes)
+
+    return replace(NEWTON, name=name, linearise=linearise_corrected, predict=predict, responses=responses)
 
 
 def corrected(correction: Correction, runs: CommandRuns, watch: Watch) -> Engine:
@@ -88,13 +108,6 @@ def corrected(correction: Correction, runs: CommandRuns, watch: Watch) -> Engine
         Called with the progress of these.
     """
 
-    def linearise_corrected(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
-        value, slope = correction.at(model, z)
-        point = NEWTON.linearise(model, z, near, lambda prediction: wanted(prediction + value))
-        if point is None:
-            return None
-        return replace(point, prediction=point.prediction + value, slope=point.slope + slope)
-
     def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
         """Runs of the command, and what the effects of the case change in the built-in engine."""
         bare = without_effects(model)
@@ -108,11 +121,7 @@ def corrected(correction: Correction, runs: CommandRuns, watch: Watch) -> Engine
             return np.full_like(found, np.nan)
         return found + NEWTON.predict(model, points, z) - NEWTON.predict(bare, known, z_own)
 
-    def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
-        value, _ = correction.at(model, point.z)
-        return NEWTON.responses(model, replace(point, prediction=point.prediction - value), causes)
-
-    return replace(NEWTON, name="command", linearise=linearise_corrected, predict=predict, responses=responses)
+    return replace(with_correction(correction, "command"), predict=predict)
 
 
 def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slopes: bool = True) -> Correction:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.model_result import (
     ModelResult,
@@ -63,7 +63,7 @@ def read_delft3d_trim(path: Path) -> ModelResult:
         )
         along, across = np.where(open_u, np.nan_to_num(along), 0.0), np.where(open_v, np.nan_to_num(across), 0.0)
         before_u, before_v = _before(along, 0), _before(across, 1)
-        wet = open_u | open_v | (_before(open_u, 0) > 0) | (_before(open_v, 1) > 0)
+        wet = open_u | open_v | (_before(open_u.astype(float), 0) > 0) | (_before(open_v.astype(float), 1) > 0)
         u, v = 0.5 * (along + before_u), 0.5 * (across + before_v)
         active = np.isfinite(x) & np.isfinite(y)
         if "KCS" in variables:
@@ -118,7 +118,7 @@ def _mean_of_both(of_faces: Array) -> Array:
     return np.where(count > 0, np.where(known, both, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
-def _turned_as_the_grid(x: Array, y: Array, active: Array, angle: Array) -> tuple[tuple[str, ...], Array]:
+def _turned_as_the_grid(x: Array, y: Array, active: Mask, angle: Array) -> tuple[tuple[str, ...], Array]:
     """The angle with the sign with which it runs along the line from one centre to the next, and a note."""
     pairs = active[1:] & active[:-1]
     dx, dy = np.diff(x, axis=0)[pairs], np.diff(y, axis=0)[pairs]

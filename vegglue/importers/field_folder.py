@@ -40,6 +40,7 @@ from vegglue.importers.config_parts import (
 )
 from vegglue.importers.measured_files import held_out_measurements, measured_files, record, texts_of_tables
 from vegglue.importers.measured_rows import Placement
+from vegglue.importers.result_site import SiteOfResult, ground_of_result, site_of
 from vegglue.importers.site_file import (
     Channel,
     FieldSite,
@@ -47,7 +48,6 @@ from vegglue.importers.site_file import (
     MeasuredFlow,
     PlantedPatch,
     SiteGrid,
-    read_site,
     site_file,
 )
 from vegglue.importers.terrain import (
@@ -117,8 +117,8 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     InputError
         If the site file or every file of measurements is missing, or states too little.
     """
-    path = site_file(folder)
-    site = read_site(path)
+    path, found = site_file(folder), site_of(folder)
+    site = found.site if isinstance(found, SiteOfResult) else found
     _refuse_standing_water(path, site)
     frame = site.frame.frame if site.frame is not None else None
     given = site.grid.centreline if site.grid is not None else None
@@ -128,7 +128,11 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     # Files that the site file names and that hold no measurements.
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
     used += [given.file] if isinstance(given, FileOfSite) else []
-    if site.bed is not None or site.channel is None:
+    of_result = ground_of_result(target, found, place) if isinstance(found, SiteOfResult) else None
+    if of_result is not None and isinstance(found, SiteOfResult):
+        ground = of_result.ground
+        used += [one.name for one in found.paths.values()]
+    elif site.bed is not None or site.channel is None:
         ground = surveyed_ground(folder, target, site, place)
     else:
         ground = _straight_ground(folder, site, site.channel, place)
@@ -160,9 +164,13 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         "observations": measured.observations,
         **FIRST_LOOK,
     }
+    if of_result is not None:
+        tree["parameters"] = of_result.parameters | unknown
+        tree["finished_result"] = of_result.key
     if site.walls is not None:  # a smoother bed than a stream's, and one that is known better
         tree["friction"] = tree["friction"] | {"walls": {"law": "manning", "n": "n_w"}}
-        tree["parameters"] = tree["parameters"] | {"n_b": BED_OF_FLUME, "n_w": wall_prior(site.walls.n)}
+        of_floor = {"n_b": BED_OF_FLUME} if of_result is None else {}
+        tree["parameters"] = tree["parameters"] | of_floor | {"n_w": wall_prior(site.walls.n)}
         tree |= MODEL_ERROR_OF_FLUME
     elif site.bed is not None:  # of a natural reach, surveyed outdoors
         walked = any(patch.polygon is not None for patch in patches)

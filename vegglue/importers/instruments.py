@@ -28,6 +28,8 @@ from vegglue.importers.teledyne import PD0_BEGINS, is_winriver, read_pd0, read_w
 FileReader = Callable[[Path, FileOptions], MeasuredRows]
 # Endings of files that instruments write for programs, beside those of tables.
 BINARY_ENDINGS = (".pd0", ".000", ".ft", ".vec", ".vno", ".ntk", ".ad2cp")
+# Of raw transects, which may begin with something else, up to so much of it [bytes].
+PD0_ENDINGS, LONGEST_PREAMBLE = (".pd0", ".000"), 65_536
 # How binary records of Nortek begin that no kept reader has: those of the Vectrino, and those of the Signature.
 NORTEK_BEGINS = (b"\xa5\x05", b"\xa5\x0a")
 # How a MATLAB file begins: version 5, which all instruments write, and 7.3, which is HDF5.
@@ -65,12 +67,14 @@ def reader_of(path: Path) -> FileReader:
         return read_placed_rows
     try:
         with path.open("rb") as file:
-            begin = file.read(max(map(len, BY_BEGINNING)))
+            begin = file.read(LONGEST_PREAMBLE)
     except OSError as error:
         raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
     known = next((reader for mark, reader in BY_BEGINNING.items() if begin.startswith(mark)), None)
     if known is not None:
         return known
+    if path.suffix.lower() in PD0_ENDINGS and PD0_BEGINS in begin:  # a cut ensemble, or sentences of a GPS, in front
+        return read_pd0
     nortek = begin.startswith(NORTEK_BEGINS)
     if nortek or path.suffix.lower() in BINARY_ENDINGS:
         got = "a binary record of a Nortek instrument" if nortek else f"a record {path.suffix}"

@@ -5,6 +5,7 @@ sentence.
 """
 
 import io
+import json
 import logging
 import struct
 import traceback
@@ -13,10 +14,13 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
+from scipy.io.matlab import mat_struct
 
 from vegglue.arrays import Array
 from vegglue.case.size_limits import LARGEST_DATA
@@ -25,7 +29,7 @@ from vegglue.sandboxed_reader import why_unreadable
 
 COMPRESSED, AT_ONCE_UNPACKED = 15, 1 << 20  # type of an element of a MATLAB file; [bytes]
 LONGEST_COMPLAINT = 200  # letters of a library's complaint; some quote the file
-MATLAB_READER = f"{__name__}:read_all_variables"  # as the process of its own knows it
+MATLAB_READER = f"{__name__}:unpack_matlab"  # as the process of its own knows it
 MATLAB_5 = "a MATLAB file of version 5"
 
 
@@ -100,22 +104,48 @@ def importing(library: str, path: Path, what: str, extra: str, instead: str) -> 
 
 
 def load_matlab(path: Path, kind: str = MATLAB_5, names: Sequence[str] | None = None) -> dict[str, Any]:
-    """The variables of a MATLAB file of version 5, structures as objects; with `names` these alone, as arrays.
+    """The variables of a MATLAB file of version 5, structures as objects with attributes.
 
-    A process of its own reads the file to its end first. InputError for a file that is too large or damaged;
-    StorageError if no process can be started.
+    A process of its own reads the file, which damage may make crash, and hands over plain arrays.
+
+    Parameters
+    ----------
+    path
+        The file.
+    kind
+        What it should be, for messages.
+    names
+        Of variables that are read alone, as arrays of two or more dimensions.
+
+    Raises
+    ------
+    InputError
+        If the file is too large or damaged, or lacks one of the names.
+    StorageError
+        If no process can be started.
     """
-    with read_by_library(path, kind):
+    with read_by_library(path, kind), TemporaryDirectory() as folder:
         _refuse_larger_matlab(path)
-        state = path.stat()
-    why = why_unreadable(path.absolute(), state.st_size, state.st_mtime_ns, by=MATLAB_READER)
-    if why is not None:
-        raise InputError(f"{shown_path(path)} cannot be read as {kind}: {why}; save it anew.")
-    with read_by_library(path, kind):
-        if names is None:
-            return dict(loadmat(path, struct_as_record=False, squeeze_me=True))
-        found = loadmat(path, variable_names=names)
-        return {name: np.asarray(found[name], dtype=np.float64) for name in names}
+        copy = Path(folder) / "read.mat"
+        copy.write_bytes(path.read_bytes())
+        if (why := why_unreadable(copy, copy.stat().st_size, by=MATLAB_READER)) is not None:
+            raise ValueError(why)
+        with np.load(copy.with_suffix(".npz"), allow_pickle=False) as arrays:
+            tree = json.loads(str(arrays["tree"]))
+
+            def built(node: Any) -> Any:
+                if "fields" in node:
+                    return SimpleNamespace(**{name: built(one) for name, one in node["fields"].items()})
+                if "cells" in node:
+                    cells = np.empty(len(node["cells"]), dtype=object)
+                    for place, one in enumerate(node["cells"]):
+                        cells[place] = built(one)
+                    return cells.reshape(node["shape"])
+                return arrays[node["array"]][()]
+
+            if names is None:
+                return {name: built(node) for name, node in tree["variables"].items()}
+            return {name: np.asarray(arrays[tree["whole"][name]], dtype=np.float64) for name in names}
 
 
 def _refuse_larger_matlab(path: Path) -> None:
@@ -138,16 +168,28 @@ def _refuse_larger_matlab(path: Path) -> None:
                 refuse_larger(path, total)
 
 
-def read_all_variables(path: str) -> None:
-    """Load a MATLAB file and drop what comes; the next reader meets its errors, which harm nothing."""
+def unpack_matlab(path: str) -> None:
+    """Write the arrays of a MATLAB file into an .npz beside it, with a tree of its structures and cells."""
+    arrays: dict[str, Any] = {}
+
+    def kept(value: Any) -> Any:
+        if isinstance(value, mat_struct):
+            return {"fields": {name: kept(getattr(value, name)) for name in value._fieldnames}}
+        found = np.asarray(value)
+        if found.dtype == object:
+            return {"cells": [kept(one) for one in found.ravel()], "shape": found.shape}
+        name = f"a{len(arrays)}"
+        arrays[name] = found if found.dtype.kind in "biufUS" else np.zeros(0)
+        return {"array": name}
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        try:
-            loadmat(path, struct_as_record=False, squeeze_me=True)
-        except MemoryError:
-            raise
-        except Exception:  # on damaged files it raises anything
-            return
+        variables = loadmat(path, struct_as_record=False, squeeze_me=True)
+        tree: dict[str, Any] = {"variables": {name: kept(one) for name, one in variables.items()}, "whole": {}}
+        for name, one in loadmat(path).items():
+            if isinstance(one, np.ndarray) and one.dtype.kind in "biuf":
+                tree["whole"][name] = kept(one)["array"]
+    np.savez(Path(path).with_suffix(".npz"), tree=np.array(json.dumps(tree)), **arrays)
 
 
 @contextmanager

@@ -145,11 +145,14 @@ def _trusted_samples(velocity: Array, correlation: Array) -> Mask:
 
     velocity: x, y, z (n, 3) [m/s]; correlation: of the beams (n, beams) [%].
     """
-    known = np.isfinite(velocity).all(axis=1)
-    trusted: Mask = known & ((correlation >= LEAST_CORRELATION) & (correlation <= 100.0)).all(axis=1)
+    known = np.asarray(np.isfinite(velocity).all(axis=1))
+    sound = (correlation >= LEAST_CORRELATION) & (correlation <= 100.0)
+    trusted: Mask = known & np.asarray(sound.all(axis=1))
     for part in velocity.T if known.any() else ():
         off = np.abs(part - np.median(part[known]))
-        trusted &= off <= SPIKE * OF_THE_MEDIAN * max(float(np.median(off[known])), LEAST_DEVIATION)
+        trusted = trusted & np.asarray(
+            off <= SPIKE * OF_THE_MEDIAN * max(float(np.median(off[known])), LEAST_DEVIATION)
+        )
     return trusted
 
 

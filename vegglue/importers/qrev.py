@@ -51,7 +51,7 @@ def _profiles(path: Path, transect: Any, first_bank: str) -> list[BoatProfile]:
     boat = getattr(transect.boatVel, str(transect.boatVel.selected))
     steps = numbers_of_variable(transect.dateTime.ensDuration_sec)
     moved = np.column_stack([numbers_of_variable(one) * steps for one in (boat.uProcessed_mps, boat.vProcessed_mps)])
-    known = np.isfinite(moved).all(axis=1)
+    known = np.asarray(np.isfinite(moved).all(axis=1))
     order = np.arange(known.size)
     if known.any():  # the boat moves on where its own velocity is lost, as it does before and after
         moved = np.column_stack([np.interp(order, order[known], part[known]) for part in moved.T])

@@ -5,7 +5,7 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
@@ -34,6 +34,8 @@ def _with_unit(quantity: str) -> Callable[[Any], Any]:
     """A text such as `42 l/s` as a number in SI; what is no text is left to the checks of numbers."""
 
     def converted(value: Any) -> Any:
+        if isinstance(value, list | dict) and quantity == "discharge":
+            raise ValueError("one number, of the inflow upstream (add others by `inflows` in the config made of it)")
         if not isinstance(value, str):
             return value
         try:
@@ -197,6 +199,19 @@ class SiteFrame(_SitePart):
         return Frame(origin=self.origin, angle=angle or 0.0, crs=self.crs)
 
 
+class ResultEntry(_SitePart):
+    """A finished result of another model, one for each experiment in `files`.
+
+    law: of the roughness in the file; manning: n of all, if the file has none; parameters: others that it was run with.
+    """
+
+    file: PrintableName | None = None
+    files: dict[PrintableName, PrintableName] = {}
+    law: Literal["manning", "strickler", "chezy", "nikuradse"] | None = None
+    manning: Annotated[Number, Field(ge=0.001, le=1.0)] | None = None
+    parameters: dict[str, Number] = {}
+
+
 class FieldSite(_SitePart):
     """All that a site file states; SI."""
 
@@ -205,6 +220,9 @@ class FieldSite(_SitePart):
     grid: SiteGrid | None = None
     frame: SiteFrame | None = None
     classes: FileOfSite | None = None
+    result: Annotated[
+        ResultEntry | None, BeforeValidator(lambda one: {"file": one} if isinstance(one, str) else one)
+    ] = None
     walls: Annotated[FlumeWalls | None, BeforeValidator(_walled)] = None
     files: dict[PrintableName, dict[str, Any] | None] = {}
     experiments: Annotated[dict[PrintableName, MeasuredFlow], AfterValidator(_one_or_more)]
@@ -309,15 +327,18 @@ def held_out_files(folder: Path) -> list[Path]:
     return sorted(found, key=lambda path: (path.name != "holdout.csv", path.name))
 
 
-def read_site(path: Path) -> FieldSite:
-    """The site in a file. InputError, which names file and key, for what is missing, no number or beyond bounds."""
-    if not path.exists():
+def read_site(path: Path, completed: Any = None) -> FieldSite:
+    """The site in a file. InputError, which names file and key, for what is missing, no number or beyond bounds.
+
+    completed: its keys and values with those of a finished result.
+    """
+    if completed is None and not path.exists():
         what = "none in it" if path.parent.is_dir() else "a file" if path.parent.exists() else "no such folder"
         raise InputError(
             f"{shown_path(path.parent)}: expected a folder with site.yaml, or site.json, and tables of measurements, "
             f"got {what}; `vegglue new NAME` makes one to begin with."
         )
-    given = _read_keys(path)
+    given = read_keys(path) if completed is None else completed
     for place, key, missing in _unknown_keys(given):  # the first that is all but a known one which is not given
         close = next(iter(difflib.get_close_matches(key, missing, n=1, cutoff=MISSPELT)), None)
         if close is None and OTHER_WORDS.get(key.lower()) in missing:
@@ -348,13 +369,13 @@ def read_site(path: Path) -> FieldSite:
     return site
 
 
-def assumptions_of_site(folder: Path) -> list[str]:
+def assumptions_of_site(folder: Path, site: FieldSite) -> list[str]:
     """What `import` assumes because the site file does not state it, and what in the folder is not read.
 
-    InputError as `read_site`.
+    site: of the folder. InputError as `read_site`.
     """
     path = site_file(folder)
-    site, given = read_site(path), _read_keys(path)
+    given = read_keys(path) if path.is_file() else {}
     assumed = []
     if "eddy_viscosity_m2_s" not in site.model_fields_set:
         within = f" (standard deviation: a factor of {site.viscosity_factor:g})" if site.viscosity_factor > 1 else ""
@@ -384,7 +405,7 @@ def assumptions_of_site(folder: Path) -> list[str]:
     return lines
 
 
-def _read_keys(path: Path) -> Any:
+def read_keys(path: Path) -> Any:
     """Keys and values of a site file, not checked. InputError."""
     if path.suffix == ".yaml":
         return read_tree(path)

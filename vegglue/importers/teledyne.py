@@ -6,6 +6,9 @@ each ensemble six lines and one for each depth cell.
 """
 
 import math
+import struct
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,8 +21,11 @@ from vegglue.importers.library_files import open_raw, read_by_library, readable_
 from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.transects import DEEPEST_RIVER, FASTEST, BoatProfile, refuse_leaps, stations_of_transect
 
-# How a file of ensembles begins.
-PD0_BEGINS = b"\x7f\x7f"
+# How a file of ensembles begins, and each ensemble; bytes of the shortest one, header and leaders alone.
+PD0_BEGINS, LEAST_ENSEMBLE = b"\x7f\x7f", 100
+# How blocks begin: the fixed leader, and those of the surface layer of a RiverPro or a StreamPro.
+FIXED_LEADER = b"\x00\x00"
+SURFACE_BLOCKS = {bytes([0x10, number]) for number in range(6)}
 INSTEAD = "classic ASCII output from WinRiver"
 # What marks no value in the output of WinRiver, whatever the unit.
 NO_VALUE = -32768.0
@@ -27,75 +33,159 @@ NO_VALUE = -32768.0
 SCALES = {"cm": (1.0, 0.01), "ft": (0.3048, 0.3048)}
 
 
-def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
-    """Stations of a transect. The instrument hangs `draft` below the surface, else as deep as the file has it.
-
-    `declination` turns its compass to true north, beyond what the file does. InputError, also without mhkit.
-    Water over ground is the water against the boat less the bottom against it; the boat moves as the bottom seems to,
-    the other way, x_i = x_(i-1) + u_i (t_i - t_(i-1)), as makers' programs sum it up. Cells that the side lobes of the
-    beams reach are left out: range > R cos(beam angle).
+@dataclass(frozen=True)
+class _RawEnsemble:
+    """Time; draft [m]; bottom against the boat (2,) [m/s]; depth below the instrument [m], 0 for none; ranges of the
+    cells above the side lobes (cells,) [m], and their velocities against the boat (cells, 2) [m/s].
     """
-    with TemporaryDirectory() as folder:
-        data = open_raw(_with_last_ensemble_twice(path, Path(folder)), INSTEAD, named=path)
-    if data.attrs["coord_sys"] != "earth":
-        from mhkit import dolfyn  # which has opened the file
 
-        with read_by_library(path, "velocities to be turned to the earth", "", "export them in earth coordinates"):
-            data = dolfyn.rotate2(data, "earth", inplace=False)
-    if missing := {"vel", "vel_bt", "dist_bt"} - set(data):
-        raise InputError(
-            f"{shown_path(path)}: expected velocities and bottom track, got none of {', '.join(sorted(missing))}; "
-            "without bottom track no boat has a place."
+    time: np.datetime64
+    draft: float
+    bottom: Array
+    depth: float
+    cells: Array
+    water: Array
+
+
+def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
+    """Stations of a raw transect.
+
+    x_i = x_(i-1) + u_i (t_i - t_(i-1)), the boat moving as the bottom seems to, the other way. Water over ground is the
+    water against the boat less the bottom against it. Cells that the side lobes of the beams reach are left out:
+    range > R cos(beam angle).
+
+    Parameters
+    ----------
+    path
+        Velocities in coordinates of the earth, the ship, the instrument or its beams.
+    options
+        `start` of the boat [m]; `draft` of the instrument [m], else that of the file; `declination`, which turns its
+        compass to true north beyond what the file does [degrees].
+
+    Returns
+    -------
+    MeasuredRows
+        Velocities east and north at up to 15 stations, with errors [m/s].
+
+    Raises
+    ------
+    InputError
+        Also without mhkit, without bottom track, and if the boat leaps.
+
+    References
+    ----------
+    WorkHorse Commands and Output Data Format (P/N 957-6156-00).
+    """
+    groups, damaged, of_surface = _sound_ensembles(path.read_bytes())
+    found: list[_RawEnsemble] = []
+    model = ""
+    for group in groups:  # the reader takes all cells for those of the first ensemble, and drops the last ensemble
+        with TemporaryDirectory() as folder:
+            copy = Path(folder) / path.name
+            copy.write_bytes(b"".join([*group, group[-1]]))
+            data = open_raw(copy, INSTEAD, named=path)
+        if missing := {"vel", "vel_bt", "dist_bt"} - set(data):
+            raise InputError(
+                f"{shown_path(path)}: expected velocities and bottom track, got none of {', '.join(sorted(missing))}; "
+                "without bottom track no boat has a place."
+            )
+        model = str(data.attrs["inst_model"])
+        lost = np.abs(data["vel_bt"]) > FASTEST  # -32.768 m/s marks a lost bottom; the reader keeps it
+        data["vel_bt"] = data["vel_bt"].where(~lost)
+        if data.attrs["coord_sys"] == "beam" and str(data.attrs.get("use_3beam", "")) == "yes":
+            for name in ("vel", "vel_bt"):
+                data[name] = (data[name].dims, _by_three_beams(np.asarray(data[name].values, dtype=np.float64)))
+        if data.attrs["coord_sys"] != "earth":
+            from mhkit import dolfyn  # which has opened the file
+
+            with read_by_library(path, "velocities to be turned to the earth", "", "export them in earth coordinates"):
+                data = dolfyn.rotate2(data, "earth", inplace=False)
+        own, beams, bottom, water, cells = (
+            np.asarray(data[name].values, dtype=np.float64) for name in ("depth", "dist_bt", "vel_bt", "vel", "range")
         )
-    own = np.asarray(data["depth"].values, dtype=np.float64)
-    own = np.where((own >= 0.0) & (own <= DEEPEST_RIVER), own, np.nan)
-    own = np.where(np.isnan(own), np.nanmedian(own) if np.isfinite(own).any() else 0.0, own)
-    draft = own if options.draft is None else np.full(own.shape, options.draft)
-    bottom = np.asarray(data["vel_bt"].values, dtype=np.float64)[:2]
-    # -32.768 m/s marks a lost bottom; the reader keeps it.
-    known = np.isfinite(bottom).all(axis=0) & (np.abs(np.nan_to_num(bottom)) <= FASTEST).all(axis=0)
+        own = np.where((own >= 0.0) & (own <= DEEPEST_RIVER), own, np.nan)
+        beams = np.where((beams > 0.0) & (beams <= DEEPEST_RIVER), beams, np.nan)  # 0 marks a lost beam
+        half, slant = 0.5 * float(data.attrs["cell_size"]), math.cos(math.radians(float(data.attrs["beam_angle"])))
+        for i, time in enumerate(data["time"].values):
+            seen = beams[np.isfinite(beams[:, i]), i]
+            reached = cells + half <= (float(seen.min()) * slant if seen.size else 0.0)
+            depth = float(seen.mean()) if seen.size else 0.0
+            found.append(_RawEnsemble(time, own[i], bottom[:2, i], depth, cells[reached], water[:2, reached, i].T))
+    found.sort(key=lambda one: one.time)
+    bottoms = np.array([one.bottom for one in found])
+    known = (np.isfinite(bottoms) & (np.abs(np.nan_to_num(bottoms)) <= FASTEST)).all(axis=1)
     if not known.any():
         raise InputError(
             f"{shown_path(path)}: expected bottom track, got none in {known.size} ensembles; without it no boat has a "
             "place. Export classic ASCII output with GPS as reference from WinRiver."
         )
-    time = (data["time"].values - data["time"].values[0]) / np.timedelta64(1, "s")
-    track = np.cumsum(-bottom[:, known] * np.diff(time[known], prepend=time[known][:1]), axis=1)
-    places = _to_true_north(track.T, options.declination)
-    beams = np.asarray(data["dist_bt"].values, dtype=np.float64)[:, known]
-    beams = np.where((beams > 0.0) & (beams <= DEEPEST_RIVER), beams, np.nan)  # 0 marks a lost beam
-    cells = np.asarray(data["range"].values, dtype=np.float64)
-    size, slant = float(data.attrs["cell_size"]), math.cos(math.radians(float(data.attrs["beam_angle"])))
-    water = np.asarray(data["vel"].values, dtype=np.float64)[:2, :, known] - bottom[:, None, known]
-    profiles = [BoatProfile((np.nan, np.nan), 0.0, np.zeros(0), np.zeros((0, 2)))] * int((~known).sum())
-    for i, (deep, (x, y)) in enumerate(zip(draft[known], places.tolist(), strict=True)):
-        seen = beams[:, i][np.isfinite(beams[:, i])]
-        reach = float(seen.min()) * slant if seen.size else 0.0
-        velocity = _to_true_north(water[:, :, i].T, options.declination)
-        good = np.isfinite(velocity).all(axis=1) & (cells + 0.5 * size <= reach)
-        depth = float(seen.mean()) + float(deep) if seen.size else 0.0
-        profiles.append(BoatProfile((x, y), depth, depth - deep - cells[good], velocity[good]))
+    own = np.array([one.draft for one in found])
+    usual = float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0
+    draft = np.where(np.isnan(own), usual, own) if options.draft is None else np.full(own.shape, options.draft)
+    time = np.array([(one.time - found[0].time) / np.timedelta64(1, "s") for one in found])
+    track = np.cumsum(-bottoms[known].T * np.diff(time[known], prepend=time[known][:1]), axis=1)
+    places = iter(_to_true_north(track.T, options.declination).tolist())
+    profiles = []
+    for one, deep, is_known in zip(found, draft.tolist(), known.tolist(), strict=True):
+        if not is_known:
+            profiles.append(BoatProfile((np.nan, np.nan), 0.0, np.zeros(0), np.zeros((0, 2))))
+            continue
+        velocity = _to_true_north(one.water - one.bottom, options.declination)
+        good = np.isfinite(velocity).all(axis=1)
+        depth = one.depth + deep if one.depth > 0.0 else 0.0
+        east, north = next(places)
+        profiles.append(BoatProfile((east, north), depth, depth - deep - one.cells[good], velocity[good]))
     refuse_leaps(path, profiles)
-    turned = f", turned by a declination of {options.declination:g} degrees" if options.declination else ""
-    form = f"PD0 of a {data.attrs['inst_model']} {float(np.median(draft)):.3g} m below the surface{turned}"
+    form = f"PD0 of a {model} {float(np.median(draft)):.3g} m below the surface"
+    form += f", turned by a declination of {options.declination:g} degrees" if options.declination else ""
+    form += f", {damaged} damaged left out" if damaged else ""
+    form += ", cells of the surface layer left out" if of_surface else ""
     return stations_of_transect(path, options, profiles, form)
 
 
-def _with_last_ensemble_twice(path: Path, folder: Path) -> Path:
-    """A copy of a file whose last whole ensemble stands there again: the reader drops the last one that it meets.
+def _sound_ensembles(content: bytes) -> tuple[list[list[bytes]], int, bool]:
+    """Whole ensembles with a right check sum, those with the same cells together; how many are damaged; and whether
+    blocks of a surface layer were taken out, whose cells of another size the reader misplaces.
 
-    Each ensemble begins with its mark and its number of bytes, without the check sum of two behind it.
+    Each ensemble begins with its mark, its number of bytes without the check sum, and the places of its blocks.
     """
-    content = path.read_bytes()
-    at = last = 0
-    while content[at : at + 2] == PD0_BEGINS and at + 4 <= len(content):
-        end = at + int.from_bytes(content[at + 2 : at + 4], "little") + 2
-        if end > len(content):
-            break
-        last, at = at, end
-    copy = folder / path.name
-    copy.write_bytes(content[:at] + content[last:at] if at else content)
-    return copy
+    groups: dict[bytes, list[bytes]] = {}
+    at = damaged = 0
+    of_surface = False
+    while at + 4 <= len(content):
+        size = int.from_bytes(content[at + 2 : at + 4], "little")
+        whole = content[at : at + size + 2]
+        if (
+            size < LEAST_ENSEMBLE
+            or len(whole) < size + 2
+            or int.from_bytes(whole[size:], "little") != sum(whole[:size]) & 0xFFFF
+        ):
+            damaged += content[at : at + 2] == PD0_BEGINS
+            at = content.find(PD0_BEGINS, at + 1)
+            if at < 0:
+                break
+            continue
+        at += size + 2
+        starts = [int.from_bytes(whole[6 + 2 * i : 8 + 2 * i], "little") for i in range(whole[5])]
+        blocks = [whole[a:b] for a, b in pairwise([*starts, size - 2])]
+        kept = [block for block in blocks if block[:2] not in SURFACE_BLOCKS]
+        if len(kept) < len(blocks):
+            of_surface = True
+            ends = np.cumsum([6 + 2 * len(kept), *map(len, kept)]).tolist()
+            whole = struct.pack("<HHBB", 0x7F7F, ends[-1] + 2, whole[4], len(kept))
+            whole += struct.pack(f"<{len(kept)}H", *ends[:-1]) + b"".join(kept) + bytes(2)
+            whole += struct.pack("<H", sum(whole) & 0xFFFF)
+        leader = next((block for block in kept if block[:2] == FIXED_LEADER), b"")
+        groups.setdefault(leader[9:10] + leader[12:14] + leader[32:34], []).append(whole)  # count, size and first range
+    return [*groups.values()] or [[content]], damaged, of_surface
+
+
+def _by_three_beams(beams: Array) -> Array:
+    """Velocities (4, ...) along the beams, a lost one of four from b1 + b2 - b3 - b4 = 0, no error of velocity."""
+    signs = np.array([1.0, 1.0, -1.0, -1.0]).reshape(-1, *[1] * (beams.ndim - 1))
+    lost = np.isnan(beams)
+    rest = -signs * np.nansum(signs * beams, axis=0)
+    return np.where(lost & (lost.sum(axis=0) == 1), rest, beams)
 
 
 def _to_true_north(vectors: Array, declination: float) -> Array:
@@ -115,7 +205,8 @@ def is_winriver(text: str) -> bool:
 
 def read_winriver(path: Path, options: FileOptions) -> MeasuredRows:
     """Stations of a transect. InputError."""
-    lines = [line for line in readable_text(path).splitlines() if line.strip()]
+    text = readable_text(path).replace(",", ".")  # decimal commas: spaces part the fields
+    lines = [line for line in text.splitlines() if line.strip()]
     profiles, at = [], 3
     while at + 6 <= len(lines):
         try:

@@ -69,6 +69,8 @@ SPREAD_OF_SECTION = 1.0
 SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0
 NO_LEVEL = -9999
 MOST_LEVELS = 10 * MOST_CELLS  # of some eight bytes each; a case reads no larger file
+# Kind and name of the file of a bed: on a straight grid, and along a centreline.
+BED_FILES = (("raster", "bed.asc"), ("points", "bed.csv"))
 # Most points in no line of which each is left out in turn.
 MOST_LEFT_OUT = 100
 BANK = "bank"
@@ -122,8 +124,8 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
     sections = bool(given.pop("sections", False))
     options = read_file_options(given, f"{shown_path(folder)}: `bed`")
     terrain = read_terrain(path, place, options, sections)
-    grid = _grid_of(path, terrain, site.grid or SiteGrid(), place)
-    kind, file = ("raster", "bed.asc") if place.line is None else ("points", "bed.csv")
+    grid = grid_of_terrain(path, terrain, site.grid, place)
+    kind, file = BED_FILES[place.line is not None]
     text, beyond = _bed_text(terrain, grid, place)
     texts = {data_folder(target) / file: text}
     layer: Tree = {kind: f"{data_folder(target).name}/{file}"}
@@ -158,6 +160,14 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
             taken += f"; no bank, as it is nowhere steeper than {steeper:g}, half the stated slope of the banks"
     tree = {"grid": grid, "bed": [layer], "friction": friction}
     return Ground(tree, [record(path, None, taken), *imported], texts, terrain.level)
+
+
+def ground_on_grid(target: Path, terrain: Terrain, grid: Tree, friction: Tree, place: Placement) -> Ground:
+    """The ground of a terrain on a grid with this friction; its bed is written beside the config `target`."""
+    kind, file = BED_FILES[place.line is not None]
+    text, _ = _bed_text(terrain, grid, place)
+    tree = {"grid": grid, "bed": [{kind: f"{data_folder(target).name}/{file}"}], "friction": friction}
+    return Ground(tree, [], {data_folder(target) / file: text}, terrain.level)
 
 
 def mapped_classes(folder: Path, site: FieldSite, place: Placement) -> tuple[Tree, list[Tree]]:
@@ -203,9 +213,10 @@ def _file_of(folder: Path, given: FileOfSite | None, key: str) -> Path:
     return folder / name
 
 
-def _grid_of(path: Path, terrain: Terrain, given: SiteGrid, place: Placement) -> Tree:
+def grid_of_terrain(path: Path, terrain: Terrain, asked: SiteGrid | None, place: Placement) -> Tree:
     """The grid of the site file, else of the extent of the survey; along a centreline no further than the line goes."""
     west, east, south, north = terrain.extent
+    given = asked or SiteGrid()
     if place.line is not None:
         west, east = max(west, 0.0), min(east, float(place.line.s[-1]))
         if given.y is None and path.suffix.lower() in RASTERS:
@@ -213,7 +224,7 @@ def _grid_of(path: Path, terrain: Terrain, given: SiteGrid, place: Placement) ->
                 f"{shown_path(path)}: expected `grid.y`, how far the grid reaches to the right and to the left of its "
                 "centreline, as a raster lies on both sides of it; add it."
             )
-    x = list(given.x or (round(west, 4), round(east, 4)))
+    x = list(given.x or (round(west, 4) + 0.0, round(east, 4) + 0.0))  # no -0.0
     y = list(given.y or (round(south, 4), round(north, 4)))
     for key, (low, high) in (("x", x), ("y", y)):
         if not high > low:

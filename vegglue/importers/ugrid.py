@@ -98,10 +98,9 @@ def read_ugrid(path: Path) -> ModelResult:
                 notes.append(f"{int((~keep).sum())} ghost cells of other partitions left out")
         roughness: Array | None = None
         kind: RoughnessKind = "not-stated"
-        for name, of in (("czs", "chezy"), ("roughness_manning", "manning")):
-            one = variables.get(f"{mesh}_{name}")
-            if one is not None and at_faces and one.shape[-1] == faces:
-                roughness, kind = one.values(times), of  # type: ignore[assignment]
+        chezy = variables.get(f"{mesh}_czs")
+        if chezy is not None and at_faces and chezy.shape[-1] == faces:
+            roughness, kind = chezy.values(times), "chezy"
         time = variables.get("time")
         more: dict[str, Any] = {"corners": nodes, "crs": _system(variables), "notes": tuple(notes)}
         more["roughness_kind"] = kind

@@ -166,7 +166,7 @@ def findings(run: Run) -> list[tuple[object, bool]]:
         if not run.ensemble.by_command:
             worst = largest_mass_error(run.ensemble)
             found.append((MassError(worst), worst >= MASS_LIMIT))
-    if case.engine is not None:
+    if case.of_another_model:
         found.append((FlowOfBuiltInEngine(), False))
     return sorted(found, key=lambda one: not one[1])
 

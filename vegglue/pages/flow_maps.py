@@ -309,7 +309,7 @@ def plans(run: Run, experiment: str) -> Iterator[Picture]:
     """The reach of patches and stations, and the whole channel."""
     flow, table, planted = run.flow[experiment], run.observations.table, planted_cells(run, experiment)
     called = told_apart({name: file_name(name) for name in run.case.experiments})[experiment]
-    rows, built_in = table[table["experiment"] == experiment], run.case.engine is not None
+    rows, built_in = table[table["experiment"] == experiment], run.case.of_another_model
     stations, note = rows[["x", "y"]].drop_duplicates().to_numpy(float), SYNTHETIC if is_synthetic(run.case) else ""
     here = [run.case.plants.patches[index] for index in np.unique(run.site.patch[planted])]
     patches = [Outline(patch.name, corners_of(run.case, patch)) for patch in here]

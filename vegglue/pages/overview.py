@@ -149,6 +149,14 @@ def render_overview(folder: Path, runs: Sequence[Run]) -> str:
         if run.behind is not None and first not in loops:
             title, name = run.case.title or run.case.name, run.case.name
             loops[first] = LoopOfOverview(file_name(name), title, f"{name}/report.html", answer_of(run))
+    rows = []
+    for run in runs:
+        posterior, ensemble, name = run.posterior, run.ensemble, run.case.name
+        refined, members = posterior.refinement is not None, 0 if ensemble is None else len(ensemble.status)
+        rows.append(OverviewRow(
+            name, run.case.title, f"{name}/report.html", headline_lines(run), refined, members,
+            posterior.sample.members if refined else 0, max(posterior.weighting.effective_size, 1.0),
+        ))  # fmt: skip
     shared = list(_shared_parameters(runs))
     shown = [run for _, those in shared for run in those]
     light, dark = palette_css()
@@ -157,20 +165,11 @@ def render_overview(folder: Path, runs: Sequence[Run]) -> str:
         light=light,
         dark=dark,
         loops=list(loops.values()),
-        rows=[_run_row(run) for run in runs],
+        rows=rows,
         compared=[_side_by_side(folder, name, those) for name, those in shared],
         others=any(run.case.reference for run in shown),
         first_looks=any(not run.posterior.claimed for run in shown),
     )
-
-
-def _run_row(run: Run) -> OverviewRow:
-    posterior, ensemble, name = run.posterior, run.ensemble, run.case.name
-    refined, members = posterior.refinement is not None, 0 if ensemble is None else len(ensemble.status)
-    return OverviewRow(
-        name, run.case.title, f"{name}/report.html", headline_lines(run), refined, members,
-        posterior.sample.members if refined else 0, max(posterior.weighting.effective_size, 1.0),
-    )  # fmt: skip
 
 
 def _shared_parameters(runs: Sequence[Run]) -> Iterator[tuple[str, list[Run]]]:

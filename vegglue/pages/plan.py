@@ -19,7 +19,7 @@ from vegglue.results.plan_files import FieldFiles, FieldPlace, field_places
 from vegglue.wording.sentences import page_document, phrase
 
 # The map [px]: its width, letters, and room beside it; its height over its width is between these.
-MAP_WIDTH, PLAN_LETTERS, BESIDE, MAP_FOOT, MAP_HEAD = 960.0, 13.0, 44.0, 34.0, 22.0
+MAP_WIDTH, PLAN_LETTERS, BESIDE, MAP_MARGIN, MAP_FOOT, MAP_HEAD = 960.0, 13.0, 44.0, 18.0, 34.0, 22.0
 FLATTEST, STEEPEST_LABEL = 0.22, 0.5
 # Chances are drawn for so many cells along and across at most, in steps of a third.
 MAP_CELLS_ALONG, MAP_CELLS_ACROSS, BED_SHADES = 80, 24, 3
@@ -139,9 +139,9 @@ def draw_plan_map(
     wet = site.grid.y[water.any(axis=0)]
     if wet.size:
         south, north = max(south, float(wet[0]) - site.grid.dy), min(north, float(wet[-1]) + site.grid.dy)
-    inner = MAP_WIDTH - BESIDE - 8.0
+    inner = MAP_WIDTH - BESIDE - MAP_MARGIN
     height = float(np.clip((north - south) / (east - west), FLATTEST, STEEPEST_LABEL)) * inner
-    along = linear_scale(west, east, BESIDE, MAP_WIDTH - 8.0)
+    along = linear_scale(west, east, BESIDE, MAP_WIDTH - MAP_MARGIN)
     across = linear_scale(south, north, MAP_HEAD + height, MAP_HEAD)
 
     def path(x: Iterable[float], y: Iterable[float]) -> str:
@@ -185,7 +185,7 @@ def draw_plan_map(
         parts.append(svg_words(float(along(tick)), foot + 18.0, words, "muted", text_anchor="middle"))
     for tick, words in zip(ticks := round_ticks(south, north, 5), tick_labels(ticks), strict=True):
         parts.append(svg_words(BESIDE - 8.0, float(across(tick)) + 4.0, words, "muted", text_anchor="end"))
-    parts.append(svg_words(MAP_WIDTH - 8.0, foot + 32.0, phrase("label", "along"), "muted", text_anchor="end"))
+    parts.append(svg_words(MAP_WIDTH - MAP_MARGIN, foot + 32.0, phrase("label", "along"), "muted", text_anchor="end"))
     parts.append(svg_words(0.0, MAP_HEAD - 6.0, phrase("label", "y_in_metres"), "muted"))
     return svg_document(MAP_WIDTH, foot + MAP_FOOT + 4.0, parts, title, PLAN_LETTERS)
 

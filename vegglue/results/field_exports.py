@@ -3,7 +3,9 @@
 import csv
 import io
 import re
+import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -191,11 +193,18 @@ def _mapped(frame: Frame | None) -> dict[str, str]:
 
 
 def _system(frame: Frame | None) -> dict[str, Any]:
-    """The coordinate system by its code, where the frame names one; and the frame itself."""
+    """The coordinate system by its code and, with pyproj, as CF has it (grid_mapping_name, crs_wkt); and the frame."""
     if frame is None:
         return {"long_name": "coordinates of the model"}
     code = epsg_code(frame)
-    of_code = {"epsg": np.int32(code), "epsg_code": f"EPSG:{code}"} if code else {}
+    of_code: dict[str, Any] = {"epsg": np.int32(code), "epsg_code": f"EPSG:{code}"} if code else {}
+    with suppress(ImportError):
+        from pyproj import CRS
+        from pyproj.exceptions import CRSError
+
+        with suppress(CRSError), warnings.catch_warnings():  # a code that it does not know
+            warnings.simplefilter("ignore")  # of what CF has no word for; crs_wkt has it
+            of_code = (CRS.from_epsg(code).to_cf() if code else {}) | of_code
     origin = np.array(frame.origin)
     return {"long_name": frame.crs or "coordinates of the map", **of_code, "origin": origin, "angle": frame.angle}
 

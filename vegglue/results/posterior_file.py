@@ -135,16 +135,14 @@ def _fields_from(kind: type, group: Mapping[str, np.ndarray], stated: Mapping[st
     """Arguments that make a value of this kind again, but for those that are no field of the group or attribute."""
     hints = get_type_hints(kind)
     own = {name: stated_as(hint, stated, prefix + name) for name, hint in _plain(kind).items()}
-    own |= {name: _array(group, name, stored, hints[name]) for name, stored in stored_fields(kind).items()}
+    for name, stored in stored_fields(kind).items():
+        own[name] = group[name]
+        if get_origin(hints[name]) is dict:
+            entry = get_args(hints[name])[1]
+            convert = entry if entry in (str, float, bool) else np.asarray
+            keys = names_of(group, stored.dims[0])
+            own[name] = {key: convert(value) for key, value in zip(keys, group[name], strict=True)}
     return own | {name: inner(**_fields_from(inner, group, stated, prefix)) for name, inner in _values_in(kind).items()}
-
-
-def _array(group: Mapping[str, np.ndarray], name: str, stored: Stored, hint: Any) -> Any:
-    if get_origin(hint) is not dict:
-        return group[name]
-    entry = get_args(hint)[1]
-    convert = entry if entry in (str, float, bool) else np.asarray
-    return {key: convert(value) for key, value in zip(names_of(group, stored.dims[0]), group[name], strict=True)}
 
 
 def _arviz_groups(posterior: Posterior) -> dict[str, Group]:

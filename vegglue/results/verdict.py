@@ -479,6 +479,33 @@ class CommandCompared:
     careful: bool
 
 
+@dataclass(frozen=True)
+class ResultCompared:
+    """The flow of a finished run of another model beside the built-in engine's with the same parameters, over all wet
+    cells.
+
+    code: the program; velocity_share: rms difference of the velocity vector over its mean size [-]; level_share: that
+    of the level over the mean depth [-]; area_share: cells that are wet in one flow only, over those wet in theirs [-];
+    velocity, level: the rms differences [m/s, m]; beyond_mesh: cells wet in ours where they have no mesh, over those
+    wet in theirs [-]; discharge_spread: standard deviation of their discharge along the channel over its mean [-];
+    measured: rms difference of theirs, as it is, from the measured velocities [m/s], NaN without any; alike: whether
+    all shares are within their limits, so that a diagnosis may use slopes of the built-in engine; limits: of the three
+    shares [-].
+    """
+
+    code: str
+    velocity_share: float
+    level_share: float
+    area_share: float
+    velocity: float
+    level: float
+    beyond_mesh: float
+    discharge_spread: float
+    measured: float
+    alike: bool
+    limits: tuple[float, float, float]
+
+
 Note = (
     DischargeMismatch
     | MisfitTooSmall
@@ -501,6 +528,7 @@ Note = (
     | TooShallow
     | MisfitRemains
     | CommandCompared
+    | ResultCompared
 )
 
 

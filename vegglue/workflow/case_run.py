@@ -50,8 +50,8 @@ SAME_FIT = 1.0
 # Parts of a case that its measurements and its site do not depend on: a child differs from its parent in these alone.
 OF_THE_MODEL_ALONE = {
     "source", "name", "title", "eddy_viscosity", "effects", "exclude", "effect_file", "engine", "parameters",
-    "imported", "numerics", "simulate", "infer", "model_error", "validation", "reference", "canopy_correction",
-    "planned",
+    "finished_result", "imported", "numerics", "simulate", "infer", "model_error", "validation", "reference",
+    "canopy_correction", "planned",
 }  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from vegglue.case.case_effects import effect_of
 from vegglue.case.schema import Case
 from vegglue.diagnosis.case_check import check_case, critical_remarks
 from vegglue.effects.library import effects_of
+from vegglue.engine.finished import compared_flows
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
@@ -75,6 +76,8 @@ def check(case: Case | CaseRun, *, runs: Path | str = "runs") -> CheckedCase:
     case, observations, site = run.case, run.observations, run.site
     picture = run.folder / "channel.png"
     remarks: list[object] = [*check_case(case, site, observations), *beyond_seen(run)]
+    if case.finished_result is not None:
+        remarks.insert(0, compared_flows(run.model).agreement)
     save_channel_figure(case, site, observations, picture)
     if case.engine is not None:
         remarks.append(command_tried(run.model, run.folder))

@@ -1,4 +1,5 @@
-"""Models of a case whose `engine` is a command: linearised from its predictions where it fits best.
+"""Models of a case that another model predicts: a command of `engine`, linearised from its predictions where it fits
+best, or a finished run.
 
 runs/<name>/engine/place.json holds that place and the hash of the case; all runs of the command lie beside it.
 """
@@ -16,18 +17,22 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.engine.command import CommandEnd, command_predictions, command_runs, ended_runs
-from vegglue.engine.corrected import corrected, correction_at, without_effects
+from vegglue.engine.corrected import corrected, correction_at, with_correction, without_effects
+from vegglue.engine.finished import compared_flows
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.errors import InputError, shown_path
 from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.progress import Watch
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.verdict import CommandCompared, CommandDiffers, CommandNotSettled
+from vegglue.results.verdict import CommandCompared, CommandDiffers, CommandNotSettled, ResultCompared
 from vegglue.wording.phases import COMMAND_ONCE_MORE
 from vegglue.wording.remedies import MAKE_ROOM
 
-PLACE_FILE = "place.json"
+PLACE_FILE, FINISHED = "place.json", "finished"
+# Standard deviation of the discharge along the channel over its mean [-], above which a flow is not at rest. Chosen:
+# what is lost by interpolation between the cells of a mesh is some per cent.
+SPREAD_OF_STEADY = 0.05
 # Difference between the command and its linear model [standard errors, root mean square] above which sizes and chances
 # are taken with care. Chosen, not measured: half an error hardly moves a score.
 CLOSE_ENOUGH = 0.5
@@ -79,17 +84,44 @@ class CommandTried:
 
 
 def with_command(model: Model, folder: Path, watch: Watch) -> Model:
-    """The model with the engine of its command, if its case has one; folder: of the results of the case.
+    """The model with the engine of its command or of its finished run, if its case has one; folder: of its results.
 
-    Raises InputError when the command cannot be run, or fails where it fits best.
+    Raises InputError when the command cannot be run, or fails where it fits best, and when the flow of the finished run
+    is too far from the built-in engine's.
     """
-    return model if model.case.engine is None else place_of_command(model, folder, watch).model
+    if model.case.engine is not None:
+        return place_of_command(model, folder, watch).model
+    if model.case.finished_result is None:
+        return model
+    found = compared_flows(model)
+    refuse_unlike(model.case, found.agreement)
+    return replace(model, engine=with_correction(found.correction, FINISHED))
+
+
+def refuse_unlike(case: Case, found: ResultCompared) -> None:
+    """Raise InputError if the flow of a finished run is beyond the limits of its difference from the built-in one."""
+    if found.alike:
+        return
+    shares = (found.velocity_share, found.level_share, found.area_share)
+    words = ("of the velocity", "of the depth in level", "of the wet area")
+    worst = max(range(3), key=lambda one: shares[one] / found.limits[one])
+    hint = "complete bed, roughness and plants, or see `vegglue check`"
+    if found.beyond_mesh > 0.5 * found.limits[2]:
+        hint = f"{100 * found.beyond_mesh:.0f} % of it lies beyond their mesh, so narrow `grid`"
+    elif found.discharge_spread > SPREAD_OF_STEADY:
+        hint = f"its discharge varies by {100 * found.discharge_spread:.0f} % along the channel, so run it to rest"
+    raise InputError(
+        f"{shown_path(case.source)}: expected a flow within {100 * found.limits[worst]:.0f} % {words[worst]} of "
+        f"`finished_result`, got {100 * shares[worst]:.0f} %; {hint}."
+    )
 
 
 def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch) -> Model:
     """The model at held-out stations, with the command linearised there at the place of `model`."""
     if model.case.engine is None:
-        return unseen
+        if model.case.finished_result is None:
+            return unseen
+        return replace(unseen, engine=with_correction(compared_flows(unseen).correction, FINISHED))
     runs = command_runs(model.case, folder)
     correction = correction_at(runs, unseen, place_of_command(model, folder, watch).z, watch)
     return replace(unseen, engine=corrected(correction, runs, watch))
@@ -98,10 +130,14 @@ def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch)
 def with_command_compared(found: Diagnosis, model: Model, folder: Path, watch: Watch) -> Diagnosis:
     """The diagnosis with a first note on how far the command is from its linear model at the last parameters.
 
-    The command is run once more for it. A verdict on numbers that the command does not give is not believed.
+    The command is run once more for it. A verdict on numbers that the command does not give is not believed. With a
+    finished run, the note is how far its flow is from the built-in engine's.
     """
     if model.case.engine is None:
-        return found
+        if model.case.finished_result is None:
+            return found
+        beside = compared_flows(model).agreement
+        return replace(found, verdict=replace(found.verdict, notes=(beside, *found.verdict.notes)))
     place, runs = place_of_command(model, folder, watch), command_runs(model.case, folder)
     bare = replace(without_effects(model), engine=place.model.engine)
     theta = {name: found.parameters.last[name][0] for name in bare.names}
@@ -174,9 +210,10 @@ def command_tried(model: Model, folder: Path) -> CommandTried:
 
 def refuse_command(case: Case, verb: str) -> None:
     """Raise InputError for a case with an `engine`, in a verb that needs the built-in one."""
-    if case.engine is not None:
+    if case.of_another_model:
+        key = "engine" if case.engine is not None else "finished_result"
         raise InputError(
-            f"{shown_path(case.source)}: `{verb}` works with the built-in engine only; take `engine` out of the config."
+            f"{shown_path(case.source)}: `{verb}` works with the built-in engine only; take `{key}` out of the config."
         )
 
 

@@ -23,6 +23,8 @@ from vegglue.results.model_comparison import ComparedModel, ModelComparison, Mod
 from vegglue.wording.numbers import in_short, in_short_html, so_many
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run, excluded_in_all
 
+# What the name of a case with a finished result ends with when the built-in engine predicts.
+BUILT_IN = "-built-in"
 # On which errors hang that are set side by side, of each station.
 ALIKE_IN_ALL = [*MEASUREMENT, "standard_error", "used"]
 
@@ -58,7 +60,7 @@ def compare(
     Parameters
     ----------
     cases : sequence of Case or CaseRun
-        The baseline first.
+        The baseline first. One case with a finished result is set beside the same case of the built-in engine.
     runs : Path or str
         Folder that holds the folders of runs.
     jobs : int
@@ -77,6 +79,10 @@ def compare(
         error.
     """
     several = [case_run(case, runs, jobs, watch) for case in cases]
+    if len(several) == 1 and several[0].case.finished_result is not None:  # theirs beside ours
+        theirs = several[0].case
+        own = {"finished_result": None, "name": f"{theirs.name}{BUILT_IN}", "title": f"{theirs.title}, built-in engine"}
+        several.insert(0, several[0].of(theirs.model_copy(update=own)))
     hashes = [run.config_hash for run in several]  # before anything is read, see CaseRun.config_hash
     refuse_other_measurements(several)
     aside, model_scores = excluded_in_all(several), []

@@ -189,13 +189,13 @@ def export_to_spotpy(run: CaseRun) -> Exported:
     members: dict[str, tuple[Mapping[str, Array], Array, Array]] = {}
     if ensemble is not None:
         solved = solved_rows(ensemble)
-        theta = {name: values[solved] for name, values in ensemble.parameters.items()}
-        members["ensemble"] = theta, ensemble.prediction[solved], np.ones(len(solved))
+        of_ensemble = {name: values[solved] for name, values in ensemble.parameters.items()}
+        members["ensemble"] = of_ensemble, ensemble.prediction[solved], np.ones(len(solved))
     if posterior is not None:
         chains, draws = posterior.predicted.draws.shape
         drawn = posterior.predicted.draws.ravel()
-        theta = {name: values[drawn] for name, values in posterior.sample.theta.items()}
-        members["posterior"] = theta, posterior.sample.prediction[drawn], np.repeat(np.arange(1, chains + 1), draws)
+        of_draws = {name: values[drawn] for name, values in posterior.sample.theta.items()}
+        members["posterior"] = of_draws, posterior.sample.prediction[drawn], np.repeat(np.arange(1, chains + 1), draws)
     table = without_stations(run.observations.table, excluded_in(run))
     valued = table["value"].notna().to_numpy()
     names, into = pest_names(case.parameters, LONGEST_IN_FILES), folder_within(run.folder, "export/spotpy")

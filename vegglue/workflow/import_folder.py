@@ -30,6 +30,8 @@ from vegglue.importers.confluence import (
     tables_of_mat,
 )
 from vegglue.importers.field_folder import case_from_folder, case_from_sheet, case_of_sheet
+from vegglue.importers.finished_results import holds_result
+from vegglue.importers.result_site import SiteOfResult, site_of
 from vegglue.importers.site_file import assumptions_of_site, site_file
 from vegglue.measurements.observations import read_observations
 from vegglue.wording.remedies import ANOTHER_FILE, ROOM_FOR_TEMPORARY
@@ -84,8 +86,9 @@ def assumptions_of(folder: Path | str) -> list[str]:
     folder = Path(folder)
     if case_of_sheet(folder) is not None:  # of a case that is there
         return []
-    if site_file(folder).is_file():
-        return assumptions_of_site(folder)
+    if site_file(folder).is_file() or (folder.is_dir() and any(map(holds_result, folder.iterdir()))):
+        found = site_of(folder)
+        return assumptions_of_site(folder, found.site if isinstance(found, SiteOfResult) else found)
     return list(NOT_STATED) if holds_confluence(folder) or mat_folder(folder) is not None else []
 
 

@@ -75,7 +75,7 @@ def run(
     draw_ladder_of(extension.comparison, last)
     # A law is searched where none of the known effects explains the misfit and it is not at a place, or one stands out.
     acts_all_over = found.law_stands_out or (found.verdict.kind == "none-of-these" and not found.places)
-    if last is whole and acts_all_over and whole.case.engine is None:
+    if last is whole and acts_all_over and not whole.case.of_another_model:
         last = with_a_law(whole, extension.comparison, show)
     if last is not whole:
         show(last.case, diagnose(last))

@@ -21,6 +21,7 @@ from vegglue.results.result_files import read_ensemble, stored_hash
 from vegglue.results.resume import remove_left_over_fields
 from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.workflow.case_run import CaseRun, case_run, other_size
+from vegglue.workflow.command_model import refuse_command
 
 
 @one_thread()
@@ -73,6 +74,8 @@ def simulate(
         return simulate_given(case_run(case, runs, jobs, watch, force), Path(parameters))
     run = case_run(case, runs, jobs, watch, force).sized(members)
     path = run.folder / "ensemble.h5"
+    if run.case.engine is None:
+        refuse_command(run.case, "simulate")  # of a finished run: `infer` draws its posterior without members
     refuse_to_shrink(run)
     if not is_simulated(run):
         share_one_beside(run)

@@ -1,0 +1,114 @@
+"""A finished result of another code, imported and diagnosed: the second solver's flow, written in formats of others.
+
+The code of others has the second solver's scheme on its own cells and no secondary current; nature, which the same
+solver makes on finer cells, has one. What is judged is the misfit of the finished result.
+"""
+
+from pathlib import Path
+
+import blind_truth
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from blind_truth import perfect_site, true_values
+from result_files import GridFlow, write_hec_ras, write_selafin
+from second_channel import SHORT
+from site_reach import EDDY_VISCOSITY, bed_level, centres, steady_flow
+from test_second_engine import CELLS, HIDDEN, small_twin
+
+import vegglue
+from vegglue.case.config import load_case
+from vegglue.case.schema import Case
+from vegglue.measurements.observations import read_observations
+from vegglue.results.verdict import ResultCompared
+
+# What the code of others was run with, and what is true.
+STATED = {"n_b": 0.03, "k_s": 0.5, "phi": 2.0, "canopy_height": 0.7, "eddy_viscosity": EDDY_VISCOSITY}
+WRITERS = {
+    "HEC-RAS": (write_hec_ras, "p01.hdf", {}),
+    "TELEMAC": (write_selafin, "slf", {"law": "manning"}),
+}
+ORIGIN, ANGLE = (683000.0, 247000.0), 30.0
+
+
+def result_of(case: Case, experiment: str) -> GridFlow:
+    """The flow of one experiment on the cells of the mesh, with Manning's n of the laws of bed and banks there."""
+    setting = case.experiments[experiment]
+    level, discharge = float(setting.level), float(next(iter(setting.discharge.values())))
+    truth = perfect_site(case, "twin", STATED, 0).truth
+    flow = steady_flow(truth, discharge, level, CELLS, 1e-5)
+    x, y = centres(CELLS, level, SHORT)
+    depth = np.where(flow.h > 0.005, flow.h, 0.0)
+    chezy = 18.0 * np.log10(np.maximum(12.0 * np.maximum(depth, 1e-3) / STATED["k_s"], 1.3))
+    n = np.where(np.abs(y) > SHORT.half, np.maximum(depth, 1e-3) ** (1 / 6) / chezy, STATED["n_b"])
+    edges = [
+        np.append(one.ravel() - size / 2, one.ravel()[-1] + size / 2) for one, size in zip((x, y), CELLS, strict=True)
+    ]
+    return GridFlow(*edges, bed_level(x, y, truth), depth, flow.u, flow.v, n, ORIGIN, ANGLE)
+
+
+def folder_of_user(folder: Path, code: str, hidden: dict[str, dict[str, float]], flows: dict[str, GridFlow]) -> Path:
+    """Measurements along the channel, patches, and a result for each experiment."""
+    folder.mkdir()
+    case = load_case(small_twin(folder))
+    station = read_observations(case).table
+    site = perfect_site(case, "twin", STATED, len(station))
+    value = np.asarray(true_values(site, case, "twin", station, hidden))
+    value = value + np.random.default_rng(3).standard_normal(value.size) * station["standard_error"].to_numpy(float)
+    for observation in case.observations:
+        column = "u" if observation.kind == "velocity" else "level"
+        table = pd.read_csv(observation.file)
+        table[column] = value[(station["kind"] == observation.kind).to_numpy()]
+        table.to_csv(observation.file, index=False)
+    (folder / "twin.yaml").unlink()
+    write, ending, more = WRITERS[code]
+    for name, flow in flows.items():
+        write(folder / f"{name}.{ending}", flow)
+    result = {"files": {name: f"{name}.{ending}" for name in flows}, "parameters": {"phi": 2.0, "canopy_height": 0.7}}
+    tree = {
+        "result": result | more,
+        "experiments": {name: {} for name in flows},
+        "patches": [
+            {"x": list(x), "y": list(y), "stems_per_m2": 22.0 * density}
+            for (x, y), density in zip(SHORT.patches, SHORT.density, strict=True)
+        ],
+        "canopy_height_guess_m": 0.7,
+        "eddy_viscosity_m2_s": EDDY_VISCOSITY,
+        "files": {
+            "velocities.csv": {"coordinates": "channel", "directions": "channel"},
+            "levels.csv": {"coordinates": "channel"},
+        },
+    }
+    (folder / "site.yaml").write_text(yaml.safe_dump(tree), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def flows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, GridFlow]:
+    case = load_case(small_twin(tmp_path_factory.mktemp("twin")))
+    return {name: result_of(case, name) for name in case.experiments}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("code", ["HEC-RAS", "TELEMAC"])
+def test_it_names_what_a_result_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, flows: dict[str, GridFlow]
+) -> None:
+    monkeypatch.setitem(blind_truth.CELLS, "twin", CELLS)
+    folder = folder_of_user(tmp_path / "reach", code, HIDDEN, flows)
+    case = vegglue.import_folder(folder, tmp_path / "reach.yaml")
+    for name, wanted in {"low": 1.0, "high": 3.2}.items():
+        assert case.experiments[name].discharge["upstream"] == pytest.approx(wanted, rel=0.02)
+    checked = vegglue.check(case, runs=tmp_path / "runs")
+    compared = checked.remarks[0]
+    assert isinstance(compared, ResultCompared)
+    print(code, compared)
+    assert compared.alike
+    found = vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1)
+    print(found)
+    assert isinstance(found.verdict.notes[0], ResultCompared)
+    assert found.set == ["secondary_current"]
+    amplitude = found.candidate_effect("secondary_current").amplitude
+    low, high = amplitude.interval95
+    assert low <= HIDDEN["secondary_current"]["strength"] <= high

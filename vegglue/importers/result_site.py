@@ -1,0 +1,388 @@
+"""The site of a finished result: what the site file leaves out is taken from the flow of another model.
+
+The grid covers its mesh along a straight channel, or along the centreline that the site file draws; bed, friction
+classes, discharge and outlet level are those of the result.
+"""
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+from scipy.interpolate import LinearNDInterpolator
+
+from vegglue.arrays import Array
+from vegglue.case.grid import Grid, centres
+from vegglue.case.messages import dotted, expected_in_words
+from vegglue.case.resolved_config import Tree
+from vegglue.case.text_files import case_name
+from vegglue.errors import InputError, shown_path
+from vegglue.importers.config_parts import MANNING_BED, bed_prior, lognormal_prior
+from vegglue.importers.finished_results import holds_result, read_result
+from vegglue.importers.measured_files import data_folder
+from vegglue.importers.measured_rows import Placement
+from vegglue.importers.model_result import ModelResult
+from vegglue.importers.site_file import FieldSite, ResultEntry, read_keys, read_site, site_file
+from vegglue.importers.terrain import Ground, Terrain, grid_of_terrain, ground_on_grid
+from vegglue.importers.vector_files import drawn_centreline
+from vegglue.measurements.their_flow import TheirFlow, text_of_flow
+from vegglue.wording.numbers import in_digits, so_many
+
+# Name of the experiment of a result if the site file names none.
+ONLY_EXPERIMENT = "run"
+# Below this angle [degrees] a result without a coordinate system is taken to lie along the channel already.
+ALONG_ALREADY = 0.5
+# A mesh so much longer than wide [-] shows the axis of the channel; else the flow does.
+ELONGATED = 2.0
+# Direction of the flow through a section, off the axis of the grid [degrees], beyond which a straight grid is refused.
+MOST_OFF_AXIS = 30.0
+# Spread of the discharge along the channel over its mean [-], beyond which a result is refused: water enters, the flow
+# is not at rest, or the grid cuts the river. Chosen: interpolation loses some per cent.
+MOST_SPREAD = 0.15
+# Land kept beside the water, over its width [-].
+LAND_BESIDE = 0.1
+# Values of Manning's n that differ by less [-] are one class, and the most classes; more values are grouped.
+ONE_CLASS, MOST_CLASSES = 0.05, 5
+# Share of the wet places from which a value is a class of its own [-].
+OWN_CLASS = 0.1
+# Spread of the logarithm of n of a class of several: a factor of 1.5, as between the rows of Chow (1959, table 5-6).
+LOG_SD_OF_CLASS = round(math.log(1.5), 4)
+TRIES_ALONG = 12
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedResult:
+    """A result in the channel: its flow there, Manning's n (n,) or None, and corners of the mesh (k, 2)."""
+
+    result: ModelResult
+    flow: TheirFlow
+    corners: Array
+    manning: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class SiteOfResult:
+    """The site file with what a result adds to it, and the results by experiment."""
+
+    site: FieldSite
+    paths: Mapping[str, Path]
+    placed: Mapping[str, PlacedResult]
+    stated: ResultEntry
+
+
+@dataclass(frozen=True, eq=False)
+class GroundOfResult:
+    """ground: of the first result; parameters: priors of its friction; key: `finished_result` of the case."""
+
+    ground: Ground
+    parameters: Tree
+    key: Tree
+
+
+def site_of(folder: Path) -> SiteOfResult | FieldSite:
+    """The site of a folder: that of its site file, completed by a result if the folder holds one.
+
+    Raises
+    ------
+    InputError
+        If the site file or a result cannot be read, or the result cannot be laid along a channel.
+    """
+    path = site_file(folder)
+    if not folder.is_dir():
+        return read_site(path)
+    given = read_keys(path) if path.is_file() else {}
+    mappings = ("experiments", "holdout", "grid", "frame")
+    if not isinstance(given, dict) or not all(isinstance(given.get(key) or {}, dict) for key in mappings):
+        return read_site(path)
+    if not (paths := _result_files(folder, given)):
+        return read_site(path)
+    try:
+        stated = ResultEntry.model_validate(_entry(given))
+    except ValidationError as error:
+        problem = error.errors()[0]
+        key = dotted(("result", *problem["loc"]))
+        raise InputError(
+            f"{shown_path(path)}: `{key}` expected {expected_in_words(problem)}, got {problem['input']!r}; correct it."
+        ) from None
+    results = {name: _read(one, one.stat().st_mtime_ns) for name, one in paths.items()}
+    first = next(iter(results.values()))
+    grid = given.get("grid") or {}
+    completed = dict(given)
+    if "frame" not in given and not grid.get("centreline"):
+        frame = _frame_of(first)
+        if frame is not None:
+            completed["frame"] = frame
+    completed.setdefault("bed", {"file": next(iter(paths.values())).name})
+    experiments = {name: dict((given.get("experiments") or {}).get(name) or {}) for name in paths}
+    experiments = {name: one for name, one in experiments.items() if name not in (given.get("holdout") or {})}
+    held = {name: dict(one or {}) for name, one in (given.get("holdout") or {}).items()}
+    # With any numbers the rest of the site can be read, and with it where the channel lies.
+    filler = {"discharge": 1.0, "level": 0.0}
+    tried = {name: filler | one for name, one in experiments.items()}
+    site = read_site(
+        path, completed | {"experiments": tried, "holdout": {name: filler | one for name, one in held.items()}}
+    )
+    place = placement_of(folder, site)
+    placed = {name: _placed(paths[name], one, place, stated) for name, one in results.items()}
+    terrain = _terrain(next(iter(placed.values())))
+    tree = grid_of_terrain(next(iter(paths.values())), terrain, site.grid, place)
+    of_grid = _cells(tree, place)
+    for flows in (experiments, held):
+        for name, one in flows.items():
+            discharge, level = _boundary(paths[name], placed[name].flow, of_grid, place.line is None)
+            if not {"discharge", "discharge_m3_s"} & one.keys():
+                one["discharge"] = discharge
+            if not {"level", "downstream_level_m"} & one.keys():
+                one["level"] = level
+    site = read_site(path, completed | {"experiments": experiments, "holdout": held})
+    return SiteOfResult(site, paths, placed, stated)
+
+
+def placement_of(folder: Path, site: FieldSite) -> Placement:
+    """Where the channel of a site lies on the map."""
+    frame = site.frame.frame if site.frame is not None else None
+    given = site.grid.centreline if site.grid is not None else None
+    drawn = drawn_centreline(folder, given, frame) if given is not None else None
+    return Placement(frame, drawn.line if drawn is not None else None)
+
+
+def ground_of_result(target: Path, found: SiteOfResult, place: Placement) -> GroundOfResult:
+    """Grid, bed and friction of the first result, and the flows of all, to be written beside the config."""
+    name, placed = next(iter(found.placed.items()))
+    path = found.paths[name]
+    terrain = _terrain(placed)
+    tree = grid_of_terrain(path, terrain, found.site.grid, place)
+    friction, parameters, values, texts, words = _friction(path, target, placed, tree, place, found)
+    imported: list[Tree] = []
+    files: dict[str, str] = {}
+    for experiment, one in found.placed.items():
+        file = f"flow-{case_name(experiment)}.csv"
+        texts[data_folder(target) / file] = text_of_flow(_near(one.flow, tree))
+        files[experiment] = f"{data_folder(target).name}/{file}"
+        taken = f"flow of {one.result.code}" + (f" at {one.result.time}" if one.result.time else "")
+        taken += f": {so_many(len(one.flow.x), 'place')}, {int((one.flow.depth > 0).sum())} wet"
+        flow = {**found.site.experiments, **found.site.holdout}[experiment]
+        taken += f", {in_digits(flow.discharge_m3_s)} m3/s, outlet level {in_digits(flow.downstream_level_m, 4)} m"
+        notes = [taken, *one.result.notes] + ([words] if experiment == name else [])
+        imported.append({"name": found.paths[experiment].name, "sha256": _digest(found.paths[experiment]),
+                         "taken": "; ".join(notes)})  # fmt: skip
+    ground = ground_on_grid(target, terrain, tree, friction, place)
+    ground = Ground(ground.tree, imported, {**ground.texts, **texts}, terrain.level)
+    key = {"code": placed.result.code, "files": files, "parameters": values | dict(found.stated.parameters)}
+    return GroundOfResult(ground, parameters, key)
+
+
+def _entry(given: Mapping[str, Any]) -> Any:
+    """`result` of a site file in its long form."""
+    entry = given.get("result")
+    return {"file": entry} if isinstance(entry, str) else entry or {}
+
+
+def _result_files(folder: Path, given: Mapping[str, Any]) -> dict[str, Path]:
+    """The result file of each experiment; none if the folder holds none."""
+    path, entry = site_file(folder), _entry(given)
+    experiments = [*(given.get("experiments") or {}), *(given.get("holdout") or {})]
+    if isinstance(entry, dict) and isinstance(entry.get("files"), dict):
+        named = {str(name): folder / str(file) for name, file in entry["files"].items()}
+        if missing := [name for name in experiments if name not in named]:
+            raise InputError(
+                f"{shown_path(path)}: `result.files` expected the result of {missing[0]}, got none; add it."
+            )
+    else:
+        file = entry.get("file") if isinstance(entry, dict) else None
+        there = [folder / str(file)] if file else sorted(one for one in folder.iterdir() if holds_result(one))
+        if not there:
+            return {}
+        if len(there) > 1:
+            raise InputError(
+                f"{shown_path(folder)}: expected one result of a model, got {len(there)}; name it in the site file by "
+                "`result: FILE`, or one for each experiment by `result: {files: {EXPERIMENT: FILE}}`."
+            )
+        if len(experiments) > 1:
+            raise InputError(
+                f"{shown_path(path)}: expected a result for each of {len(experiments)} experiments, got one; "
+                "name them by `result: {files: {EXPERIMENT: FILE}}`."
+            )
+        named = {experiments[0] if experiments else ONLY_EXPERIMENT: there[0]}
+    for one in named.values():
+        if not one.is_file():
+            raise InputError(f"{shown_path(folder)}: `result` names {one.name}, which is not there; correct it.")
+    return named
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path, changed: int) -> ModelResult:
+    return read_result(path)
+
+
+def _frame_of(result: ModelResult) -> Tree | None:
+    """The frame along the mesh: x downstream from its upper end, y = 0 in its middle; None if it lies so already."""
+    wet = result.wet
+    flow = np.array([(result.depth * result.u)[wet].sum(), (result.depth * result.v)[wet].sum()])
+    middle = result.corners - result.corners.mean(axis=0)
+    size, axes = np.linalg.eigh(middle.T @ middle)
+    axis = axes[:, 1] * math.copysign(1.0, float(axes[:, 1] @ flow))
+    if size[1] < ELONGATED**2 * size[0] and np.hypot(*flow) > 0.0:
+        axis = flow / np.hypot(*flow)
+    angle = math.degrees(math.atan2(axis[1], axis[0]))
+    if abs(angle) < ALONG_ALREADY and not result.crs:
+        return None
+    across = np.array([-axis[1], axis[0]])
+    along_all, across_all = result.corners @ axis, result.corners @ across
+    origin = along_all.min() * axis + 0.5 * (across_all.min() + across_all.max()) * across
+    frame: Tree = {"origin": [round(float(one), 3) for one in origin], "angle": round(angle, 4)}
+    return frame | ({"crs": result.crs} if result.crs.upper().startswith("EPSG:") else {})
+
+
+def _placed(path: Path, result: ModelResult, place: Placement, stated: ResultEntry) -> PlacedResult:
+    """The result along the channel. Raises InputError if nothing states the law of its friction."""
+    along, across = place.to_channel(result.x, result.y)
+    u, v = place.turned_to_channel(along, result.u, result.v)
+    corners = np.column_stack(place.to_channel(*result.corners.T))
+    manning = result.manning(stated.law) if stated.manning is None else np.full(result.x.size, stated.manning)
+    if manning is None or not np.isfinite(manning).any():
+        held = "of which the law is not stated" if result.roughness is not None else "without one"
+        raise InputError(
+            f"{shown_path(path)}: expected the roughness of the bed, got a result {held}; write "
+            "`result: {law: strickler}` (manning, chezy, nikuradse) or `result: {manning: 0.03}` into the site file."
+        )
+    there = np.isfinite(along) & np.isfinite(across)
+    flow = TheirFlow(*(one[there] for one in (along, across, result.bed, result.depth, u, v)))
+    if not (flow.depth > 0.0).any():
+        raise InputError(f"{shown_path(path)}: expected a flow, got a result that is dry at its end; give one at rest.")
+    return PlacedResult(result, flow, corners[np.isfinite(corners).all(axis=1)], manning[there])
+
+
+def _terrain(placed: PlacedResult) -> Terrain:
+    """The bed of a result, as far along as its mesh reaches, and across as far as its water and some land."""
+    flow, corners = placed.flow, placed.corners
+    surface = LinearNDInterpolator(np.column_stack([flow.x, flow.y]), flow.bed)
+    wet = flow.y[flow.depth > 0.0]
+    beside = LAND_BESIDE * float(np.ptp(wet)) + flow.spacing
+    south = max(float(corners[:, 1].min()), float(wet.min()) - beside)
+    north = min(float(corners[:, 1].max()), float(wet.max()) + beside)
+    extent = (float(corners[:, 0].min()), float(corners[:, 0].max()), south, north)
+    return Terrain(lambda x, y: np.asarray(surface(x, y)), extent, f"bed of {placed.result.code}")
+
+
+def _cells(tree: Tree, place: Placement) -> Grid:
+    """The grid of its keys."""
+    (west, east), (south, north), (dx, dy) = tree["x"], tree["y"], tree["cell"]
+    x, y = centres(west, dx, round((east - west) / dx)), centres(south, dy, round((north - south) / dy))
+    return Grid(x, y, dx, dy, place.line)
+
+
+def _boundary(path: Path, flow: TheirFlow, grid: Grid, straight: bool) -> tuple[float, float]:
+    """Discharge [m3/s], the median along the channel, and level [m], the mean at the outlet. Raises InputError for a
+    flow that is not along the grid, or whose discharge changes along it.
+    """
+    inner = np.linspace(grid.x[0], grid.x[-1], TRIES_ALONG + 2)[1:-1]
+    at_x, at_y = (part.ravel() for part in np.meshgrid(inner, grid.y, indexing="ij"))
+    here = flow.at(at_x, at_y)
+    along, across = (
+        np.nansum((here["depth"] * here[name]).reshape(inner.size, -1), axis=1) * grid.dy for name in ("u", "v")
+    )
+    off = np.degrees(np.abs(np.arctan2(across, along)))
+    if not (off <= MOST_OFF_AXIS).all():
+        hint = "draw the channel by `grid.centreline`" if straight else "correct `grid.centreline`"
+        raise InputError(
+            f"{shown_path(path)}: expected a flow within {MOST_OFF_AXIS:g} degrees of the grid, got "
+            f"{off.max():.0f} degrees at x = {inner[off.argmax()]:.4g} m; {hint}."
+        )
+    spread = float(np.std(along) / np.mean(along))
+    if spread > MOST_SPREAD:
+        raise InputError(
+            f"{shown_path(path)}: expected one discharge all along, got {along.min():.3g} to {along.max():.3g} m3/s; "
+            "give a flow at rest, and a grid that holds the whole river."
+        )
+    last = flow.at(np.full(grid.y.size, grid.x[-1]), grid.y)["level"]
+    if not np.isfinite(last).any():
+        raise InputError(
+            f"{shown_path(path)}: expected water at the outlet, x = {grid.x[-1]:.4g} m, got none; end `grid.x` before."
+        )
+    return round(float(np.median(along)), 5), round(float(np.nanmean(last)), 4)
+
+
+def _friction(
+    path: Path, target: Path, placed: PlacedResult, grid: Tree, place: Placement, found: SiteOfResult
+) -> tuple[Tree, Tree, dict[str, float], dict[Path, str], str]:
+    """Friction of the case, priors, values of the run, a raster of classes, and words: one class, or some by value."""
+    flow, manning = placed.flow, placed.manning
+    assert manning is not None
+    wet = (flow.depth > 0.0) & np.isfinite(manning)
+    values = manning[wet] if wet.any() else manning[np.isfinite(manning)]
+    typical = round(float(np.median(values)), 5)
+    low, high = min(0.01, 0.5 * typical), max(0.2, 2.0 * typical)
+    one_class = {"classes": {"bed": MANNING_BED}, "default": "bed"}
+    words = f"n {in_digits(typical)} s m^(-1/3)"
+    if np.ptp(values) <= ONE_CLASS * typical or place.line is not None or found.stated.manning is not None:
+        if np.ptp(values) > ONE_CLASS * typical:
+            words += f", the median of {in_digits(values.min())} to {in_digits(values.max())}"
+        return one_class, {"n_b": bed_prior(low, high)}, {"n_b": typical}, {}, words
+    rounded = np.round(values, 4)
+    distinct, counts = np.unique(rounded, return_counts=True)
+    groups = [float(one) for one in distinct]
+    if len(groups) > MOST_CLASSES:  # values of a share of their own, and the others by the size of ln n
+        own = distinct[counts >= OWN_CLASS * values.size][: MOST_CLASSES - 2]
+        rest = np.log(values[~np.isin(rounded, own)])
+        edges = np.linspace(rest.min(), rest.max(), MOST_CLASSES - own.size + 1)[1:-1]
+        of_bin = np.searchsorted(edges, rest)
+        means = [round(float(np.exp(rest[of_bin == k].mean())), 5) for k in np.unique(of_bin)]
+        groups = sorted({*own.tolist(), *means})
+    number = {value: k for k, value in enumerate(groups, 1)}
+    size = float(min(grid["cell"]))
+    (west, east), (south, north) = grid["x"], grid["y"]
+    x = centres(west, size, math.ceil((east - west) / size))
+    y = centres(south, size, math.ceil((north - south) / size))
+    at_x, at_y = (part.ravel() for part in np.meshgrid(x, y, indexing="ij"))
+    nearest = flow.nearest(at_x, at_y, np.isfinite(manning))
+    there = np.abs(np.log(manning[np.isfinite(manning)][nearest][:, None] / np.array(groups))).argmin(axis=1) + 1
+    head = {"ncols": x.size, "nrows": y.size, "xllcorner": x[0] - 0.5 * size, "yllcorner": y[0] - 0.5 * size,
+            "cellsize": size, "nodata_value": -9999}  # fmt: skip
+    rows = [" ".join(map(str, row)) for row in there.reshape(x.size, y.size).T[::-1].tolist()]
+    text = "\n".join([f"{key} {float(one):.12g}" for key, one in head.items()] + rows) + "\n"
+    names = {value: f"n{k}" for value, k in number.items()}
+    shares = np.bincount(np.abs(np.log(values[:, None] / np.array(groups))).argmin(axis=1), minlength=len(groups))
+    main = groups[int(shares.argmax())]
+    names[main] = "bed"
+    parameter = {value: "n_b" if value == main else f"n_{k}" for value, k in number.items()}
+    classes = {names[value]: {"law": "manning", "n": parameter[value]} for value in groups}
+    zone = {"raster": f"{data_folder(target).name}/classes.asc", "values": {k: names[v] for v, k in number.items()}}
+    friction: Tree = {"classes": classes, "default": "bed", "zones": [zone]}
+    priors = {
+        parameter[value]: lognormal_prior(
+            value,
+            LOG_SD_OF_CLASS,
+            "s m^(-1/3)",
+            parameter[value],
+            f"Manning coefficient, {value:g} in {placed.result.code}",
+        )
+        for value in groups
+    }
+    words = f"{len(groups)} classes of n, {in_digits(groups[0])} to {in_digits(groups[-1])} s m^(-1/3)"
+    if len(distinct) > len(groups):
+        words += f", of {len(distinct)} values"
+    return (
+        friction,
+        priors,
+        {parameter[value]: value for value in groups},
+        {data_folder(target) / "classes.asc": text},
+        words,
+    )
+
+
+def _near(flow: TheirFlow, grid: Tree) -> TheirFlow:
+    """The part of a flow on the grid and two spacings beside it."""
+    (west, east), (south, north), beside = grid["x"], grid["y"], 2.0 * flow.spacing
+    near = (flow.x > west - beside) & (flow.x < east + beside) & (flow.y > south - beside) & (flow.y < north + beside)
+    return TheirFlow(*(one[near] for one in (flow.x, flow.y, flow.bed, flow.depth, flow.u, flow.v)))
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

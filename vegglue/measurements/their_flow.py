@@ -1,0 +1,96 @@
+"""The flow of a finished run of another model, at the places of its own mesh, and read between them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import QhullError, cKDTree
+
+from vegglue.arrays import Array, Mask
+from vegglue.case.grid import Grid
+from vegglue.errors import InputError, shown_path
+from vegglue.measurements.csv_table import read_table
+
+COLUMNS = ("x", "y", "bed", "depth", "u", "v")
+# A place is beyond a mesh if it is further from its nearest point than so many usual distances between points.
+BEYOND_MESH = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class TheirFlow:
+    """The flow of a finished run at its own places (n,), along and across the channel; SI. Dry places have depth 0."""
+
+    x: Array
+    y: Array
+    bed: Array
+    depth: Array
+    u: Array
+    v: Array
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(np.column_stack([self.x, self.y]))
+
+    @cached_property
+    def spacing(self) -> float:
+        """Usual distance of a place to the fourth nearest one [m]: that to the next column or row of a mesh."""
+        distance, _ = self._tree.query(np.column_stack([self.x, self.y]), k=min(5, self.x.size))
+        return float(np.median(distance[:, -1]))
+
+    def inside(self, x: Array, y: Array) -> Mask:
+        """Whether places (m,) lie on the mesh."""
+        return np.asarray(self._tree.query(np.column_stack([x, y]))[0] <= BEYOND_MESH * self.spacing)
+
+    def at(self, x: Array, y: Array) -> dict[str, Array]:
+        """level [m], depth [m], u and v [m/s] at places (m,): linear between wet places, NaN where it is dry.
+
+        A place is dry if the nearest place of the mesh is, or if it lies beyond the mesh.
+        """
+        to = np.column_stack([x, y])
+        _, nearest = self._tree.query(to)
+        wet = self.depth > 0.0
+        there = wet[nearest] & self.inside(x, y)
+        fields = np.column_stack([self.bed + self.depth, self.depth, self.u, self.v])
+        places = np.column_stack([self.x, self.y])[wet]
+        found = np.full((len(to), 4), np.nan)
+        if wet.any():
+            found = fields[wet][cKDTree(places).query(to)[1]]
+            try:
+                between = LinearNDInterpolator(places, fields[wet])(to)
+                found = np.where(np.isfinite(between), between, found)
+            except (QhullError, ValueError):  # fewer than three places, or all on a line
+                pass
+        found[~there] = np.nan
+        return dict(zip(("level", "depth", "u", "v"), found.T, strict=True))
+
+    def nearest(self, x: Array, y: Array, among: Mask) -> NDArray[np.int64]:
+        """Of the places that are true in `among` (n,), the number of the nearest one to each of (m,)."""
+        tree = cKDTree(np.column_stack([self.x, self.y])[among])
+        return np.asarray(tree.query(np.column_stack([x, y]))[1], dtype=np.int64)
+
+    def discharge(self, grid: Grid, x: Array) -> Array:
+        """Q = dy sum_j h_j u_j through the row of cells at each x (m,) [m3/s]."""
+        at_x, at_y = (part.ravel() for part in np.meshgrid(x, grid.y, indexing="ij"))
+        here = self.at(at_x, at_y)
+        return np.asarray(np.nansum((here["depth"] * here["u"]).reshape(len(x), grid.y.size), axis=1) * grid.dy)
+
+
+def read_their_flow(path: Path) -> TheirFlow:
+    """The flow in a file of a case, with the columns COLUMNS. Raises InputError."""
+    rows = read_table(path, (), COLUMNS)
+    if not (rows["depth"] > 0.0).any():
+        raise InputError(f"{shown_path(path)}: expected a flow, got {len(rows)} dry places; import it anew.")
+    return TheirFlow(*(rows[name].to_numpy(float) for name in COLUMNS))
+
+
+def text_of_flow(flow: TheirFlow) -> str:
+    """The file of a case that `read_their_flow` reads: millimetres, and a tenth of a millimetre per second."""
+    columns = (one.tolist() for one in (flow.x, flow.y, flow.bed, flow.depth, flow.u, flow.v))
+    rows = [
+        f"{x:.3f},{y:.3f},{bed:.4f},{depth:.4f},{u:.4f},{v:.4f}"
+        for x, y, bed, depth, u, v in zip(*columns, strict=True)
+    ]
+    return "\n".join([",".join(COLUMNS), *rows]) + "\n"
