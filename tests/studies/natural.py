@@ -322,7 +322,9 @@ def judged(hidden: HiddenThing, found: Mapping[str, Any]) -> dict[str, Any]:
     hit = hidden.name in names or (hidden.name == "gauge" and gauge)
     if hidden.name in ("pool", "object", "line", "reeds"):
         on_line = bool(where) and abs(where["x"] - hidden.x) <= NEAR + hidden.half_length
-        hit = on_line if hidden.name == "line" else near
+        levelled = (one for one in found["verdict_value"]["notes"] if one["kind"] == "line_levelled_wrongly")
+        reported = any(abs(one["x"] - hidden.x) <= NEAR + hidden.half_length for one in levelled)
+        hit = (on_line or reported) if hidden.name == "line" else near
     listed = hidden.name in found["not_excluded"] or any(hidden.name in group for group in found["not_excluded"])
     named = found["verdict"] in ("identified", "one-of", "none-of-these", "instrument")
     place = where and [where["x"], where["y"], where["term"], where["amplitude"]]
