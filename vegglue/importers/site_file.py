@@ -295,7 +295,9 @@ class _StraightlyPlaced(_SitePart):
     frame: _WholeFrame
 
 
-SITE_PARTS: dict[str, type[BaseModel]] = {"channel": Channel, "grid": SiteGrid, "frame": SiteFrame, "walls": FlumeWalls}
+SITE_PARTS: dict[str, type[BaseModel]] = {
+    "channel": Channel, "grid": SiteGrid, "frame": SiteFrame, "walls": FlumeWalls, "result": ResultEntry,
+}  # fmt: skip
 # Keys of an experiment, each by either name.
 OF_FLOW = (("discharge", "discharge_m3_s"), ("level", "downstream_level_m"))
 # How alike two words are that are one misspelt [-], and letters of a word cut short: `stems` for `stems_per_m2`.
