@@ -286,6 +286,14 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         if ending not in (".tif", ".tiff") and (system := path.with_suffix(".prj")).is_file():
             refuse_other_system(path, system_of_wkt(readable_text(system)), place.frame)
         raster = read_geotiff(path, place.frame) if ending in (".tif", ".tiff") else read_raster(path)
+        scaled = ""
+        beside = path.with_name(f"{path.name}.aux.xml")  # what GDAL keeps of a format that has no room for it
+        if ending not in (".tif", ".tiff") and beside.is_file():
+            with read_by_library(beside, "what GDAL keeps beside a grid"):
+                stated = dict(re.findall(r"<(Scale|Offset)>([^<]+)<", readable_text(beside)))
+                scale, offset = float(stated.get("Scale", 1.0)), float(stated.get("Offset", 0.0))
+            raster = replace(raster, values=raster.values * scale + offset)
+            scaled = f", times {scale:g} plus {offset:g} m" if stated else ""
         raster, filled_up = _without_fill(raster)
         reader = RegularGridInterpolator((raster.x, raster.y), raster.values, bounds_error=False, fill_value=np.nan)
         known = np.argwhere(~np.isnan(raster.values))
@@ -294,7 +302,7 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         return Terrain(
             lambda x, y: np.asarray(reader(np.column_stack(place.to_map(x, y)))),
             _extent(along, across),
-            f"grid of {len(known):,} levels, {raster.size:g} m apart{filled_up}",
+            f"grid of {len(known):,} levels, {raster.size:g} m apart{scaled}{filled_up}",
         )
     with path.open("rb") as file:
         of_ras = file.read(len(GEOMETRY_OF_RAS)) == GEOMETRY_OF_RAS
