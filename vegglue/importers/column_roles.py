@@ -24,7 +24,7 @@ from vegglue.importers.column_names import (
     words_of,
 )
 from vegglue.importers.file_options import FileOptions
-from vegglue.importers.import_notes import ImportNote, Note, Noted
+from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.table_parser import MOST_ROWS_NAMED, ParsedTable, is_number
 from vegglue.measurements.plausibility import MARKS_OR_VALUES, is_mark_anywhere, is_of_nines
 from vegglue.wording.numbers import listed, so_many
@@ -232,7 +232,7 @@ def _stated_unit(table: ParsedTable, place: int, quantity: str) -> str:
 
 def numbers_of_column(
     path: Path, table: ParsedTable, place: int, role: str, unit: str, missing: tuple[float, ...]
-) -> tuple[Array, list[Note]]:
+) -> tuple[Array, list[FileNote]]:
     """A column of a role in SI, NaN for no value, and what was left out or kept that may be a mark.
 
     Sevens and eights mark no value if no reading is so large; nines if they are negative, as 99 m may be a level.
@@ -252,7 +252,7 @@ def numbers_of_column(
             f"{table.rows[row][place]}; correct it, or write `missing: [{values[row]:g}]` of this file if it marks no "
             "value."
         )
-    notes: list[Note] = []
+    notes: list[FileNote] = []
     if quantity == "velocity":
         kept = sorted({f"{value:g}" for value in values.tolist() if value > 0.0 and is_of_nines(value)})
         notes += [

@@ -44,7 +44,7 @@ class ImportNote:
 
 
 # A note, or the few words of a reader on the form of its file.
-Note = ImportNote | str
+FileNote = ImportNote | str
 
 
 @dataclass(frozen=True)

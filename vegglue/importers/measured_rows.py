@@ -21,7 +21,7 @@ from vegglue.importers.column_roles import (
     without_flagged,
 )
 from vegglue.importers.file_options import FileOptions
-from vegglue.importers.import_notes import ImportNote, Note, Noted
+from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.table_parser import ParsedTable, parse_table, without_copies
 from vegglue.wording.numbers import listed, so_many
 from vegglue.wording.sentences import sentences
@@ -106,7 +106,7 @@ class MeasuredRows:
     texts: Mapping[str, Sequence[str]]
     columns: Mapping[str, str]
     units: Mapping[str, str]
-    notes: tuple[Note, ...]
+    notes: tuple[FileNote, ...]
     others: Mapping[str, Sequence[str]] = field(default_factory=dict)
     lines: Sequence[int] = ()
     of_probe: bool = False
@@ -131,7 +131,7 @@ class MeasuredRows:
         numbers = {role: values[rows] for role, values in self.numbers.items()}
         return replace(self, numbers=numbers, texts=texts, others=others, lines=lines)
 
-    def having(self, numbers: Mapping[str, Array], *notes: Note) -> "MeasuredRows":
+    def having(self, numbers: Mapping[str, Array], *notes: FileNote) -> "MeasuredRows":
         """The rows with these numbers (rows,) in SI, in place of those of the same role, and with further notes."""
         return replace(self, numbers={**self.numbers, **numbers}, notes=(*self.notes, *notes))
 
@@ -199,7 +199,7 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
     numbers: dict[str, Array] = {}
     units: dict[str, str] = {}
     assumed = taken_as_si(table, columns, options)
-    notes: list[Note] = [*([ImportNote(Noted.NO_UNIT, names=tuple(assumed))] if assumed else []), table.form]
+    notes: list[FileNote] = [*([ImportNote(Noted.NO_UNIT, names=tuple(assumed))] if assumed else []), table.form]
     for role, place in columns.items():
         if ROLES[role].quantity:
             units[role] = unit_of_column(path, table, columns, role, options)
@@ -331,7 +331,7 @@ def _along_and_across(taken: MeasuredRows, place: Placement, options: FileOption
         return taken
     first, second = (taken.numbers[role] for role in pair)
     of_map = options.directions == "map" or (options.directions is None and not taken.of_probe)
-    notes: tuple[Note, ...] = ()
+    notes: tuple[FileNote, ...] = ()
     if place.turned and of_map and (pair != ("u", "v") or options.coordinates != "channel"):
         along = taken.numbers.get("x", np.zeros(taken.size))
         first, second = place.turned_to_channel(along, first, second)

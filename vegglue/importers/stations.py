@@ -14,7 +14,7 @@ from vegglue.importers.column_names import is_in_degrees, unit_stated, words_of
 from vegglue.importers.column_roles import NO_DEGREES
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_options import FileOptions
-from vegglue.importers.import_notes import ImportNote, Note, Noted
+from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.measured_rows import MeasuredRows, Placement, vertical_role
 from vegglue.importers.repeats import (
     PlaceKey,
@@ -105,7 +105,7 @@ class StationTables:
     """The tables of one file; left_out: what they lack, and how many of its rows are in none of them and why."""
 
     tables: list[StationTable]
-    left_out: tuple[Note, ...]
+    left_out: tuple[FileNote, ...]
 
     @property
     def taken(self) -> str:
@@ -145,7 +145,7 @@ def station_tables(
     found = [_stations(taken, stem, options, kind, place) for kind in kinds]
     without_value = _lacking(taken, [kind.column for kind in kinds], np.any)
     role = vertical_role(taken)
-    at_height: tuple[Note, ...] = ()
+    at_height: tuple[FileNote, ...] = ()
     if role is not None and "u" in taken.numbers and np.isfinite(taken.numbers[role]).any():
         share = taken.numbers[role] / taken.numbers["depth"] if {"height", "depth"} <= taken.numbers.keys() else None
         if share is not None and (np.abs(share[np.isfinite(share)] - OF_AVERAGE) < NEAR_AVERAGE).all():
@@ -156,7 +156,7 @@ def station_tables(
     return StationTables([table for table in found if table.rows], left_out)
 
 
-def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[Note, ...]:
+def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[FileNote, ...]:
     """How many rows are left out for want of a role, if all or any of the roles are needed; nothing if no row is."""
     if not roles:
         return ()
@@ -352,13 +352,13 @@ def _rows_of_sections(taken: MeasuredRows, role: str) -> list[list[int]]:
     return list(rows.values())
 
 
-def _once_in_a_section(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[Note, ...]]:
+def _once_in_a_section(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[FileNote, ...]]:
     """The rows with the discharge of a section once, without shares of it by verticals, and with a level that all
     verticals repeat once; and notes on these.
 
     Several discharges at one y are repeats, and stay; gauges on both banks are two readings, even if they agree.
     """
-    notes: list[Note] = []
+    notes: list[FileNote] = []
     across = taken.numbers.get("y", np.zeros(taken.size))
     if {"y", "discharge"} <= taken.numbers.keys():
         found, shares = taken.numbers["discharge"].copy(), 0
