@@ -67,7 +67,7 @@ ROLES_OF_BED = {"x", "y", "z", "section"}
 SPREAD_OF_SECTION = 1.0
 # Cells across the survey, and how much longer than wide a cell is, as for a straight channel.
 SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0
-NO_LEVEL = -9999
+MARK_OF_NO_LEVEL = -9999
 MOST_LEVELS = 10 * MOST_CELLS  # of some eight bytes each; a case reads no larger file
 # Kind and name of the file of a bed: on a straight grid, and along a centreline.
 BED_FILES = (("raster", "bed.asc"), ("points", "bed.csv"))
@@ -257,7 +257,7 @@ def _bed_text(terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> tu
     inside = (at_x > west) & (at_x < east) & (at_y > south) & (at_y < north)
     if place.line is None:
         head = {"ncols": x.size, "nrows": y.size, "xllcorner": x[0] - 0.5 * size, "yllcorner": y[0] - 0.5 * size}
-        head |= {"cellsize": size, "nodata_value": NO_LEVEL}
+        head |= {"cellsize": size, "nodata_value": MARK_OF_NO_LEVEL}
         rows = [" ".join(f"{value:.4f}" for value in row) for row in level.reshape(x.size, y.size).T[::-1]]
         text = "\n".join([f"{key} {float(value):.12g}" for key, value in head.items()] + rows) + "\n"
     else:
