@@ -4,7 +4,6 @@
 """
 
 import errno
-import fcntl
 import json
 import os
 from collections.abc import Callable, Iterator
@@ -23,6 +22,7 @@ from vegglue.case.config import load_case
 from vegglue.inference import solve_ensemble
 from vegglue.measurements.observations import read_observations
 from vegglue.progress import Progress
+from vegglue.whole_files import lock
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "faults.md"
@@ -126,7 +126,7 @@ def without_solved(path: Path) -> None:
 def locked(path: Path) -> Iterator[None]:
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
+        lock(file.fileno())
         yield
 
 

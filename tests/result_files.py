@@ -42,11 +42,16 @@ class GridFlow:
     def nodes(self):
         return self.on_map(*np.meshgrid(self.x, self.y, indexing="ij"))
 
+    @property
+    def nodes_of_selafin(self):
+        """Centres of cells, and the edges of the grid."""
+        each = (np.concatenate([one[:1], 0.5 * (one[1:] + one[:-1]), one[-1:]]) for one in (self.x, self.y))
+        return self.on_map(*np.meshgrid(*each, indexing="ij"))
+
 
 def at_nodes(field):
-    """A field at centres (nx, ny) as means at the corners (nx + 1, ny + 1)."""
-    wide = np.pad(field, 1, mode="edge")
-    return 0.25 * (wide[1:, 1:] + wide[:-1, 1:] + wide[1:, :-1] + wide[:-1, :-1])
+    """A field at centres (nx, ny) at these and along the edges of the grid (nx + 2, ny + 2), as at the nearest one."""
+    return np.pad(field, 1, mode="edge")
 
 
 def write_hec_ras(path: Path, flow: GridFlow, feet: bool = False, version: str = "6.1") -> None:
@@ -127,13 +132,13 @@ def write_selafin(
     path: Path, flow: GridFlow, *, double: bool = False, order: str = ">", french: bool = False, cut: bool = False,
     offset: tuple[int, int] = (0, 0), friction: bool = True,
 ) -> None:  # fmt: skip
-    """A result at the corners of the grid, two triangles a cell; the first of two frames is at rest."""
+    """A result at centres and edges of the grid, two triangles between four; the first of two frames is at rest."""
     real = np.dtype(f"{order}f{8 if double else 4}")
-    nx, ny = flow.bed.shape
+    nx, ny = (size + 1 for size in flow.bed.shape)
     corner = np.arange((nx + 1) * (ny + 1)).reshape(nx + 1, ny + 1)
     a, b, c, d = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel(), corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
     triangles = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]) + 1
-    x, y = (part.ravel() for part in flow.nodes)
+    x, y = (part.ravel() for part in flow.nodes_of_selafin)
     east, north = flow.velocity
     bed, depth = at_nodes(flow.bed).ravel(), at_nodes(flow.depth).ravel()
     depth = np.where(depth > 0.0, depth, -0.01)  # as TELEMAC leaves it on dry land

@@ -1,8 +1,10 @@
 """A Python that hides what only POSIX has, before anything is imported, by `PYTHONPATH=tests/_without_posix`.
 
-Processes are spawned, and msvcrt has the one function that is used, which locks nothing.
+Processes are spawned, and msvcrt has the one function that is used: a lock that one handle alone holds.
 """
 
+import errno
+import fcntl
 import multiprocessing
 import multiprocessing.popen_spawn_posix
 import os
@@ -29,9 +31,19 @@ class Hidden(MetaPathFinder):
 for name in HIDDEN:
     sys.modules.pop(name, None)
 sys.meta_path.insert(0, Hidden())
+
+
+def locking(handle: int, mode: int, size: int) -> None:
+    """Locks an open file until it is closed, or raises OSError as Windows does."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise OSError(errno.EACCES, "Permission denied") from None
+
+
 windows = types.ModuleType("msvcrt")
 windows.LK_NBLCK = 2  # type: ignore[attr-defined]
-windows.locking = lambda handle, mode, size: None  # type: ignore[attr-defined]
+windows.locking = locking  # type: ignore[attr-defined]
 sys.modules["msvcrt"] = windows
 del os.killpg, os.fork
 multiprocessing.set_start_method("spawn", force=True)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -57,7 +58,8 @@ def screened(values: Array, effects: int = EFFECTS, flagged: tuple[int, ...] = (
     )
     columns = [np.array([column]) for column in range(effects)]
     settings, amplitudes, tested = [{}] * effects, AMPLITUDES[:effects], of_effects[:, :effects]
-    known = Fingerprints(base.fitted.point, [], columns, settings, amplitudes, [], tested, places)
+    candidates = [SimpleNamespace(effect=SimpleNamespace(tags=()))] * effects
+    known = Fingerprints(base.fitted.point, candidates, columns, settings, amplitudes, [], tested, places)
     return screen(base, flagged, known)
 
 

@@ -142,7 +142,7 @@ def test_a_bad_survey_is_refused(tmp_path, text, words):
         (TWO.replace("nrows 2", "nrows 0.5") + "1 2\n", ("`nrows`", "0.5")),
         (TWO.replace("ncols 2", "ncols 1e300") + "1 2\n", ("got 2",)), (TWO + "1 2 3\n", ("= 4", "got 3")),
         (PLANE + "1 " * 11, ("= 12", "got 11")), (PLANE + "1 1 1 1\n1 x 1 1\n1 1 1 1\n", ("line 8", "'x'")),
-        (TWO + "1 2\n3 inf\n", ("line 7", "'inf'")), (TWO + "1 2\n3 1,5\n", ("line 7", "'1,5'")),
+        (TWO + "1 2\n3 inf\n", ("line 7", "'inf'")), (TWO + "1 2\n3 1,5x\n", ("line 7", "x'")),
     ],
     ids=lambda text: str(text)[:20],
 )  # fmt: skip

@@ -11,7 +11,7 @@ from vegglue.errors import InputError
 COMMANDS = {
     "simulate": ["simulate"], "infer": ["infer"], "report": ["report"], "run": ["run"], "diagnose": ["diagnose"],
     "discover": ["discover"], "extend_stepwise": ["extend", "--auto"], "compare": ["compare"],
-    "next_measurement": ["next"],
+    "next_measurement": ["next"], "plan": ["plan"],
 }  # fmt: skip
 
 

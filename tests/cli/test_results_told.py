@@ -117,7 +117,7 @@ def test_help_keeps_what_stands_in_brackets(tmp_path: Path) -> None:
 def test_help_lists_commands_as_they_are_used(tmp_path: Path) -> None:
     said = vegglue(tmp_path, "--help").stdout
     names = re.findall(r"^│ ([a-z]+) ", said, re.MULTILINE)
-    assert names[:5] == ["demo", "new", "import", "check", "run"]
+    assert names[:5] == ["demo", "new", "plan", "import", "check"]
     assert names.index("diagnose") < names.index("extend") < names.index("compare") < names.index("next")
 
 

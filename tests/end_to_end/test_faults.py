@@ -2,7 +2,6 @@
 
 import errno
 import os
-import resource
 import signal
 import subprocess
 import time
@@ -203,6 +202,7 @@ def assert_stale_ensemble(say: Say) -> None:
 @contextmanager
 def room_for(size: int) -> Iterator[None]:
     """No file may grow beyond a size [bytes], as on a disk without room; nobody's rights are needed for that."""
+    resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:

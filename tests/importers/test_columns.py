@@ -11,6 +11,7 @@ from field_folders import CHANNEL, JUNE, import_of, refusal_of
 from vegglue.errors import InputError
 from vegglue.importers.column_names import in_si, role_of, unit_named, unit_stated
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.measured_rows import MeasuredRows, read_rows
 
 
@@ -267,13 +268,13 @@ def test_sevens_and_eights_are_marks_if_nothing_measured_is_so_large(
 ) -> None:
     taken = rows_of(tmp_path, f"{headings}\n1,2,0.4\n2,2,{number}\n")
     assert np.isfinite(taken.numbers[list(taken.numbers)[-1]]).tolist() == [True, kept]
-    assert any("1 mark" in one for one in taken.notes) == (not kept)
+    assert any(one == ImportNote(Noted.MARKS, 1, (headings.split(",")[-1],)) for one in taken.notes) == (not kept)
 
 
 def test_nines_that_may_be_a_mark_are_kept_and_reported(tmp_path: Path) -> None:
     table = "x;y;u [cm/s];level [m]\n1;0;35,1;9,99\n1;1;99,99;9,99\n1;2;-999;9,99\n"
     taken = rows_of(tmp_path, table)
-    assert [one for one in taken.notes if "99.99" in one]
+    assert ImportNote(Noted.KEPT_NINES, names=("99.99", "u [cm/s]")) in taken.notes
     assert taken.numbers["u"].tolist() == pytest.approx([0.351, 0.9999, np.nan], nan_ok=True)
     assert np.isnan(rows_of(tmp_path, table, missing=(99.99,)).numbers["u"][1])
 

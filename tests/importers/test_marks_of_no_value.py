@@ -21,8 +21,9 @@ from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.gaugings import read_flowtracker2, read_gauging
 from vegglue.importers.instruments import reader_of
-from vegglue.importers.measured_rows import read_rows
+from vegglue.importers.measured_rows import Placement, read_rows
 from vegglue.importers.teledyne import read_pd0, read_winriver
+from vegglue.importers.terrain import read_terrain
 from vegglue.measurements.observations import read_observations
 
 SHARED = Path(__file__).parents[3] / "shared" / "cases" / "files"
@@ -483,6 +484,16 @@ def test_grids_as_other_programs_write_them(tmp_path: Path, size: str, nothing: 
     raster = read_raster(tmp_path / "bed.asc")
     assert raster.size == 2.0
     np.testing.assert_array_equal(raster.values, [[1.0, np.nan], [2.0, 1.5]])
+
+
+def test_a_grid_has_the_scale_that_gdal_keeps_beside_it(tmp_path: Path) -> None:
+    """Of a terrain in centimetres the ASCII grid holds the stored numbers."""
+    text = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n10012 10013\n10014 10015\n"
+    (tmp_path / "bed.asc").write_text(text, encoding="utf-8")
+    band = '<PAMDataset><PAMRasterBand band="1"><Offset>0</Offset><Scale>0.01</Scale></PAMRasterBand></PAMDataset>'
+    (tmp_path / "bed.asc.aux.xml").write_text(band, encoding="utf-8")
+    found = read_terrain(tmp_path / "bed.asc", Placement(), FileOptions(), False)
+    assert found.level(np.array([0.5]), np.array([0.5])) == pytest.approx(100.14)
 
 
 def test_a_grid_of_oblong_cells_is_refused(tmp_path: Path) -> None:

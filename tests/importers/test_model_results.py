@@ -68,7 +68,7 @@ def test_selafin(tmp_path: Path, how: dict) -> None:
     assert holds_result(path)
     result, (east, north) = read_result(path), flow.velocity
     single = not how.get("double") and not how.get("offset")  # a large coordinate with 24 bits is good to 3 cm
-    for got, wanted in zip((result.x, result.y), flow.nodes, strict=True):
+    for got, wanted in zip((result.x, result.y), flow.nodes_of_selafin, strict=True):
         np.testing.assert_allclose(got, wanted.ravel(), atol=0.04 if single else 2e-5)
     depth = at_nodes(flow.depth).ravel()
     np.testing.assert_allclose(result.depth, np.where(depth > DRY_DEPTH, depth, 0.0), atol=1e-6)

@@ -159,7 +159,7 @@ def test_what_nobody_said_is_told(tmp_path: Path) -> None:
         holdout={},
     )
     assumed, notes, held_out = assumptions_of(folder)
-    assert "eddy_viscosity_m2_s 0.01" in assumed
+    assert "eddy_viscosity_m2_s" in assumed
     assert "weather, experiments.low.plants" in notes
     assert "holdout.csv" in held_out
     bare = field_folder(tmp_path / "bare", patches=[])
@@ -170,7 +170,7 @@ def test_what_nobody_said_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("said", "value", "median", "log_sd"),
     [
-        ({}, "eddy_viscosity", 0.01, 0.6931),
+        ({}, "eddy_viscosity", 0.016, 0.6931),
         ({"eddy_viscosity_m2_s": 0.02}, 0.02, None, None),
         ({"eddy_viscosity_m2_s": 0.02, "eddy_viscosity_factor": 3}, "eddy_viscosity", 0.02, 1.0986),
         ({"eddy_viscosity_m2_s": 0.02, "eddy_viscosity_factor": 1}, 0.02, None, None),

@@ -146,6 +146,8 @@ def _hiding(site: Site, case: Case, experiment: str, hidden: Mapping[str, Number
             level += numbers["rise"]
         elif name in ("inflow_skew", "inflow_core"):
             spread |= numbers
+        elif name == "inflow_peak":
+            spread |= {f"peak_{key}": number for key, number in numbers.items()}
         elif name == "lateral_inflow":
             half = truth.channel.half
             settings["lateral"] = (0.0, truth.channel.length, -half, half, numbers["share"] * discharge)

@@ -61,12 +61,12 @@ def one_set(config: Path, plan: FieldPlan, number: int) -> dict[str, Any] | None
         found = vegglue.diagnose(twin, runs=Path(name) / "runs")
         seconds = time.monotonic() - began
     verdict = found.verdict
-    alarmed = bool(found.steps or found.places or found.instruments)
+    alarmed = verdict.kind in ("identified", "one-of", "none-of-these", "instrument") or bool(found.steps)
     named = sorted({rival for step in found.steps for rival in step.rivals})
     similar = [other.name for other in effect.confused if other.cosine > 0.9]
     return {
         "set": number, "effect": effect.name, "amplitude": value, "said": "hidden" if said_hidden else "detected",
-        "kind": verdict.kind, "alarm": alarmed or verdict.kind != "nothing-missing",
+        "kind": verdict.kind, "alarm": alarmed,
         "named": effect.name in named, "similar_named": any(one in named for one in similar),
         "accepted": [step.accepted for step in found.steps], "places": len(found.places), "seconds": round(seconds, 1),
         "said_of_it": {key: asdict(effect)[key] for key in ("smallest", "plausible", "chance_plausible")},

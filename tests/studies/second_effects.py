@@ -150,6 +150,11 @@ DRAG: dict[str, Effect] = {
     ),
     "bed_trend": lambda s, trend: s.k * np.exp(trend * s.open_floor * (s.lie.x / s.length - 0.5)),
     "bank_difference": lambda s, log_ratio: s.k * np.exp(0.5 * log_ratio * s.lie.bank * np.sign(s.lie.y)),
+    "bank_roughness": lambda s, log_ratio: s.k * np.exp(log_ratio * s.lie.bank),
+    "floor_difference": lambda s, log_ratio: s.k * np.exp(0.5 * log_ratio * s.open_floor * np.sign(s.lie.y)),
+    "bed_stretch": lambda s, log_ratio, middle, share: (
+        s.k * np.exp(log_ratio * s.open_floor * np.exp(-((2.0 * (s.lie.x / s.length - 0.5 - middle) / share) ** 4)))
+    ),
     "steep_bank": lambda s, share: s.k * (1.0 + share * s.lie.bank * ((1.0 + s.rise**2) ** 0.5 - 1.0)),
     "bank_vegetation": lambda s, drag, height: s.k + 0.5 * drag * np.minimum(1 / height, 1 / s.h) * s.lie.bank,
     "stem_blockage": lambda s, share: s.k / (1.0 - share * s.lie.cover) ** 2,

@@ -214,6 +214,8 @@ def _problem(truth: Truth, discharge: float, level: float, cells: tuple[float, f
     s = y / truth.channel.inflow
     share = share * (1.0 + truth.spread.get("skew", 0.0) * s)
     share = share * (1.0 + truth.spread.get("excess", 0.0) * (1.0 - 3.0 * s**2) / 2.0)
+    off_peak = (s - truth.spread.get("peak_middle", 0.0)) / truth.spread.get("peak_width", 1.0)
+    share = share * (1.0 + truth.spread.get("peak_excess", 0.0) * np.exp(-(off_peak**2)))
     return reach_of(truth, cells, level), Ends(discharge, level, share)
 
 

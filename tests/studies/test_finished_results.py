@@ -99,14 +99,12 @@ def test_it_names_what_a_result_lacks(
     folder = folder_of_user(tmp_path / "reach", code, HIDDEN, flows)
     case = vegglue.import_folder(folder, tmp_path / "reach.yaml")
     for name, wanted in {"low": 1.0, "high": 3.2}.items():
-        assert case.experiments[name].discharge["upstream"] == pytest.approx(wanted, rel=0.02)
+        assert case.experiments[name].discharge["upstream"] == pytest.approx(wanted, rel=0.03)
     checked = vegglue.check(case, runs=tmp_path / "runs")
     compared = checked.remarks[0]
     assert isinstance(compared, ResultCompared)
-    print(code, compared)
     assert compared.alike
     found = vegglue.diagnose(case, runs=tmp_path / "runs", jobs=1)
-    print(found)
     assert isinstance(found.verdict.notes[0], ResultCompared)
     assert found.set == ["secondary_current"]
     amplitude = found.candidate_effect("secondary_current").amplitude

@@ -41,6 +41,15 @@ from vegglue.cli.printed import (
 from vegglue.diagnosis.comparison import MEASUREMENT
 from vegglue.diagnosis.stepwise_choice import HeldOutErrorsDidNotFall, UnclearFall
 from vegglue.effects.library import SHIPPED
+from vegglue.importers.import_notes import (
+    CountedStems,
+    ImportNote,
+    Noted,
+    SiteAssumptions,
+    ThickStems,
+    UnreadHoldout,
+    UnreadKeys,
+)
 from vegglue.inference.statements import (
     CalibrationDiffers,
     CalibrationTransfers,
@@ -373,7 +382,16 @@ def page() -> str:
     return "\n".join(page_sentence(one) for one in (brook().verdict, *STATEMENTS[4:6], *STEPS[6:9]))
 
 
+# Every kind of note of `import`, with a number and names; and what a site file leaves open.
+IMPORTED = [
+    *(ImportNote(kind, 2.0 if kind is not Noted.NEAR_AVERAGE else 0.4, ("x", "y")) for kind in Noted),
+    ImportNote(Noted.UNNAMED_SECTIONS, 1),
+    SiteAssumptions("site.yaml", 2.0, 0.8, True, False), SiteAssumptions("site.yaml", None, None, False, True),
+    UnreadKeys("site.yaml", ("weather", "patches[0].diameter"), True), ThickStems(), CountedStems(),
+    UnreadHoldout("holdout.csv", "site.yaml"), UnreadHoldout("holdout.xlsx", "site.yaml", "holdout.csv"),
+]  # fmt: skip
 RENDERED: dict[str, Callable[[], str]] = {
+    "imports": lambda: wrapped(IMPORTED),
     "files": lambda: wrapped((*YAML, *EXTENSIONS, *BUDGET)),
     "verdicts": lambda: "\n\n".join(
         "\n".join([f"## {name}", *verdict_lines(found, COMMAND, 13), "", wrapped([found.verdict])])

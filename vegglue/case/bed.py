@@ -22,7 +22,7 @@ FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")  # 3.7D-01
 # Keys of the header of an ESRI ASCII grid, in lower case.
 HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
 # Words for no level, as some programs write into the header and among the values.
-NO_LEVEL = re.compile(r"\b(null|nodata|na|nan)\b", re.IGNORECASE)
+WORDS_FOR_NO_LEVEL = re.compile(r"\b(null|nodata|na|nan)\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def read_raster(path: Path) -> Raster:
     while first < len(lines) and (words := lines[first].split()) and words[0].lower() in HEADER:
         if len(words) != 2:
             raise InputError(f"{path}, line {first + 1}: expected `{words[0]}` and one number, got {lines[first]!r}.")
-        key, of_nothing = words[0].lower(), NO_LEVEL.fullmatch(words[1])
+        key, of_nothing = words[0].lower(), WORDS_FOR_NO_LEVEL.fullmatch(words[1])
         nothing = key == "nodata_value" and of_nothing
         header[key] = math.nan if nothing else _number(path, first + 1, words[1].replace(",", "."), words[0])
         first += 1
@@ -78,12 +78,9 @@ def read_raster(path: Path) -> Raster:
         corner[axis] = header.get(f"{axis}llcorner", header.get(f"{axis}llcenter", 0.0) - 0.5 * size)
     found = [np.empty(0)]  # a line at a time, so that a large file takes little more than its numbers do
     for number, line in enumerate(lines[first:], first + 1):
+        plain = WORDS_FOR_NO_LEVEL.sub("nan", FORTRAN_EXPONENT.sub("e", line.replace(",", ".")))
         try:
-            found.append(
-                np.array(
-                    NO_LEVEL.sub("nan", FORTRAN_EXPONENT.sub("e", line.replace(",", "."))).split(), dtype=np.float64
-                )
-            )
+            found.append(np.array(plain.split(), dtype=np.float64))
         except ValueError as error:
             word = str(error).rpartition(": ")[2]
             raise InputError(f"{path}, line {number}: expected numbers, got {word}.") from None

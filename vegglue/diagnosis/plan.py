@@ -466,16 +466,23 @@ def _plan_model(
     middle, *others = places_of_prior(len(model.names))[:PRIOR_PLACES]
     coarsest = None if search is here else coarser(search)
 
-    def settled(z: Array, near: Point | None = None) -> Point | None:
+    def in_own_flows(one: Model) -> Model:
+        flows = {name: one.case.experiments[name] for name in model.case.experiments}
+        return replace(one, case=one.case.model_copy(update={"experiments": flows}))
+
+    def settled(of: Model, z: Array, near: Point | None = None) -> Point | None:
         """The point at z, from a known one, or from the flow on still coarser cells, which costs a part of it."""
         for one in known:
-            if np.array_equal(one.point.z, z) and one.point.flows.keys() == search.case.experiments.keys():
-                return linearise_from(search, z, one.point)
-        return linearise_from(search, z, near if coarsest is None else linearise(coarsest, z))
+            if np.array_equal(one.point.z, z) and one.point.flows.keys() == of.case.experiments.keys():
+                return linearise_from(of, z, one.point)
+        below = coarsest if coarsest is None or of is search else in_own_flows(coarsest)
+        return linearise_from(of, z, near if below is None else linearise(below, z))
 
-    start = settled(middle)
+    start = settled(search, middle)
     if start is None:
         return None
+    # Flows that the case does not have are computed in the middle of the priors alone, and have the usual grid error.
+    own_search = in_own_flows(search)
     difference = np.zeros(len(here.station))
     if other is not None:
         kept = list[Array]()
@@ -484,28 +491,34 @@ def _plan_model(
             kept.append(prediction)
             return False
 
-        linearise(other, middle, start if search is on_coarse else None, without_slopes)
-        difference = kept[0] - start.prediction if kept else difference  # its sign is of no matter
+        linearise(in_own_flows(other), middle, start if search is on_coarse else None, without_slopes)
+        if kept:
+            difference = kept[0] - start.prediction  # its sign is of no matter
+            kind = here.station["kind"].to_numpy()
+            for name in np.unique(kind):
+                known_there = difference[(kind == name) & np.isfinite(difference)]
+                usual = float(np.sqrt(np.mean(known_there**2))) if known_there.size else 0.0
+                difference[(kind == name) & ~np.isfinite(difference)] = usual
     of_stations = here.station["standard_error"].to_numpy(float)
     error = np.concatenate([of_stations, np.full(len(places), planned.errors.survey)])
     if not (error[: len(at_hand)] > 0).all():
         noise_of(at_hand)  # which says what lacks an error
 
-    def draw(point: Point) -> PlanDraw:
-        shared = model_error_columns(search, point, search.case.model_error)
+    def draw(of: Model, point: Point) -> PlanDraw:
+        shared = model_error_columns(of, point, of.case.model_error)
         levels = np.zeros((len(places), shared.shape[1]))
         if places:
             levels = _bed_levels(search, np.array(places), levels)
         below = np.zeros((len(places), len(causes)))
         return PlanDraw(
             point,
-            np.vstack([point.slope, np.zeros((len(places), point.slope.shape[1]))]),
-            np.vstack([responses(search, point, causes), below]),
+            np.vstack([np.nan_to_num(point.slope), np.zeros((len(places), point.slope.shape[1]))]),
+            np.vstack([responses(of, point, causes), below]),
             np.vstack([shared, levels]),
         )
 
-    points = [start, *in_threads(settled, [(z, start) for z in others])]
-    draws = in_threads(draw, [(one,) for one in points if one is not None])
+    points = in_threads(settled, [(own_search, z, start) for z in others])
+    draws = in_threads(draw, [(search, start), *((own_search, one) for one in points if one is not None)])
     grid_error = constants().grid_error_share * np.concatenate([difference, np.zeros(len(places))])
     return PlanModel(
         search, len(stations), tuple(possible), tuple(rows), error, grid_error, tuple(candidates), tuple(draws)
@@ -925,7 +938,11 @@ class PlanSearch:
         """
         found = []
         for move in self.moves(()):
-            after = self.answer(self.with_pieces(self.base, move))
+            known = self.with_pieces(self.base, move)
+            after = self.answer(known)
+            if any(self.wide.pieces[j].new for j in move):  # known at the first draw alone
+                gain = self.answer(known[:1]).mean - self.answer(self.base[:1]).mean
+                after = PlanAnswer(self.start.mean + gain, self.start.least)
             if after.mean - self.start.mean > LEAST_PLAN_GAIN:
                 found.append(self._proposed(move, after))
         found.sort(key=lambda one: -one.per_hour)

@@ -118,7 +118,8 @@ def _agreement(model: Model, point: Point, flows: dict[str, TheirFlow], measured
     code = result.code if result is not None else ""
     grid = model.site.grid
     x, y = (part.ravel() for part in np.meshgrid(grid.x, grid.y, indexing="ij"))
-    squares, speeds, levels, depths, wet, other, through, beyond = [], [], [], [], 0, 0, [], 0
+    parts: dict[str, list[Array]] = {"square": [], "speed": [], "level": [], "depth": []}
+    wet, other, beyond, spread = 0, 0, 0, 0.0
     for name, flow in flows.items():
         own = flow_at_centres(model, point, name)
         theirs = flow.at(x, y)
@@ -126,21 +127,20 @@ def _agreement(model: Model, point: Point, flows: dict[str, TheirFlow], measured
         mean = float(np.nanmean(theirs["depth"]))
         theirs_wet, ours_wet = np.nan_to_num(theirs["depth"]) > SHALLOW * mean, depth > SHALLOW * mean
         both = theirs_wet & ours_wet
-        squares.append(((u - theirs["u"])[both]) ** 2 + ((v - theirs["v"])[both]) ** 2)
-        speeds.append(np.hypot(theirs["u"], theirs["v"])[both])
-        levels.append((model.site.bed.ravel() + depth - theirs["level"])[both])
-        depths.append(theirs["depth"][both])
+        parts["square"].append(((u - theirs["u"])[both]) ** 2 + ((v - theirs["v"])[both]) ** 2)
+        parts["speed"].append(np.hypot(theirs["u"], theirs["v"])[both])
+        parts["level"].append((model.site.bed.ravel() + depth - theirs["level"])[both])
+        parts["depth"].append(theirs["depth"][both])
         wet, other = wet + int(theirs_wet.sum()), other + int((theirs_wet != ours_wet).sum())
         beyond += int((ours_wet & ~flow.inside(x, y)).sum())
         inner = np.linspace(grid.x[0], grid.x[-1], 12)[1:-1]
         carried = flow.discharge(grid, inner)
-        through.append(np.std(carried) / max(abs(float(np.mean(carried))), 1e-12))
-    if not wet or not sum(map(len, speeds)):
-        return ResultCompared(code, *(3 * (np.inf,)), np.inf, np.inf, 1.0, np.inf, measured, False, limits)
-    speed, depth_mean = float(np.mean(np.concatenate(speeds))), float(np.mean(np.concatenate(depths)))
-    velocity = float(np.sqrt(np.mean(np.concatenate(squares))))
-    level = float(np.sqrt(np.mean(np.concatenate(levels) ** 2)))
+        spread = max(spread, float(np.std(carried)) / max(abs(float(np.mean(carried))), 1e-12))
+    fields = {name: np.concatenate(each) for name, each in parts.items()}
+    if not fields["speed"].size:  # no cell is wet in both
+        return ResultCompared(code, 1.0, 1.0, 1.0, np.nan, np.nan, 1.0, spread, measured, False, limits)
+    velocity, level = float(np.sqrt(fields["square"].mean())), float(np.sqrt(np.mean(fields["level"] ** 2)))
+    speed, depth_mean = float(fields["speed"].mean()), float(fields["depth"].mean())
     found = (velocity / max(speed, 1e-12), level / depth_mean, other / wet)
     alike = all(one <= most for one, most in zip(found, limits, strict=True))
-    spread = float(max(through))
     return ResultCompared(code, *found, velocity, level, beyond / wet, spread, measured, alike, limits)

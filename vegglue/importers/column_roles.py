@@ -24,6 +24,7 @@ from vegglue.importers.column_names import (
     words_of,
 )
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.table_parser import MOST_ROWS_NAMED, ParsedTable, is_number
 from vegglue.measurements.plausibility import MARKS_OR_VALUES, is_mark_anywhere, is_of_nines
 from vegglue.wording.numbers import listed, so_many
@@ -231,7 +232,7 @@ def _stated_unit(table: ParsedTable, place: int, quantity: str) -> str:
 
 def numbers_of_column(
     path: Path, table: ParsedTable, place: int, role: str, unit: str, missing: tuple[float, ...]
-) -> tuple[Array, list[str]]:
+) -> tuple[Array, list[FileNote]]:
     """A column of a role in SI, NaN for no value, and what was left out or kept that may be a mark.
 
     Sevens and eights mark no value if no reading is so large; nines if they are negative, as 99 m may be a level.
@@ -251,16 +252,16 @@ def numbers_of_column(
             f"{table.rows[row][place]}; correct it, or write `missing: [{values[row]:g}]` of this file if it marks no "
             "value."
         )
-    notes = []
+    notes: list[FileNote] = []
     if quantity == "velocity":
         kept = sorted({f"{value:g}" for value in values.tolist() if value > 0.0 and is_of_nines(value)})
         notes += [
-            f"kept {number} in {heading} (if it marks no value, say `missing: [{number}]`)"
+            ImportNote(Noted.KEPT_NINES, names=(number, heading))
             for number in kept
             if number.count("9") >= FEWEST_NINES
         ]
     empty = sum(not text.strip() for text in table.texts(place))
     absent = int(np.isnan(values).sum()) - empty
-    notes += [f"{so_many(absent, 'mark')} for no value in {heading}"] if absent else []
-    notes += [f"{so_many(empty, 'empty cell')} in {heading}"] if empty else []
+    notes += [ImportNote(Noted.MARKS, absent, (heading,))] if absent else []
+    notes += [ImportNote(Noted.EMPTY, empty, (heading,))] if empty else []
     return values * factor, notes

@@ -24,11 +24,12 @@ from vegglue.arrays import Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import si_factor
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.library_files import read_by_library, readable_text, reading_structures, refuse_larger
 from vegglue.importers.measured_rows import MeasuredRows, on_the_tape, rows_of_table
 from vegglue.importers.table_parser import Line, ParsedTable, is_number
 from vegglue.measurements.plausibility import is_mark_anywhere
-from vegglue.wording.numbers import so_many
+from vegglue.wording.sentences import sentence
 
 ZIP_BEGINS = b"PK\x03\x04"
 DATA_FILE = "datafile.json"
@@ -195,7 +196,8 @@ def _table(headings: tuple[str, ...], units: tuple[str, ...], rows: list[Line], 
         if fields and (is_number(fields[0]) or 2 * sum(map(is_number, fields)) >= len(headings))
     ]
     kept = [(number, fields) for number, fields in there if len(fields) == len(headings)]
-    form += f", {so_many(len(there) - len(kept), 'row')} of another width left out" if len(there) > len(kept) else ""
+    other = sentence(ImportNote(Noted.OTHER_WIDTH, len(there) - len(kept)))
+    form += f", {other}" if len(there) > len(kept) else ""
     texts, numbers = tuple(fields for _, fields in kept), tuple(number for number, _ in kept)
     return ParsedTable(headings, units, texts, numbers, decimal_comma=False, form=form)
 
@@ -208,7 +210,7 @@ def _wet_verticals(taken: MeasuredRows, measured: Mask) -> MeasuredRows:
     """
     wet = np.isfinite(taken.numbers["u"]) & (taken.numbers["depth"] > 0.0) & measured
     lost = int((~wet & (taken.numbers["depth"] != 0.0)).sum())
-    notes = [f"{so_many(lost, 'row')} without a measurement left out"] if lost else []
+    notes = [ImportNote(Noted.UNMEASURED, lost)] if lost else []
     taken = taken.only(wet)
     place = taken.numbers["tape"]
     last = np.array([not np.any(place[i + 1 :] == place[i]) for i in range(taken.size)], dtype=bool)
@@ -216,6 +218,6 @@ def _wet_verticals(taken: MeasuredRows, measured: Mask) -> MeasuredRows:
     u = np.abs(kept.numbers["u"])
     own = kept.numbers.get("u_se", np.full(kept.size, np.nan))
     unknown = int(np.isnan(own).sum())
-    notes += [f"{so_many(unknown, 'error')} not stated"] if 0 < unknown < kept.size else []
+    notes += [ImportNote(Noted.ERRORS_UNKNOWN, unknown)] if 0 < unknown < kept.size else []
     sound = np.where(own < 0.5 * u, own, LEAST_ERROR)
     return kept.having({"u_se": np.hypot(OF_THE_RULE * u, np.fmax(sound, LEAST_ERROR))}, *notes)

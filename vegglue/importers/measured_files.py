@@ -21,6 +21,7 @@ from vegglue.importers.column_names import ROLES, words_of
 from vegglue.importers.column_roles import OF_FLAGS
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_options import FileOptions, read_file_options
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
 from vegglue.importers.library_files import readable_text
 from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, joined_rows, with_experiments
@@ -295,7 +296,7 @@ def _converted(
             floor, of = numbers.get("z_bed"), "in the table"
             if floor is None:
                 floor, of = bed(numbers["x"], numbers.get("y", np.zeros(one.size))), "of the case"
-            note = f"levels from depths, above that of the bed {of}"
+            note = ImportNote(Noted.LEVELS_FROM_DEPTHS, names=(of,))
             placed[number] = one.having({"level": floor + numbers["depth"]}, note)
     path, options = group[0]
     if len(group) > 1:  # each file keeps standard errors of its own, NaN if neither it nor the site file has one

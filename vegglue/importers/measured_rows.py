@@ -21,8 +21,10 @@ from vegglue.importers.column_roles import (
     without_flagged,
 )
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.table_parser import ParsedTable, parse_table, without_copies
-from vegglue.wording.numbers import in_digits, listed, so_many
+from vegglue.wording.numbers import listed, so_many
+from vegglue.wording.sentences import sentences
 
 MOST_UNREAD = 12  # columns without a role that are listed
 # Options of other files, which do nothing to a table.
@@ -104,7 +106,7 @@ class MeasuredRows:
     texts: Mapping[str, Sequence[str]]
     columns: Mapping[str, str]
     units: Mapping[str, str]
-    notes: tuple[str, ...]
+    notes: tuple[FileNote, ...]
     others: Mapping[str, Sequence[str]] = field(default_factory=dict)
     lines: Sequence[int] = ()
     of_probe: bool = False
@@ -129,7 +131,7 @@ class MeasuredRows:
         numbers = {role: values[rows] for role, values in self.numbers.items()}
         return replace(self, numbers=numbers, texts=texts, others=others, lines=lines)
 
-    def having(self, numbers: Mapping[str, Array], *notes: str) -> "MeasuredRows":
+    def having(self, numbers: Mapping[str, Array], *notes: FileNote) -> "MeasuredRows":
         """The rows with these numbers (rows,) in SI, in place of those of the same role, and with further notes."""
         return replace(self, numbers={**self.numbers, **numbers}, notes=(*self.notes, *notes))
 
@@ -169,7 +171,7 @@ class MeasuredRows:
         unread = [heading for heading in self.others if heading.strip()]
         more = [f"{len(unread) - MOST_UNREAD} more"] if len(unread) > MOST_UNREAD else []
         not_read = f"; not read: {listed([*unread[:MOST_UNREAD], *more])}" if unread else ""
-        return f"{', '.join(roles)}; {', '.join(self.notes)}; {so_many(self.size, 'row')}{not_read}"
+        return f"{', '.join(roles)}; {', '.join(sentences(self.notes))}; {so_many(self.size, 'row')}{not_read}"
 
 
 def read_rows(path: Path, options: FileOptions) -> MeasuredRows:
@@ -197,7 +199,7 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
     numbers: dict[str, Array] = {}
     units: dict[str, str] = {}
     assumed = taken_as_si(table, columns, options)
-    notes = [*([f"no unit given of {listed(assumed)}, taken as SI"] if assumed else []), table.form]
+    notes: list[FileNote] = [*([ImportNote(Noted.NO_UNIT, names=tuple(assumed))] if assumed else []), table.form]
     for role, place in columns.items():
         if ROLES[role].quantity:
             units[role] = unit_of_column(path, table, columns, role, options)
@@ -229,12 +231,12 @@ def read_placed_rows(path: Path, options: FileOptions) -> MeasuredRows:
     taken = read_rows(path, replace(options, line=None))
     if {"below", "depth"} <= taken.numbers.keys() and vertical_role(taken) is None:
         height = taken.numbers["depth"] - taken.numbers["below"]
-        taken = taken.having({"height": height}, "height above the bed from both depths")
+        taken = taken.having({"height": height}, ImportNote(Noted.HEIGHT_FROM_DEPTHS))
     if {"u", "depth"} <= taken.numbers.keys():  # edges of a gauging, where the bank meets the water
         edges = (taken.numbers["u"] == 0.0) & (taken.numbers["depth"] <= 0.0)
         if edges.any():
             u = np.where(edges, np.nan, taken.numbers["u"])
-            taken = taken.having({"u": u}, f"{so_many(int(edges.sum()), 'edge')} without a depth left out")
+            taken = taken.having({"u": u}, ImportNote(Noted.EDGES, int(edges.sum())))
     if options.line is not None:
         places = [taken.columns[role] for role in ("x", "y") if role in taken.numbers]
         if places:
@@ -254,7 +256,7 @@ def read_placed_rows(path: Path, options: FileOptions) -> MeasuredRows:
                 f"{shown_path(path)}: expected no `x` in its entry of `files`, which is for tables without one, got x "
                 f"in {taken.columns['x']}; take it out, or name the column by `columns`."
             )
-        return taken.having({"x": np.full(taken.size, options.x)}, f"x = {options.x:g} m of all rows")
+        return taken.having({"x": np.full(taken.size, options.x)}, ImportNote(Noted.SAME_X, options.x))
     return taken
 
 
@@ -274,7 +276,7 @@ def on_the_tape(path: Path, taken: MeasuredRows, options: FileOptions) -> Measur
     east, north = (x1 - x0) / length, (y1 - y0) / length
     t = taken.numbers["tape"]
     places = {"x": x0 + t * east, "y": y0 + t * north}
-    return taken.having(places, f"places along a tape of {in_digits(length, 4)} m").without("tape")
+    return taken.having(places, ImportNote(Noted.ON_TAPE, length)).without("tape")
 
 
 def vertical_role(taken: MeasuredRows) -> str | None:
@@ -299,16 +301,15 @@ def in_the_channel(taken: MeasuredRows, place: Placement, options: FileOptions) 
         parts = {"east_velocity": numbers["speed"] * np.sin(to), "north_velocity": numbers["speed"] * np.cos(to)}
         if (error := numbers.get("speed_se")) is not None:  # one error for a velocity is that of both components
             parts |= {"u_se": error, "v_se": error}
-        taken = taken.having(parts, "components from speed and direction").without("speed", "direction", "speed_se")
+        taken = taken.having(parts, ImportNote(Noted.COMPONENTS)).without("speed", "direction", "speed_se")
     elif "speed" in numbers and known:  # beside a component it is the same reading, and would count twice
         again = np.any([np.isfinite([numbers[role] for role in roles]).all(axis=0) for roles in known], axis=0)
         if again.any():
             left = np.where(again, np.nan, numbers["speed"])
-            taken = taken.having({"speed": left}, "speed not taken again beside its components")
+            taken = taken.having({"speed": left}, ImportNote(Noted.SPEED_TWICE))
     if place.turned and options.coordinates != "channel" and {"x", "y"} <= taken.numbers.keys():
         x, y = place.to_channel(taken.numbers["x"], taken.numbers["y"])
-        into = "the channel" if place.line is None else "lengths along and across the centreline"
-        taken = taken.having({"x": x, "y": y}, f"places turned from the map into {into}")
+        taken = taken.having({"x": x, "y": y}, ImportNote(Noted.INTO_CHANNEL, int(place.line is not None)))
     taken = _along_and_across(taken, place, options)
     turned = {"x": ("x", "u"), "y": ("y", "v")}
     flipped = {name: -taken.numbers[name] for axis in options.flip for name in turned[axis] if name in taken.numbers}
@@ -330,7 +331,7 @@ def _along_and_across(taken: MeasuredRows, place: Placement, options: FileOption
         return taken
     first, second = (taken.numbers[role] for role in pair)
     of_map = options.directions == "map" or (options.directions is None and not taken.of_probe)
-    notes: tuple[str, ...] = ()
+    notes: tuple[FileNote, ...] = ()
     if place.turned and of_map and (pair != ("u", "v") or options.coordinates != "channel"):
         along = taken.numbers.get("x", np.zeros(taken.size))
         first, second = place.turned_to_channel(along, first, second)
@@ -339,9 +340,9 @@ def _along_and_across(taken: MeasuredRows, place: Placement, options: FileOption
             one, none = np.ones(taken.size), np.zeros(taken.size)
             (ee, en), (ne, nn) = place.turned_to_channel(along, one, none), place.turned_to_channel(along, none, one)
             taken = taken.having({"u_se": np.hypot(ee * east, ne * north), "v_se": np.hypot(en * east, nn * north)})
-        notes = ("velocities turned with them, as components east and north",)
+        notes = (ImportNote(Noted.VELOCITIES_TURNED),)
     elif place.turned and taken.of_probe:
-        notes = ("x and y of the probe along and across the channel (else say `directions: map`)",)
+        notes = (ImportNote(Noted.OF_PROBE),)
     return taken.without(*pair).having({"u": first, "v": second}, *notes)
 
 

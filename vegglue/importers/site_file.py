@@ -17,6 +17,7 @@ from vegglue.case.text_files import read_text, unprintable
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import UNITS, in_si
 from vegglue.importers.config_parts import VISCOSITY_FACTOR
+from vegglue.importers.import_notes import CountedStems, SiteAssumptions, ThickStems, UnreadHoldout, UnreadKeys
 from vegglue.measurements.plausibility import is_mark_anywhere
 
 # Name of the file of measurements that no calibration sees, whatever its ending.
@@ -295,7 +296,9 @@ class _StraightlyPlaced(_SitePart):
     frame: _WholeFrame
 
 
-SITE_PARTS: dict[str, type[BaseModel]] = {"channel": Channel, "grid": SiteGrid, "frame": SiteFrame, "walls": FlumeWalls}
+SITE_PARTS: dict[str, type[BaseModel]] = {
+    "channel": Channel, "grid": SiteGrid, "frame": SiteFrame, "walls": FlumeWalls, "result": ResultEntry,
+}  # fmt: skip
 # Keys of an experiment, each by either name.
 OF_FLOW = (("discharge", "discharge_m3_s"), ("level", "downstream_level_m"))
 # How alike two words are that are one misspelt [-], and letters of a word cut short: `stems` for `stems_per_m2`.
@@ -307,13 +310,6 @@ OTHER_WORDS = {
     "canopy_height": "canopy_height_guess_m", "q": "discharge", "width": "bottom_width_m", "slope": "bed_slope",
     "viscosity": "eddy_viscosity_m2_s",
 }  # fmt: skip
-# What takes the place of two things that are often counted.
-THICK_STEMS = (
-    "Diameters of stems have no key: the drag phi = C_d m D h of the densest patch is calibrated, with the diameter D "
-    "in it. Where it differs from patch to patch, write stems times diameter [1/m] as `stems_per_m2` of all of them: "
-    "only their ratio counts. Where you know D, narrow the prior of phi in the config."
-)
-COUNTED_STEMS = "The number of stems in a patch has no key: write it over the area of the patch, as `stems_per_m2`."
 
 
 def site_file(folder: Path) -> Path:
@@ -369,40 +365,36 @@ def read_site(path: Path, completed: Any = None) -> FieldSite:
     return site
 
 
-def assumptions_of_site(folder: Path, site: FieldSite) -> list[str]:
+def assumptions_of_site(folder: Path, site: FieldSite) -> list[object]:
     """What `import` assumes because the site file does not state it, and what in the folder is not read.
 
     site: of the folder. InputError as `read_site`.
     """
     path = site_file(folder)
     given = read_keys(path) if path.is_file() else {}
-    assumed = []
-    if "eddy_viscosity_m2_s" not in site.model_fields_set:
-        within = f" (standard deviation: a factor of {site.viscosity_factor:g})" if site.viscosity_factor > 1 else ""
-        assumed.append(f"eddy_viscosity_m2_s by depth, speed and usual roughness{within}")
-    if site.patches and "canopy_height_guess_m" not in site.model_fields_set:
-        assumed.append(f"canopy_height_guess_m {site.canopy_height_guess_m:g}")
     here = [one for one in site.patches if one.file is None]
-    if here and not any("stems_per_m2" in one.model_fields_set for one in here):
-        assumed.append("plants equally dense in all patches that have no file")
-    if not site.patches:
-        assumed.append("no plants")
-    unread = [place + key for place, key, _ in _unknown_keys(given)]
-    if site.walls is not None and site.channel is not None and site.channel.bank_slope_v_per_h is not None:
-        unread.append("channel.bank_slope_v_per_h, as there are walls")
-    lines = [f"{path.name} does not say, and so is assumed: {', '.join(assumed)}."] if assumed else []
-    lines += [f"{path.name}: taken as notes, and not read: {', '.join(unread)}."] if unread else []
+    stated = site.model_fields_set
+    found: list[object] = [
+        SiteAssumptions(
+            file=path.name,
+            viscosity=None if "eddy_viscosity_m2_s" in stated else site.viscosity_factor,
+            canopy=site.canopy_height_guess_m if site.patches and "canopy_height_guess_m" not in stated else None,
+            alike=bool(here) and not any("stems_per_m2" in one.model_fields_set for one in here),
+            bare=not site.patches,
+        )
+    ]
+    unread = tuple(place + key for place, key, _ in _unknown_keys(given))
+    walled = site.walls is not None and site.channel is not None and site.channel.bank_slope_v_per_h is not None
+    found += [UnreadKeys(path.name, unread, walled)] if unread or walled else []
     of_patches = [key.rpartition(".")[2].lower() for key in unread if key.startswith("patches")]
     if any("diam" in word or "thick" in word for word in of_patches):
-        lines.append(THICK_STEMS)
+        found.append(ThickStems())
     if any("stem" in word and ("number" in word or "count" in word) for word in of_patches):
-        lines.append(COUNTED_STEMS)
+        found.append(CountedStems())
     held_out = held_out_files(folder)
     if held_out and not site.holdout:
-        lines.append(f"{held_out[0].name} is not read: {path.name} names no experiment under `holdout`.")
-    for other in held_out[1:]:
-        lines.append(f"{other.name} is not read, as {held_out[0].name} is: put the rows of both into one.")
-    return lines
+        found.append(UnreadHoldout(held_out[0].name, path.name))
+    return [*found, *(UnreadHoldout(other.name, path.name, held_out[0].name) for other in held_out[1:])]
 
 
 def read_keys(path: Path) -> Any:

@@ -14,6 +14,7 @@ from vegglue.importers.column_names import is_in_degrees, unit_stated, words_of
 from vegglue.importers.column_roles import NO_DEGREES
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.measured_rows import MeasuredRows, Placement, vertical_role
 from vegglue.importers.repeats import (
     PlaceKey,
@@ -27,6 +28,7 @@ from vegglue.importers.site_file import HELD_OUT
 from vegglue.importers.table_parser import numbers_of
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
 from vegglue.wording.numbers import listed, so_many
+from vegglue.wording.sentences import sentences
 
 EXPERIMENTS = "experiments"
 VELOCITIES = ("u", "v", "speed")
@@ -36,10 +38,6 @@ VERTICALS = 0.2
 # Height of a point over the depth at which a log law has its average [-], the rule of 0.6 below the surface; and how
 # near that is near enough: it moves the velocity of a log law by 2 %.
 OF_AVERAGE, NEAR_AVERAGE = 0.4, 0.05
-NOT_AVERAGES = (
-    "they are that about 0.4 of the depth above the bed only, and not among plants; correct others, or state errors "
-    "that hold the difference"
-)
 # By how much verticals are moved to the line of their section before a note says so [m].
 NEAR_LINE = 0.01
 OTHER_NAMES_SHOWN = 4  # names of a column that a message lists
@@ -107,13 +105,13 @@ class StationTables:
     """The tables of one file; left_out: what they lack, and how many of its rows are in none of them and why."""
 
     tables: list[StationTable]
-    left_out: tuple[str, ...]
+    left_out: tuple[FileNote, ...]
 
     @property
     def taken(self) -> str:
         """What was made of the rows."""
         made = [table.taken for table in self.tables] or ["no measurement, left out"]
-        return ", ".join([*made, *self.left_out])
+        return ", ".join([*made, *sentences(self.left_out)])
 
 
 def station_tables(
@@ -125,12 +123,11 @@ def station_tables(
     names = taken.texts.get("section", ()) if options.section is None else ()
     unnamed = sum(not name for name in names)
     if 0 < unnamed < len(names):  # below a merged cell, say
-        lacking = "1 row lacks its name" if unnamed == 1 else f"{unnamed:,} rows lack their names"
-        without_place = (*without_place, f"sections told by x, as {lacking}")
+        without_place = (*without_place, ImportNote(Noted.UNNAMED_SECTIONS, unnamed))
     named = _named(taken, options, known.names, f"{file}:")
     taken, once = _once_in_a_section(named)
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
-    on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else ("y = 0 for want of a column",)
+    on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else (ImportNote(Noted.ON_AXIS),)
     if options.experiment is not None and options.experiment not in known.names:
         raise InputError(f"{file}: {known.remedy(options.experiment)}; or correct `experiment` of this file.")
     if kinds and taken.lines:
@@ -138,7 +135,7 @@ def station_tables(
         known.refuse_unknown(file, measured.lines, measured.texts["experiment"])
     if _in_verticals(taken):
         refuse_confounded_replicates(named, _heights(named), file)
-        beside = tuple(f"{kind.words} beside points left out" for kind in kinds if not kind.velocity)
+        beside = tuple(ImportNote(Noted.BESIDE_POINTS, names=(kind.words,)) for kind in kinds if not kind.velocity)
         _refuse_zeros(taken, options, file, vertical_role(taken))
         lacking_points = _lacking(taken, ["u", str(vertical_role(taken))], np.all)
         return StationTables([_points(taken, stem, options)], (*on_axis, *without_place, *lacking_points, *beside))
@@ -148,25 +145,23 @@ def station_tables(
     found = [_stations(taken, stem, options, kind, place) for kind in kinds]
     without_value = _lacking(taken, [kind.column for kind in kinds], np.any)
     role = vertical_role(taken)
-    at_height: tuple[str, ...] = ()
+    at_height: tuple[FileNote, ...] = ()
     if role is not None and "u" in taken.numbers and np.isfinite(taken.numbers[role]).any():
         share = taken.numbers[role] / taken.numbers["depth"] if {"height", "depth"} <= taken.numbers.keys() else None
         if share is not None and (np.abs(share[np.isfinite(share)] - OF_AVERAGE) < NEAR_AVERAGE).all():
-            as_rule = f"at about {OF_AVERAGE:g} of the depth above the bed, and so taken for averages over the depth"
-            at_height = (as_rule,)
+            at_height = (ImportNote(Noted.NEAR_AVERAGE, OF_AVERAGE),)
         else:
-            unused = f"few places have several heights ({role} not used): {NOT_AVERAGES}"
-            at_height = (f"taken for averages over the depth, as {unused}",)
+            at_height = (ImportNote(Noted.HEIGHTS_UNUSED, names=(role,)),)
     left_out = (*on_axis, *without_place, *without_value, *once, *at_height)
     return StationTables([table for table in found if table.rows], left_out)
 
 
-def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[str, ...]:
-    """`2 rows left out for want of x or y`, if all or any of the roles are needed; nothing if no row is."""
+def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[FileNote, ...]:
+    """How many rows are left out for want of a role, if all or any of the roles are needed; nothing if no row is."""
     if not roles:
         return ()
     lacking = int((~needed([np.isfinite(taken.numbers[role]) for role in roles], axis=0)).sum())
-    return (f"{so_many(lacking, 'row')} left out for want of {' or '.join(roles)}",) if lacking else ()
+    return (ImportNote(Noted.LACKING, lacking, tuple(roles)),) if lacking else ()
 
 
 def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str], where: str) -> MeasuredRows:
@@ -357,13 +352,13 @@ def _rows_of_sections(taken: MeasuredRows, role: str) -> list[list[int]]:
     return list(rows.values())
 
 
-def _once_in_a_section(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ...]]:
+def _once_in_a_section(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[FileNote, ...]]:
     """The rows with the discharge of a section once, without shares of it by verticals, and with a level that all
     verticals repeat once; and notes on these.
 
     Several discharges at one y are repeats, and stay; gauges on both banks are two readings, even if they agree.
     """
-    notes: list[str] = []
+    notes: list[FileNote] = []
     across = taken.numbers.get("y", np.zeros(taken.size))
     if {"y", "discharge"} <= taken.numbers.keys():
         found, shares = taken.numbers["discharge"].copy(), 0
@@ -374,9 +369,7 @@ def _once_in_a_section(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ..
             found[rows[1:] if alike else rows] = np.nan
             shares += 0 if alike else len(rows)
         taken = taken.having({"discharge": found})
-        if shares:
-            left_out = f"{so_many(shares, 'discharge')} left out"
-            notes.append(f"{left_out}, as those of one section differ: shares of its verticals")
+        notes += [ImportNote(Noted.SHARES, shares)] if shares else []
     if {"y", "level"} <= taken.numbers.keys() and taken.numbers.keys() & set(VELOCITIES):
         found = taken.numbers["level"].copy()
         sections = [rows for rows in _rows_of_sections(taken, "level") if len(set(across[rows])) > 2]
@@ -384,8 +377,7 @@ def _once_in_a_section(taken: MeasuredRows) -> tuple[MeasuredRows, tuple[str, ..
         for rows in repeated:
             found[rows[1:]] = np.nan
         taken = taken.having({"level": found})
-        if repeated:
-            notes.append(f"levels of {so_many(len(repeated), 'section')} once, as all rows repeat them")
+        notes += [ImportNote(Noted.LEVEL_ONCE, len(repeated))] if repeated else []
     return taken, tuple(notes)
 
 

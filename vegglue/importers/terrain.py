@@ -67,7 +67,7 @@ ROLES_OF_BED = {"x", "y", "z", "section"}
 SPREAD_OF_SECTION = 1.0
 # Cells across the survey, and how much longer than wide a cell is, as for a straight channel.
 SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0
-NO_LEVEL = -9999
+MARK_OF_NO_LEVEL = -9999
 MOST_LEVELS = 10 * MOST_CELLS  # of some eight bytes each; a case reads no larger file
 # Kind and name of the file of a bed: on a straight grid, and along a centreline.
 BED_FILES = (("raster", "bed.asc"), ("points", "bed.csv"))
@@ -257,7 +257,7 @@ def _bed_text(terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> tu
     inside = (at_x > west) & (at_x < east) & (at_y > south) & (at_y < north)
     if place.line is None:
         head = {"ncols": x.size, "nrows": y.size, "xllcorner": x[0] - 0.5 * size, "yllcorner": y[0] - 0.5 * size}
-        head |= {"cellsize": size, "nodata_value": NO_LEVEL}
+        head |= {"cellsize": size, "nodata_value": MARK_OF_NO_LEVEL}
         rows = [" ".join(f"{value:.4f}" for value in row) for row in level.reshape(x.size, y.size).T[::-1]]
         text = "\n".join([f"{key} {float(value):.12g}" for key, value in head.items()] + rows) + "\n"
     else:
@@ -286,6 +286,14 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         if ending not in (".tif", ".tiff") and (system := path.with_suffix(".prj")).is_file():
             refuse_other_system(path, system_of_wkt(readable_text(system)), place.frame)
         raster = read_geotiff(path, place.frame) if ending in (".tif", ".tiff") else read_raster(path)
+        scaled = ""
+        beside = path.with_name(f"{path.name}.aux.xml")  # what GDAL keeps of a format that has no room for it
+        if ending not in (".tif", ".tiff") and beside.is_file():
+            with read_by_library(beside, "what GDAL keeps beside a grid"):
+                stated = dict(re.findall(r"<(Scale|Offset)>([^<]+)<", readable_text(beside)))
+                scale, offset = float(stated.get("Scale", 1.0)), float(stated.get("Offset", 0.0))
+            raster = replace(raster, values=raster.values * scale + offset)
+            scaled = f", times {scale:g} plus {offset:g} m" if stated else ""
         raster, filled_up = _without_fill(raster)
         reader = RegularGridInterpolator((raster.x, raster.y), raster.values, bounds_error=False, fill_value=np.nan)
         known = np.argwhere(~np.isnan(raster.values))
@@ -294,7 +302,7 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         return Terrain(
             lambda x, y: np.asarray(reader(np.column_stack(place.to_map(x, y)))),
             _extent(along, across),
-            f"grid of {len(known):,} levels, {raster.size:g} m apart{filled_up}",
+            f"grid of {len(known):,} levels, {raster.size:g} m apart{scaled}{filled_up}",
         )
     with path.open("rb") as file:
         of_ras = file.read(len(GEOMETRY_OF_RAS)) == GEOMETRY_OF_RAS

@@ -35,7 +35,7 @@ from vegglue.importers.result_site import SiteOfResult, site_of
 from vegglue.importers.site_file import assumptions_of_site, site_file
 from vegglue.measurements.observations import read_observations
 from vegglue.wording.remedies import ANOTHER_FILE, ROOM_FOR_TEMPORARY
-from vegglue.wording.sentences import sentence
+from vegglue.wording.sentences import sentence, sentences
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
@@ -88,7 +88,7 @@ def assumptions_of(folder: Path | str) -> list[str]:
         return []
     if site_file(folder).is_file() or (folder.is_dir() and any(map(holds_result, folder.iterdir()))):
         found = site_of(folder)
-        return assumptions_of_site(folder, found.site if isinstance(found, SiteOfResult) else found)
+        return list(sentences(assumptions_of_site(folder, found.site if isinstance(found, SiteOfResult) else found)))
     return list(NOT_STATED) if holds_confluence(folder) or mat_folder(folder) is not None else []
 
 
