@@ -242,7 +242,7 @@ def write_folder(folder: Path, seed: int, site: NaturalReach, hidden: HiddenThin
             truly = deep + (VERTICALS * site.rough * rng.standard_normal(deep.size) if name != HELD_OUT else 0.0)
             u = read(flow.u, np.full(deep.size, x), truly)
             if name == HELD_OUT:
-                held += [f"{name},{letter},{x},{y:.2f},{value:.4f}," for y, value in zip(deep, u, strict=True)]
+                held += [f"{name},{letter},{x},{y:.2f},{value:.4f}" for y, value in zip(deep, u, strict=True)]
                 continue
             u = u * (1.0 + hidden.amplitude * (hidden.name == f"probe_gain[{letter}]"))
             u = u + VELOCITY_ERROR * rng.standard_normal(u.size)
@@ -277,7 +277,7 @@ def write_folder(folder: Path, seed: int, site: NaturalReach, hidden: HiddenThin
         "grid": {"x": [0, LENGTH], "y": [-HALF, HALF]},
     }  # fmt: skip
     tables = {
-        "velocities": velocities, "levels": levels, "holdout": [velocities[0], *held], "sections": survey,
+        "velocities": velocities, "levels": levels, "holdout": ["experiment,section,x,y,u", *held], "sections": survey,
         "patches": corners,
     }  # fmt: skip
     for name, rows in tables.items():
