@@ -25,7 +25,27 @@ EAST_NORTH_UP, OVER_GROUND, IN_TRANSECT = 2, (1, 2, 3), 3
 
 
 def stations_of_riversurveyor(path: Path, parts: dict[str, Any], options: FileOptions) -> MeasuredRows:
-    """Stations of a transect. InputError."""
+    """Stations of a transect, from an export of RiverSurveyor Live to MATLAB.
+
+    Parameters
+    ----------
+    path
+        For messages.
+    parts
+        Variables of the file: Setup, Summary, System, WaterTrack.
+    options
+        `start` of the boat [m].
+
+    Returns
+    -------
+    MeasuredRows
+        Velocities east and north at up to 15 stations, with errors [m/s].
+
+    Raises
+    ------
+    InputError
+        For other coordinates than ENU, and a boat that leaps.
+    """
     with reading_structures(path, "the structures of a MATLAB export of RiverSurveyor Live", "export it anew"):
         profiles = _profiles(path, parts)
     refuse_leaps(path, profiles)
