@@ -11,9 +11,8 @@ conjugate residuals: if a cell is about to fall dry they can be so far off that 
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.flow import block_elimination
 from vegglue.flow.equations import residual
-from vegglue.flow.jacobian import Factors, column_held, shared_inflows, sharing_at
+from vegglue.flow.jacobian import Factors, SharedFactors, column_held, shared_inflows, sharing_at, solved
 from vegglue.flow.problem import LEVEL, Problem, take
 
 # Step [m, m/s] of the central difference along a direction scaled to one: chosen, not measured. Tangents agree with
@@ -101,8 +100,9 @@ def adjoints(problem: Problem, state: Array, shared: Factors, weights: Array) ->
         l (nx, 3, ny, p).
     """
     sides = [inflow for inflow in shared_inflows(problem) if inflow.side != "west"]
-    sharings = [sharing_at(problem, state, inflow) for inflow in sides]
-    answer = correction = _solved_transposed(shared, weights)
+    exact = isinstance(shared.inverse, SharedFactors)
+    sharings = [] if exact else [sharing_at(problem, state, inflow) for inflow in sides]
+    answer = correction = solved(shared.inverse, weights, transposed=True)
     for _ in range(REPEATS if sharings else 0):
         left = np.zeros_like(correction)  # (A - J)' l: what A puts down to columns that its blocks hold
         levels = left[:, LEVEL]
@@ -113,16 +113,9 @@ def adjoints(problem: Problem, state: Array, shared: Factors, weights: Array) ->
                 change = one.slope[:, None] * weight
                 np.add.at(levels, (one.column, one.row), change)
                 np.add.at(levels, (column_held(one.column, int(block)), one.row), -change)
-        correction = _solved_transposed(shared, left)
+        correction = solved(shared.inverse, left, transposed=True)
         answer = answer + correction
     return answer
-
-
-def _solved_transposed(shared: Factors, weights: Array) -> Array:
-    nx, _, ny, p = weights.shape
-    work = weights.astype(np.float32).reshape(nx, 3 * ny, p)
-    block_elimination.solve_transposed(shared.columns, shared.far, work)
-    return work.reshape(weights.shape).astype(np.float64)
 
 
 def _product(one: Array, other: Array) -> Array:
