@@ -20,7 +20,7 @@ FLOW, AT_WORK = 1000.0, 5000.0
 # and of the one it started from, and two to spare.
 SETS = 6.0
 # Share of the machine's memory that may be used unless a command says otherwise [-].
-SHARE = 0.9
+MEMORY_SHARE = 0.9
 GIGABYTE = 1e9
 
 

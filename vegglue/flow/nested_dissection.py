@@ -28,7 +28,7 @@ from vegglue.compilation import compiled_exactly
 from vegglue.flow.block_elimination import ACROSS_PERIOD, ALONG_PERIOD, ROWS_REACH
 
 Indices = NDArray[np.int64]
-Memory = tuple[Single, Single, Single]
+PartMatrices = tuple[Single, Single, Single]
 # Cells of a part that is not cut further [-].
 LEAF = 16
 # Rounds of correction of adjoints [-], which nothing else corrects. Chord steps and tangents correct themselves, in 40
@@ -332,7 +332,7 @@ class SparseFactors:
 
     values: Single
     far: Single
-    kept: list[Memory]
+    kept: list[PartMatrices]
 
     def solve(self, right: Single, transposed: bool = False) -> None:
         """A x = right, or A' x = right, in place and nearly; right (nx, 3 ny, n)."""
@@ -353,7 +353,7 @@ class SparseFactors:
             found[at] += step
         rows[...] = found
 
-    def _memory(self) -> Memory:
+    def _memory(self) -> PartMatrices:
         """The factors, made again to the same bits if need be; those used longest ago make room."""
         memory = next(iter(self.kept), None) or factors_of(self.values, self.far)
         with _LOCK:
@@ -386,7 +386,7 @@ def _rows_in_order(nx: int, ny: int) -> Indices:
     return np.stack([(own // ny * 3 + kind) * ny + own % ny for kind in range(3)], axis=1).ravel()
 
 
-def factors_of(values: Single, far: Single) -> Memory:
+def factors_of(values: Single, far: Single) -> PartMatrices:
     """Factors of a Jacobian with these entries, see `collect_stencil`."""
     parts = dissection(*values.shape[:2])
     starts = np.stack([parts.inverse, parts.lower, parts.upper])
