@@ -169,8 +169,8 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
             hopeful = True
     if flow is None:
         coarse = None if hopeful else _from_coarser_cells(model, experiment, z)
-        for start in [warm] if coarse is None else [coarse, warm]:
-            solution, own, band = settled(problem, start, tolerance)
+        for beginning in [warm] if coarse is None else [coarse, warm]:
+            solution, own, band = settled(problem, beginning, tolerance)
             if own is not None:
                 break
         else:

@@ -22,6 +22,9 @@ DIRECTION_STEP = 1e-5
 MOST_ROUNDS = 12
 # Causes answered together [-]: what has been tried for each is kept, so that more need more memory.
 CAUSE_SLOTS = 16
+# Sparse factors are those of a matrix near J: what the last correction leaves is up to 0.3 of it [-], of others a
+# hundredth, so that corrections go on to a smaller one.
+FURTHER_IF_SPARSE = 0.1
 # Corrections of adjoints beside side inflows [-]: each leaves less than a hundredth of what the last one did.
 REPEATS = 2
 
@@ -50,6 +53,8 @@ def tangents(problem: Problem, state: Array, shared: Factors, causes: Array, tol
     Eisenstat, Elman and Schultz (1983), doi:10.1137/0720023.
     """
     found = np.empty_like(causes)
+    if isinstance(shared.inverse, SharedFactors):
+        tolerance *= FURTHER_IF_SPARSE
     for first in range(0, causes.shape[3], CAUSE_SLOTS):
         some = slice(first, first + CAUSE_SLOTS)
         left = -np.ascontiguousarray(causes[..., some])
