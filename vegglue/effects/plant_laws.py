@@ -22,7 +22,7 @@ are fixed at plausible values, see there.
 
 import math
 
-from vegglue.compilation import compiled, compiled_within
+from vegglue.compilation import compiled
 from vegglue.effects.physical_constants import GRAVITY, KARMAN
 
 PLANT_LAWS = ("baptist", "huthoff", "klopstra", "luhar-nepf", "stone-shen", "yang-choi")
@@ -35,7 +35,7 @@ STEM_SPACING, INTERFACE, SOLIDITY = 0.1, 0.1, 0.05
 DENSE = 5.0
 
 
-@compiled_within
+@compiled
 def _klopstra(drag_area: float, top: float, depth: float) -> float:
     """U / (g S)^(1/2) [m^1/2] over plants of drag_area = C_D m D [1/m], so written that nothing overflows."""
     over, mixing, stem = depth - top, 0.0227 * top**0.7, math.sqrt(2.0 / drag_area)
@@ -55,7 +55,7 @@ def _klopstra(drag_area: float, top: float, depth: float) -> float:
     return (top * within + over * above) / depth
 
 
-@compiled_within
+@compiled
 def _submerged(law: int, phi: float, top: float, depth: float) -> float:
     """C [m^1/2/s] of plants under water, without the bed."""
     share = top / depth
@@ -74,19 +74,19 @@ def _submerged(law: int, phi: float, top: float, depth: float) -> float:
     return alone + grown * over
 
 
-@compiled_within
+@compiled
 def above_canopy(top: float, depth: float) -> float:
     """g^(1/2)/kappa ln(max(h/h_d, 1)): what the water above the plants adds to C by Baptist's law [m^1/2/s]."""
     return math.sqrt(GRAVITY) / KARMAN * math.log(max(depth / top, 1.0))
 
 
-@compiled_within
+@compiled
 def baptist_chezy(phi: float, top: float, depth: float, bare: float) -> float:
     """C = (1/C_b^2 + phi/2g)^(-1/2) + g^(1/2)/kappa ln(max(h/h_d, 1)) [m^1/2/s]."""
     return 1.0 / math.sqrt(1.0 / bare**2 + phi / (2.0 * GRAVITY)) + above_canopy(top, depth)
 
 
-@compiled_within
+@compiled
 def _chezy(law: int, phi: float, top: float, depth: float, bare: float) -> float:
     """C [m^1/2/s] of plants and bed; phi already of the part under water."""
     if law == BAPTIST:
