@@ -17,6 +17,18 @@ from vegglue.effects.plant_laws import baptist_chezy
 print(baptist_chezy(1.0, 0.5, 1.0, 60.0), sum(baptist_chezy.stats.cache_hits.values()))
 """
 
+DRAG = """
+import hashlib
+import numpy as np
+from vegglue.effects.bed_laws import class_drag
+chance = np.random.default_rng(0)
+depth, half_range = chance.uniform(5e-4, 1.5, (40, 40, 16)), chance.uniform(1e-3, 0.1, (40, 40))
+classes = np.repeat(chance.integers(0, 2, (40, 1)), 40, axis=1)
+coefficient = np.stack([chance.uniform(0.02, 0.05, 16), chance.uniform(0.1, 2.0, 16)])
+found = class_drag(depth, half_range, classes, np.array([0, 1]), coefficient, 1.3, 0.01)
+print(hashlib.sha256(found.tobytes()).hexdigest())
+"""
+
 
 def chezy(folder: Path, **environment: str) -> tuple[float, int]:
     """C of a copy of the package in a process of its own, and how many compilations came from the cache."""
@@ -56,6 +68,13 @@ def test_a_constant_changed_in_another_file_is_compiled_anew(tmp_path: Path, whe
     other = chezy(tmp_path, **elsewhere)
     assert other[0] > first[0]
     assert other[1] == 0
+
+
+@pytest.mark.slow
+def test_a_cold_and_a_warm_cache_give_the_same_digits(tmp_path: Path) -> None:
+    command, own = [sys.executable, "-c", DRAG], os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    runs = [subprocess.run(command, env=own, capture_output=True, text=True, check=True) for _ in range(2)]
+    assert runs[0].stdout == runs[1].stdout
 
 
 @pytest.mark.slow

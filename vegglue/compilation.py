@@ -17,8 +17,16 @@ SHARED = ("compilation.py", "physical_constants.py")
 
 def compiled(loop: Callable[..., Any]) -> Any:
     """A loop whose products and sums may fuse."""
-    # No flag that lets one compilation round otherwise than the next: the same numbers from a cold and a warm cache.
     return _cached(loop, fastmath={"contract", "nsz"})
+
+
+def compiled_within(loop: Callable[..., Any]) -> Any:
+    """As `compiled`, of a loop that others call: it becomes part of each.
+
+    Machine code of its own would be used by these in the process that compiles them, and code within them by those that
+    read them from the cache: products fuse otherwise in one than in the other, and the last digits differ.
+    """
+    return _cached(loop, fastmath={"contract", "nsz"}, forceinline=True)
 
 
 def compiled_exactly(loop: Callable[..., Any]) -> Any:

@@ -119,15 +119,25 @@ def parallel_map(
 @contextmanager
 def at_most(jobs: int) -> Iterator[None]:
     """Limit the number of threads at once within; -1 for one on every core. Raises InputError for others below 1."""
-    if jobs == 0 or jobs < -1:
-        raise InputError(f"jobs: expected the number of cores to use, or -1 for all of them, got {jobs}.")
-    cores = int(cpu_count()) if jobs < 0 else jobs
+    cores = cores_of(jobs)
     spare, allowed = _SPARE.set(Semaphore(cores - 1)), _CORES.set(cores)
     try:
         yield
     finally:
         _SPARE.reset(spare)
         _CORES.reset(allowed)
+
+
+def cores_of(jobs: int) -> int:
+    """The number of cores, -1 for all. Raises InputError for others below 1."""
+    if jobs == 0 or jobs < -1:
+        raise InputError(f"jobs: expected the number of cores to use, or -1 for all of them, got {jobs}.")
+    return int(cpu_count()) if jobs < 0 else jobs
+
+
+def memory_of_machine() -> float:
+    """All of its memory [bytes]."""
+    return float(psutil.virtual_memory().total)
 
 
 def in_threads(

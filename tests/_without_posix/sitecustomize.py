@@ -11,10 +11,14 @@ import os
 import subprocess  # noqa: F401
 import sys
 import types
+from contextlib import suppress
 from importlib.abc import MetaPathFinder
 
 import joblib  # noqa: F401
 import psutil  # noqa: F401
+
+with suppress(ImportError):  # of dask
+    import locket  # noqa: F401
 
 HIDDEN = ("fcntl", "resource", "pwd", "grp", "termios")
 

@@ -83,8 +83,8 @@ def test_spots_lie_in_the_water_and_reach_all_of_it(
     assert one.fingerprints.shape == (len(model.station), one.x.size)
     assert np.unique(one.length).size == len(SPOT_LENGTHS[term])
     short = one.length == one.length.min()
-    from_inflow = grid.x - grid.x[0] >= one.length.min()
-    i, j = np.nonzero((depths.min(axis=0) > 0.3) & from_inflow[:, None])
+    from_ends = np.minimum(grid.x - grid.x[0], grid.x[-1] - grid.x) >= one.length.min()
+    i, j = np.nonzero((depths.min(axis=0) > 0.3) & from_ends[:, None])
     away = np.hypot(
         (grid.x[i][:, None] - one.x[short]) / one.length[short], (grid.y[j][:, None] - one.y[short]) / one.width[short]
     )
@@ -127,6 +127,7 @@ def test_behind_walls_no_water_enters_and_beside_the_inflow_is_no_place(flowing:
     assert {one.term for one in found} == set(EFFECT_AT_PLACE) - {"inflow"}
     for one in found:
         assert (one.x >= model.case.grid.x[0] + one.length).all()
+        assert (one.x <= model.case.grid.x[1] - one.length).all()
 
 
 def test_shapes_are_those_of_the_effect_to_a_centimetre() -> None:

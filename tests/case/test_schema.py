@@ -2,6 +2,7 @@
 
 from typing import get_args
 
+import pytest
 from reach import ROOT
 
 from vegglue.case import size_limits
@@ -9,6 +10,7 @@ from vegglue.case.site_schema import COEFFICIENT_OF, FrictionClass, VegetationTy
 from vegglue.case.size_limits import factor_bytes
 from vegglue.effects.bed_laws import BED_LAWS
 from vegglue.effects.plant_laws import PLANT_LAWS
+from vegglue.flow.nested_dissection import dissection
 
 STATED = (
     "LARGEST_CONFIG", "LARGEST_DATA", "DEEPEST_KEYS", "MOST_PARTS", "LONGEST_CHAIN", "MOST_CELLS", "MOST_MEMBERS",
@@ -27,6 +29,13 @@ def test_every_limit_is_stated() -> None:
 def test_factors_take_three_blocks_a_column() -> None:
     nx, ny = 1142, 40  # the grid of the paper's case
     assert factor_bytes(nx, ny) == 108 * nx * ny**2 == nx * 3 * (3 * ny) ** 2 * 4
+
+
+@pytest.mark.parametrize(("nx", "ny"), [(90, 56), (180, 75), (120, 120)])
+def test_sparse_factors_take_what_is_said(nx: int, ny: int) -> None:
+    parts = dissection(nx, ny)
+    held = 4.0 * (parts.inverse[-1] + parts.lower[-1] + parts.upper[-1])
+    assert 0.8 < held / factor_bytes(nx, ny) < 1.05
 
 
 def test_a_config_knows_the_laws_there_are() -> None:

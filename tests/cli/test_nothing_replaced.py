@@ -68,9 +68,9 @@ def test_a_second_import_keeps_edits(tmp_path: Path, say: Say) -> None:
     (folder / "site.json").write_text(json.dumps(site), encoding="utf-8")
     assert say("import", "my-site") == (0, ""), "its own"
     config = tmp_path / "my-site.yaml"
-    config.write_text(config.read_text().replace("Measurements of", "My measurements of"))
+    config.write_text(config.read_text("utf-8").replace("Measurements of", "My measurements of"), "utf-8")
     refused(say("import", "my-site"), "my-site.yaml", "edited since")
-    assert "My measurements" in config.read_text()
+    assert "My measurements" in config.read_text("utf-8")
     assert say("import", "my-site", "--force") == (0, "")
 
 

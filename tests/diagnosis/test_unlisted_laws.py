@@ -51,8 +51,7 @@ def test_laws_are_told_that_hold_their_chance_together() -> None:
 
 
 def test_where_no_law_has_anything_to_act_on_none_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    last: Any = SimpleNamespace(base=SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(engine=None))),
-                                fingerprints=None)  # fmt: skip
+    last: Any = SimpleNamespace(base=SimpleNamespace(model=SimpleNamespace(case=CASE_OF_TWINS)), fingerprints=None)
     monkeypatch.setattr(candidate_effects, "law_fingerprints", lambda *_: SimpleNamespace(laws=[]))
     assert candidate_laws(last, last, SearchState(), partial(laws_beside, last)) is None
 

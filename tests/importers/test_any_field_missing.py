@@ -197,7 +197,9 @@ def _riversurveyor_mat() -> Format:
             f"{axis}{cell}": SHAPE[cell] * mean + 0.02 * random.standard_normal()
             for axis, mean in (("e", 0.6), ("n", 0.02)) for cell in range(CELLS)
         }  # fmt: skip
-        rows.append({"east": 0.0, "north": 0.08 * n, "depth": DEPTH, "start": 0.2, "size": 0.1, **velocity})
+        rows.append(
+            {"east": 0.0, "north": 0.08 * n, "depth": DEPTH, "start": 0.2, "size": 0.1, "cells": CELLS, **velocity}
+        )
 
     def write(path: Path, rows: Sequence[Row]) -> None:
         column = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in rows[0]}
@@ -207,7 +209,7 @@ def _riversurveyor_mat() -> Format:
                 water[cell, axis] = column[f"{name}{cell}"]
         savemat(path, {
             "Setup": {"coordinateSystem": 2, "trackReference": 1},
-            "Summary": {"Depth": column["depth"], "Cells": CELLS * every,
+            "Summary": {"Depth": column["depth"], "Cells": column["cells"],
                         "Track": np.column_stack([column["east"], column["north"]])},
             "System": {"Cell_Start": column["start"], "Cell_Size": column["size"], "Step": 3 * every},
             "WaterTrack": {"Velocity": water},

@@ -348,7 +348,7 @@ def test_rows_without_a_value_may_name_any_experiment(tmp_path: Path) -> None:
         ("Gauge;x;level low;level mid (m)\nA;2;0.93;1.04\nB;12;0.92;1.03\n", "level low and level mid (m)"),
         ("Gauge;afstand;low;mid\nA;2;0.93;1.04\nB;12;0.92;1.03\n", "low and mid"),
         ("x;y;u;Remarks\n12;0;0.4;\n12;1;0.3;in reeds\n12;2;0.4;\n", "`survey.txt: {experiment: low}`"),
-        ("run;debiet [l/s];opmerking\nlow;620;meetschot\nmid;1400;ADCP, 4 raaien\n", "experiments: {low: {discharge:"),
+        ("run;debiet [l/s];opmerking\nlow;620;meetschot\nmid;1400;ADCP, 4 raaien\n", "`discharge` of low"),
     ],
 )  # fmt: skip
 def test_a_table_that_hides_its_experiments_is_refused_with_what_to_write(

@@ -13,7 +13,8 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import as_yaml
 from vegglue.case.safe_yaml import safe_yaml
 from vegglue.errors import InputError
-from vegglue.importers.site_file import read_site, site_file
+from vegglue.importers.import_notes import SiteAssumptions, UnreadHoldout, UnreadKeys
+from vegglue.importers.site_file import assumptions_of_site, read_site, site_file
 from vegglue.workflow.import_folder import assumptions_of, import_folder
 
 ODD = (
@@ -151,26 +152,27 @@ def test_a_channel_wider_than_long_has_cells(tmp_path: Path) -> None:
     assert import_folder(folder, tmp_path / "site.yaml").grid.cell[0] == 0.125
 
 
-def test_what_nobody_said_is_told(tmp_path: Path) -> None:
+def test_what_is_not_stated_is_assumed_and_listed(tmp_path: Path) -> None:
     folder = field_folder(
         tmp_path / "site",
         weather="fine",
         experiments=put(SITE["experiments"], ("low", "plants"), False),
         holdout={},
     )
-    assumed, notes, held_out = assumptions_of(folder)
-    assert "eddy_viscosity_m2_s" in assumed
-    assert "weather, experiments.low.plants" in notes
-    assert "holdout.csv" in held_out
+    assert assumptions_of_site(folder, read_site(folder / "site.json")) == [
+        SiteAssumptions("site.json", viscosity=2.0, canopy=None, alike=False, bare=False),
+        UnreadKeys("site.json", ("weather", "experiments.low.plants")),
+        UnreadHoldout("holdout.csv", "site.json"),
+    ]
     bare = field_folder(tmp_path / "bare", patches=[])
-    assert "no plants" in assumptions_of(bare)[0]
+    assert assumptions_of_site(bare, read_site(bare / "site.json"))[0].bare
     assert assumptions_of(field_folder(tmp_path / "whole", eddy_viscosity_m2_s=0.01)) == []
 
 
 @pytest.mark.parametrize(
     ("said", "value", "median", "log_sd"),
     [
-        ({}, "eddy_viscosity", 0.016, 0.6931),
+        ({}, "eddy_viscosity", 0.016, 0.6931),  # by depth, speed and usual roughness
         ({"eddy_viscosity_m2_s": 0.02}, 0.02, None, None),
         ({"eddy_viscosity_m2_s": 0.02, "eddy_viscosity_factor": 3}, "eddy_viscosity", 0.02, 1.0986),
         ({"eddy_viscosity_m2_s": 0.02, "eddy_viscosity_factor": 1}, 0.02, None, None),

@@ -13,6 +13,7 @@ import memory
 import numpy as np
 import scale
 import startup
+import wide
 from joblib import Parallel, delayed
 
 from vegglue.case.config import load_case
@@ -70,6 +71,8 @@ def main() -> None:
     loop.main()
     scale.spread()
     memory.main()
+    with tempfile.TemporaryDirectory() as folder:
+        wide.main(Path(folder), None, wide.SMALL)
 
 
 def marching(case) -> float:  # type: ignore[no-untyped-def]
@@ -123,16 +126,17 @@ def roofline(case) -> None:  # type: ignore[no-untyped-def]
     rates = eased(part, state, shared.slope, part.boundaries.outlet)
     residual = shortest(lambda: eased(part, state, shared.slope, part.boundaries.outlet))
     solve = shortest(lambda: shared.step(rates))
-    nx, _, n, _ = shared.columns.shape
+    columns = shared.inverse.columns
+    nx, _, n, _ = columns.shape
     block, right = np.ones((n, n), np.float32), np.ones((n, MEMBER_SLOTS), np.float32)
-    flops, moved = 2.0 * shared.columns.size * MEMBER_SLOTS, shared.columns.nbytes + 3 * nx * right.nbytes
+    flops, moved = 2.0 * columns.size * MEMBER_SLOTS, columns.nbytes + 3 * nx * right.nbytes
     product = shortest(lambda: [block @ right for _ in range(nx)])
-    copied = shortest(lambda: shared.columns.copy())
+    copied = shortest(lambda: columns.copy())
     print(
         f"a chord step of {MEMBER_SLOTS} members, one core: residual {1e3 * residual:.0f} ms, "
         f"{residual / rates.size * 3e9:.0f} ns a cell and member; solve {1e3 * solve:.0f} ms, "
         f"{flops / solve / 1e9:.0f} Gflop/s (products of its size in cache: {flops / 3 / product / 1e9:.0f}), "
-        f"{moved / solve / 1e9:.1f} GB/s (a copy of its factors: {2 * shared.columns.nbytes / copied / 1e9:.1f})"
+        f"{moved / solve / 1e9:.1f} GB/s (a copy of its factors: {2 * columns.nbytes / copied / 1e9:.1f})"
     )
 
 

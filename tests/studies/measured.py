@@ -140,7 +140,7 @@ def smooth_flume(data: Path, to: Path) -> Path:
             for at, u, h in zip(x, table[f"U{side} (cm/s)"], table[f"h{side} (mm)"], strict=True):
                 if at > 0.5:
                     velocity.append(f"{name},x{at:g},{at:g},{y},{u / 100.0:.5f},0.008")
-                    level.append(f"{name},x{at:g},{at:g},{y},{h / 1000.0 - SMOOTH_SLOPE * at:.5f},0.0004")
+                    level.append(f"{name},x{at:g},{at:g},{y},{h / 1000.0 - SMOOTH_SLOPE * at:.5f},0.001")
         last = float(np.mean([table["h1 (mm)"][-1], table["h2 (mm)"][-1]])) / 1000.0
         flows.append(f"  {name}: {{discharge: {sum(carried):.5f}, level: {last - SMOOTH_SLOPE * SMOOTH_LENGTH:.5f}}}")
     (to / "velocities.csv").write_text("\n".join(velocity) + "\n", encoding="utf-8")

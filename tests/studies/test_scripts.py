@@ -27,6 +27,7 @@ STUDIES = Path(__file__).parent
         "sensitivity",
         "loop",
         "startup",
+        "wide",
     ],
 )
 def test_a_script_is_read_by_itself(name: str) -> None:

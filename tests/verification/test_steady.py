@@ -141,12 +141,18 @@ def readings(problem, state):
     return read_sensors(problem, state, grid, station, (("middle", 14.0),)).prediction
 
 
+def blocks(problem, state):
+    """Columns and far diagonal of the Jacobian."""
+    found = jacobian(problem, state)
+    return found.columns, found.far
+
+
 def in_double_precision(problem, state):
     """Newton with a general sparse solver in double precision: nothing of the blocks but the entries of J."""
     nx, _, ny, _ = state.shape
     size = 3 * ny
     for _ in range(12):
-        columns, far = (part.astype(np.float64) for part in jacobian(problem, state))
+        columns, far = (part.astype(np.float64) for part in blocks(problem, state))
         whole = sparse.block_diag([columns[i, 1] for i in range(nx)], format="lil")
         for i in range(1, nx):
             whole[i * size : (i + 1) * size, (i - 1) * size : i * size] = columns[i, 0]
@@ -165,7 +171,7 @@ def test_single_precision_factors_give_the_same_observations():
     centre = take(problem, np.array([0]))
     start = solved(centre, 1e-8)
     shared = factors(centre, start)
-    assert shared.columns.dtype == np.float32
+    assert shared.inverse.columns.dtype == np.float32
     solution = chord(problem, np.repeat(start, 5, axis=3), shared, 1e-8)
     assert solution.converged.all()
     read = readings(problem, solution.state)
@@ -189,7 +195,7 @@ def times(columns, far, vector):
 def compare_jacobian(problem, state):
     """|J d - dR| over |J| |d|, row by row, for random directions d and central differences dR; (nx, n)."""
     nx, _, ny, _ = state.shape
-    columns, far = jacobian(problem, state)
+    columns, far = blocks(problem, state)
     worst = np.zeros((nx, 3 * ny))
     for _ in range(3):
         direction = CHANCE.standard_normal(state.shape)
@@ -229,7 +235,7 @@ def test_factors_undo_the_jacobian():
     problem = river()
     state = solved(problem)
     vector = CHANCE.standard_normal(state.shape)
-    product = times(*jacobian(problem, state), vector.reshape(60, 72)).reshape(state.shape)
+    product = times(*blocks(problem, state), vector.reshape(60, 72)).reshape(state.shape)
     error = np.abs(factors(problem, state).solve(product) - vector)
     print(f"J^-1 J: worst {error.max():.1e}, median {np.median(error):.1e}")
     assert error.max() < 2e-2

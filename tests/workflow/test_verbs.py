@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from diagnoses import a_diagnosis
 from reach import COARSE, ROOT, write_reach
+from systems import NOT_SIMULATED
 
 import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
@@ -28,6 +29,7 @@ SMALL = ("members: 1024", f"members: {MEMBERS}")
 WITH_ERROR = ("experiment: June}", "experiment: June, standard_error: 0.02}")
 
 
+@NOT_SIMULATED
 def test_nothing_heavy_is_imported_before_a_verb_is_used() -> None:
     program = f"import sys, vegglue; print(*(name for name in {HEAVY} if name in sys.modules))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

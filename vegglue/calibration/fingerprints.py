@@ -56,8 +56,8 @@ STEPS_AROUND = 4
 LEAST_SHARE = 0.5
 # Depth over that of the site [-] above which a cell counts as under water.
 LEAST_DEPTH = 0.05
-# Cells that a spot keeps from the inflow at least: nearer, it only changes how the water enters.
-FROM_INFLOW = 2.0
+# Cells that a spot keeps from inflow and outlet at least: nearer, it only changes how the water enters or leaves.
+FROM_ENDS = 2.0
 # Share of a spot under plants [-] up to which it lies on a bare bed.
 WITHOUT_PLANTS = 0.02
 # The effect of the library that stands for a term at a place.
@@ -161,7 +161,7 @@ def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ..
         if term not in excluded
         and not (term == "inflow" and model.case.friction.walls is not None)  # no water passes a wall
     }
-    return _places_over(model, point, rasters, beside_inflow=False)
+    return _places_over(model, point, rasters, beside_ends=False)
 
 
 def places_around(model: Model, point: Point, term: Term, place: Mapping[str, float], share: float) -> Places:
@@ -175,9 +175,9 @@ def places_around(model: Model, point: Point, term: Term, place: Mapping[str, fl
 
 
 def _places_over(
-    model: Model, point: Point, rasters: Mapping[Term, Sequence[GaussianBasis]], beside_inflow: bool = True
+    model: Model, point: Point, rasters: Mapping[Term, Sequence[GaussianBasis]], beside_ends: bool = True
 ) -> tuple[Places, ...]:
-    """beside_inflow: whether spots may reach the inflow, where any of them is another distribution of what enters."""
+    """beside_ends: whether spots may reach inflow and outlet, where each only changes how the water passes."""
     cells, grid = cell_responses(model, point, tuple(rasters)), model.site.grid
     water = {}
     if "inflow" in rasters:
@@ -206,8 +206,9 @@ def _places_over(
             within = share > LEAST_SHARE * over.along.sum(axis=1)[:, None] * over.across.sum(axis=1)[None]
             # With the middle in the grid, to a cell, as places are rounded.
             along = (over.x >= grid.x[0] - grid.dx) & (over.x <= grid.x[-1] + grid.dx)
-            if not beside_inflow:
-                along &= over.x >= grid.x[0] + max(over.length, FROM_INFLOW * grid.dx)
+            if not beside_ends:
+                kept = max(over.length, FROM_ENDS * grid.dx)
+                along &= (over.x >= grid.x[0] + kept) & (over.x <= grid.x[-1] - kept)
             across = (over.y >= grid.y[0] - grid.dy) & (over.y <= grid.y[-1] + grid.dy)
             a, b = np.nonzero(within & (along[:, None] & across))
             size = np.full((2, a.size), [[over.length], [over.width]])

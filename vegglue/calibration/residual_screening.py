@@ -187,6 +187,7 @@ def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) 
     plausible = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     prior = np.empty(plausible.size)
     weights = [COMMON if "common" in one.effect.tags else 1.0 for one in fingerprints.candidates]
+    weights = weights or [1.0] * len(fingerprints.columns)  # of columns alone, all are alike
     for weight, columns in zip(weights, fingerprints.columns, strict=True):
         prior[columns] = weight / (GROUPS * sum(weights) * columns.size)
     return kind_of_hypotheses("effect", projected, plausible, prior, fingerprints.only_sign)

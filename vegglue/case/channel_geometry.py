@@ -258,9 +258,15 @@ def _scales(case: Case, site: Site) -> SiteScales:
     )
 
 
+# Share of a prior without bounds that lies beyond what counts as its end [-].
+TAIL = 1e-3
+
+
 def _chezy(case: Case, of: FrictionClass, share: float, depth: float) -> float:
     """C [m^1/2/s] at a share of the prior of its coefficient: h^(1/6)/n, 18 log10(12 h/k_s), or given."""
     value = value_at(case, of.coefficient, share)
+    if not 0.0 < value < np.inf:  # a prior without bounds
+        value = value_at(case, of.coefficient, min(max(share, TAIL), 1.0 - TAIL))
     if of.law == "manning":
         return depth ** (1.0 / 6.0) / value
     if of.law == "keulegan":

@@ -163,6 +163,13 @@ def filter_width_of(case: Case) -> float:
     return float(case.grid.filter_width or np.sqrt(dx * dy))
 
 
+def on_cells(case: Case, cell: tuple[float, float]) -> Case:
+    """The case on cells of another size [m]; eddies are unresolved below the same width as on its own."""
+    grid = case.grid.model_copy(update={"cell": cell, "filter_width": filter_width_of(case)})
+    other: Case = case.model_copy(update={"grid": grid})
+    return other
+
+
 def centreline_in(case: Case) -> Centreline | None:
     """The centreline the grid of a case follows; None of a straight one."""
     return None if case.grid.centreline is None else centreline_of(case.grid.centreline)

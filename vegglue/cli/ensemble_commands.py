@@ -18,6 +18,7 @@ from vegglue.cli.options import (
     Jobs,
     Json,
     Members,
+    MemoryLimit,
     Quiet,
     Runs,
     Trust,
@@ -130,6 +131,7 @@ def run_command(
     config: Config,
     members: Members = None,
     jobs: Jobs = -1,
+    memory: MemoryLimit = None,
     cluster: Cluster = None,
     runs: Runs = RUNS,
     as_object: Json = False,
@@ -146,7 +148,7 @@ def run_command(
             print_result(of, runs, result, as_object)
 
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        extension = vegglue.run(opened.with_settings(runs, jobs, watch, force), members=members, show=show)
+        extension = vegglue.run(opened.with_settings(runs, jobs, watch, force, memory), members=members, show=show)
     if as_object:
         from vegglue.cli.objects import run_object
 

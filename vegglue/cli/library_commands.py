@@ -72,7 +72,7 @@ def export_command(
 
 def effects_command(
     name: Annotated[str | None, typer.Argument(help=HELP["effects.name"], show_default=False)] = None,
-    config: Annotated[Path | None, typer.Option(help=HELP["effects.config"])] = None,
+    config: Annotated[Path | None, typer.Option("--config", "--case", help=HELP["effects.config"])] = None,
     check: Annotated[Path | None, typer.Option(help=HELP["effects.check"])] = None,
     as_object: Json = False,
     quiet: Quiet = False,

@@ -15,6 +15,7 @@ from vegglue.cli.options import (
     Force,
     Jobs,
     Json,
+    MemoryLimit,
     Quiet,
     Runs,
     Trust,
@@ -70,6 +71,7 @@ def diagnose_command(
     config: Config,
     details: Annotated[bool, typer.Option("--details", metavar=FLAG, help=HELP["diagnose.details"])] = False,
     jobs: Jobs = -1,
+    memory: MemoryLimit = None,
     cluster: Cluster = None,
     runs: Runs = RUNS,
     as_object: Json = False,
@@ -79,7 +81,7 @@ def diagnose_command(
     """Find where the model fails, which effect is missing, and with which probability."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-        found = vegglue.diagnose(opened.with_settings(runs, jobs, watch))
+        found = vegglue.diagnose(opened.with_settings(runs, jobs, watch, memory=memory))
     more = command_line("diagnose", config, "--details", runs=runs, trust=trust)
     print_result(opened.case, runs, found, as_object, details, more)
     if quiet or as_object:
@@ -119,6 +121,7 @@ def extend_command(
     auto: Annotated[bool, typer.Option("--auto", metavar=FLAG, help=HELP["extend.auto"])] = False,
     to: Annotated[Path | None, typer.Option(help=HELP["discover.to"])] = None,
     jobs: Jobs = -1,
+    memory: MemoryLimit = None,
     cluster: Cluster = None,
     runs: Runs = RUNS,
     as_object: Json = False,
@@ -137,7 +140,7 @@ def extend_command(
     if auto:
         opened = opened_run(config, trust)
         with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
-            extension = vegglue.extend_stepwise(opened.with_settings(runs, jobs, watch, force))
+            extension = vegglue.extend_stepwise(opened.with_settings(runs, jobs, watch, force, memory))
         print_result(opened.case, runs, extension, as_object)
         return
     child = vegglue.extend(vegglue.load_case(config, trust), add or [], shapes=shapes, to=to, force=force, runs=runs)

@@ -31,6 +31,7 @@ def _some(jobs: int) -> int:
 
 
 Jobs = Annotated[int, typer.Option(min=-1, callback=_some, help=HELP["jobs"])]
+MemoryLimit = Annotated[float | None, typer.Option(min=0.1, metavar="GB", help=HELP["memory"])]
 Cluster = Annotated[
     str | None,
     typer.Option(

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.compilation import compiled
+from vegglue.compilation import compiled, compiled_within
 from vegglue.effects.physical_constants import FILM_ON_LAND, GRAVITY
 
 LN2, ROOT2 = math.log(2.0), math.sqrt(2.0)
@@ -21,7 +21,7 @@ FRACTION, ONE = 0xFFFFFFFFFFFFF, 0x3FF0000000000000
 TWO_THIRDS = 0x2A9F7893782DA1CE
 
 
-@compiled
+@compiled_within
 def logarithm(x: float) -> float:
     """ln x = e ln 2 + 2 artanh((m - 1)/(m + 1)), x = m 2^e with m between 0.71 and 1.41."""
     bits = np.float64(x).view(np.int64)
@@ -45,7 +45,7 @@ def logarithm(x: float) -> float:
     return exponent * LN2 + 2.0 * (t + t * s * series)
 
 
-@compiled
+@compiled_within
 def cube_root(x: float) -> float:
     """y <- y (y^3 + 2 x) / (2 y^3 + x), three times (Halley's rounds triple the digits)."""
     third = np.int64(np.float64(np.float64(x).view(np.int64)) * (1.0 / 3.0)) + TWO_THIRDS
@@ -63,7 +63,7 @@ MANNING, KEULEGAN, CHEZY = 0, 1, 2
 LOG_SLOPE = 18.0 / math.log(10.0)
 
 
-@compiled
+@compiled_within
 def _wet_depths(out, depth, half_range, dry):
     """Mean depth [m] of the wet part of cells (t,), f + a^(1/2) (a^4 + w^4)^(1/8), a = h - f: f + (a w)^(1/2) if the
     waterline crosses the cell, h far from it.
@@ -74,7 +74,7 @@ def _wet_depths(out, depth, half_range, dry):
         out[t] = dry + math.sqrt(mean * math.sqrt(math.sqrt(square * square + half_range[t] ** 4)))
 
 
-@compiled
+@compiled_within
 def _chezys(out, wet, half_range, law, coefficient, bank_argument_minimum):
     """C [m^1/2/s] of the wet part of cells (t,), of depths from h - w to h + w, or 0 to 2 h.
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from vegglue.case.grid import filter_width_of
+from vegglue.case.grid import on_cells
 from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.schema import Case
 from vegglue.case.zones import ranges_without_cells
@@ -53,13 +53,6 @@ def coarser_grid(case: Case, site: Site) -> tuple[Case, Site] | None:
     coarse = on_cells(case, (along * case.grid.cell[0], 2.0 * case.grid.cell[1]))
     on_coarse = build_site(coarse)
     return None if any(ranges_without_cells(coarse, on_coarse.grid)) else (coarse, on_coarse)
-
-
-def on_cells(case: Case, cell: tuple[float, float]) -> Case:
-    """The case on cells of another size [m]; eddies are unresolved below the same width as on its own."""
-    grid = case.grid.model_copy(update={"cell": cell, "filter_width": filter_width_of(case)})
-    other: Case = case.model_copy(update={"grid": grid})
-    return other
 
 
 def ever_coarser(case: Case, site: Site) -> list[tuple[Case, Site]]:

@@ -14,6 +14,7 @@ how discharge is shared over all cells of an inflow, that part is added on its o
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -21,7 +22,11 @@ from scipy.special import ndtr, ndtri
 from vegglue.arrays import Array, Single
 from vegglue.case.case_effects import stages_of
 from vegglue.case.channel_geometry import ChannelGeometry, channel_geometry, rows_of
+from vegglue.case.grid import on_cells
+from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.parameter_space import theta_at
+from vegglue.case.size_limits import WIDE_FROM
+from vegglue.case.zones import ranges_without_cells
 from vegglue.compilation import compiled
 from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
 from vegglue.flow.batch import solve_members
@@ -42,10 +47,10 @@ from vegglue.flow.problem import EMPTY, Problem, crop
 from vegglue.flow.problem_setup import build_problem, with_effects_of
 from vegglue.flow.reference_member import settled
 from vegglue.flow.sensor import predictions_at_sensors, reading_weights
-from vegglue.flow.starts import on_grid
+from vegglue.flow.starts import backwater, between_cells, on_grid
 from vegglue.flow.status import FAILED
 from vegglue.flow.tangent import CAUSE_SLOTS, adjoints, tangents
-from vegglue.flow.wet_band import chord_in_band, rows_inside, widen
+from vegglue.flow.wet_band import chord_in_band, rows_inside, wet_band, widen
 from vegglue.parallel import in_threads, parallel_map
 
 # Step of central differences in z [standard deviations of the prior], small against 1 and large against rounding.
@@ -66,11 +71,19 @@ CELL_STRIDE = 5
 # Stations whose adjoints are made together [-]. On 342 x 40 cells 1,000 stations take 1.6 s of a core with 128, 1.7 s
 # with 64 or 32, and 2.6 s all at once, when each holds some 50 bytes in every cell.
 STATIONS_TOGETHER = 128
+# Stations times cells on a wide grid whose adjoints are made together [-]: they then take 0.25 GB.
+STATIONS_AND_CELLS = 2e6
+# Largest correction [m, m/s] of flows on coarser cells, which are off by more than that: chosen.
+ROUGH = 1e-3
 # Small changes for differences, in the unit of each term: thousandths of what is common, and large against rounding.
 SMALL_CHANGE: dict[Term, float] = {
     "friction": 1e-3, "drag": 1e-5, "bed": 1e-4, "inflow": 1e-6, "viscosity": 1e-4, "mixing": 1e-2,
     "advection": 1e-3,
 }  # fmt: skip
+
+
+# Sites on half as many cells each way, by the site on its own.
+_ON_COARSER_CELLS: WeakKeyDictionary[Site, Site | None] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -139,6 +152,7 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
     predictions (stations of it,).
     """
     problem, tolerance, warm, flow = problem_at(model, experiment, z), model.case.numerics.tolerance, None, None
+    hopeful = False  # whether the start is better than one from coarser cells at z
     before = None if near is None else near.flows.get(experiment)
     if near is not None and before is not None:
         # Along its slopes; from a point on cells of twice the size if need be.
@@ -150,13 +164,44 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
                 moved = before.moved + float(np.abs(end.state - before.state).max())
                 flow = replace(before, state=end.state, moved=moved)
             elif end.correction[0] < CLOSE:  # factors made here lead on, and are those of the flow itself
-                warm = widen(end.state, before.rows, before.band)
+                warm, hopeful = widen(end.state, before.rows, before.band), True
+        else:
+            hopeful = True
     if flow is None:
-        solution, own, band = settled(problem, warm, tolerance)
-        if own is None:
+        coarse = None if hopeful else _from_coarser_cells(model, experiment, z)
+        for beginning in [warm] if coarse is None else [coarse, warm]:
+            solution, own, band = settled(problem, beginning, tolerance)
+            if own is not None:
+                break
+        else:
             return None
         flow = SteadyFlow(solution.state, band, problem.shape[1], own, EMPTY, 0.0)
     return flow, _read(model, experiment, problem, flow.state, flow.band)[0]
+
+
+def _from_coarser_cells(model: Model, experiment: str, z: Array) -> Array | None:
+    """A start (nx, 3, ny, 1) on a wide grid: the flow on cells of about twice the size, and so on to narrow ones; None
+    if the grid is narrow, or no flow is found there.
+    """
+    problem = problem_at(model, experiment, z)
+    south, north = wet_band(problem, backwater(problem))
+    site = _site_on_coarser_cells(model) if north - south >= WIDE_FROM else None
+    if site is None:
+        return None
+    coarse = replace(model, case=on_cells(model.case, (site.grid.dx, site.grid.dy)), site=site)
+    there, start = problem_at(coarse, experiment, z), _from_coarser_cells(coarse, experiment, z)
+    solution, own, band = settled(there, start, ROUGH)
+    return None if own is None else between_cells(widen(solution.state, there.shape[1], band), problem.shape)
+
+
+def _site_on_coarser_cells(model: Model) -> Site | None:
+    """The site on half as many cells along and across, to whole numbers; None if an inflow or the outlet has none."""
+    if model.site not in _ON_COARSER_CELLS:
+        (nx, ny), of = model.site.bed.shape, model.case.grid
+        case = on_cells(model.case, (float(np.ptp(of.x)) / (nx // 2), float(np.ptp(of.y)) / (ny // 2)))
+        site = build_site(case)
+        _ON_COARSER_CELLS[model.site] = None if any(ranges_without_cells(case, site.grid)) else site
+    return _ON_COARSER_CELLS[model.site]
 
 
 def _step_of_known(known: Array, z: Array) -> Array:
@@ -285,8 +330,11 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
     inflows = shared_inflows(part)
     discharges = [answer_to_discharge(part, flow.state, inflow).astype(np.float32) for inflow in inflows]
     found = {term: np.zeros((len(station), grid.x.size, grid.y.size), np.float32) for term in terms}
-    for first in range(0, len(station), STATIONS_TOGETHER):
-        some = slice(first, first + STATIONS_TOGETHER)
+    together, cells = STATIONS_TOGETHER, part.shape[0] * part.shape[1]
+    if part.shape[1] >= WIDE_FROM:
+        together = int(np.clip(STATIONS_AND_CELLS / cells, 8, STATIONS_TOGETHER))
+    for first in range(0, len(station), together):
+        some = slice(first, first + together)
         weights = reading_weights(problem, state, grid, station.iloc[some])
         sensitivity = adjoints(part, flow.state, flow.factors, weights[:, :, rows]).astype(np.float32)
         of_discharges = [np.einsum("ikjn,ikj->n", sensitivity, discharge) for discharge in discharges]

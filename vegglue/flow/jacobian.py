@@ -9,14 +9,17 @@ this is a product of two vectors for each inflow.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
+from vegglue.case.size_limits import WIDE_FROM
 from vegglue.flow import block_elimination
 from vegglue.flow.block_elimination import ACROSS_PERIOD, ALONG_PERIOD
 from vegglue.flow.equations import cell_depths, inflow_parts, residual
+from vegglue.flow.nested_dissection import SparseFactors, collect_stencil, sparse_factors
 from vegglue.flow.problem import LEVEL, InflowSegment, Problem, take
 from vegglue.flow.thin_water import slope_of_friction, thickness, tilt
 
@@ -102,34 +105,128 @@ def answer_to_discharge(problem: Problem, state: Array, inflow: InflowSegment) -
 
 
 @dataclass(frozen=True)
+class BlockFactors:
+    """J^-1 as `block_elimination.factor` leaves it: three products a column."""
+
+    columns: Single
+    far: Single
+
+    def solve(self, right: Single, transposed: bool = False) -> None:
+        """J x = right, or J' x = right, in place; right (nx, 3 ny, n)."""
+        loop = block_elimination.solve_transposed if transposed else block_elimination.solve
+        loop(self.columns, self.far, right)
+
+
+@dataclass(frozen=True)
+class SharedFactors:
+    """J^-1 = (A - a s')^-1 = A^-1 + A^-1 a (1 - s' A^-1 a)^-1 s' A^-1 with sparse factors of A (Woodbury).
+
+    sparse: None if A has no inverse. a, s: answers to the discharge of inflows shared by depth and slopes of ln W, (nx,
+    3 ny, inflow) each.
+    """
+
+    sparse: SparseFactors | None
+    answers: Single
+    slopes: Single
+
+    def solve(self, right: Single, transposed: bool = False) -> None:
+        """As `BlockFactors.solve`; NaN if there is no inverse."""
+        if self.sparse is None:
+            right.fill(np.nan)
+            return
+        self.sparse.solve(right, transposed)
+        if not self.answers.shape[2]:
+            return
+        spread, by, core = self._spread_back if transposed else self._spread
+        right += (spread @ np.linalg.solve(core, np.einsum("inp,inm->pm", by, right))).astype(np.float32)
+
+    @cached_property
+    def _spread(self) -> tuple[Single, Single, Array]:
+        """A^-1 a, s and 1 - s' A^-1 a."""
+        return self._spread_of(self.answers, self.slopes, False)
+
+    @cached_property
+    def _spread_back(self) -> tuple[Single, Single, Array]:
+        """A'^-1 s, a and 1 - a' A'^-1 s."""
+        return self._spread_of(self.slopes, self.answers, True)
+
+    def _spread_of(self, of: Single, by: Single, transposed: bool) -> tuple[Single, Single, Array]:
+        assert self.sparse is not None
+        spread = of.copy()
+        self.sparse.solve(spread, transposed)
+        return spread, by, np.eye(of.shape[2]) - np.einsum("inp,inq->pq", by, spread)
+
+
+@dataclass(frozen=True)
+class BlockJacobian:
+    """J as blocks of columns i - 1, i and i + 1 of row block i (nx, 3, n, n), n = 3 ny, and the diagonal of i - 2 (nx,
+    n).
+    """
+
+    columns: Single
+    far: Single
+
+    def inverse(self, shift: Single | None = None) -> BlockFactors:
+        """Factors of J + shift, a diagonal (nx, 3, ny); NaN if there is no inverse."""
+        columns = self.columns
+        if shift is not None:
+            columns, diagonal = columns.copy(), np.arange(self.far.shape[1])
+            columns[:, 1, diagonal, diagonal] += shift.reshape(self.far.shape)
+        eliminate(columns, self.far)
+        return BlockFactors(columns, self.far)
+
+
+@dataclass(frozen=True)
+class SparseJacobian:
+    """J = A - a s', A by its entries, see `nested_dissection`; a, s: see `SharedFactors`."""
+
+    values: Single
+    far: Single
+    answers: Single
+    slopes: Single
+
+    def inverse(self, shift: Single | None = None) -> SharedFactors:
+        """As `BlockJacobian.inverse`."""
+        values = self.values
+        if shift is not None:
+            values = values.copy()
+            for e in range(3):
+                values[:, :, 1, 2, e, e] += shift[:, e]
+        try:
+            found = sparse_factors(values, self.far)
+        except np.linalg.LinAlgError:  # see `eliminate`
+            found = None
+        return SharedFactors(found, self.answers, self.slopes)
+
+
+@dataclass(frozen=True)
 class Factors:
-    """The eliminated Jacobian of one member, and what chord steps need of the state it was made at.
+    """J^-1 of one member, and what chord steps need of the state it was made at.
 
     Parameters
     ----------
-    columns, far
-        As `block_elimination.factor` leaves them: J^-1 costs three products a column.
+    inverse
+        Of J, in single precision.
     slope, thick, answer
         Slopes of friction (nx, 3, ny, 1) [1/s], depths of faces [m] and changes of velocities with levels [1/s] there
         (nx, 3, ny), see `thin_water`.
     """
 
-    columns: Single
-    far: Single
+    inverse: BlockFactors | SharedFactors
     slope: Array
     thick: Array
     answer: Array
 
     def solve(self, right: Array) -> Array:
         """J^-1 right, (nx, 3, ny, m)."""
-        return solved(self.columns, self.far, right)
+        return solved(self.inverse, right)
 
     def step(self, rates: Array) -> Single:
         """-J^-1 R in the unknowns of chord steps (nx, 3, ny, m): levels, velocities times rho where water is thin."""
         nx, _, ny, m = rates.shape
         with np.errstate(over="ignore"):  # of a member that runs away, known by its correction
             work = np.multiply(rates, -1.0, dtype=np.float32, casting="same_kind")
-        block_elimination.solve(self.columns, self.far, work.reshape(nx, 3 * ny, m))
+        self.inverse.solve(work.reshape(nx, 3 * ny, m))
         tilt(work, self.answer)
         return work
 
@@ -142,51 +239,54 @@ def eliminate(columns: Single, far: Single) -> None:
         columns.fill(np.nan)
 
 
-def solved(columns: Single, far: Single, right: Array) -> Array:
-    """J^-1 right, (nx, 3, ny, m), of factors."""
+def solved(inverse: BlockFactors | SharedFactors, right: Array, transposed: bool = False) -> Array:
+    """J^-1 right, or J'^-1 right, (nx, 3, ny, m)."""
     nx, _, ny, m = right.shape
     with np.errstate(over="ignore"):  # of a member that runs away, known by its correction
         work = right.astype(np.float32).reshape(nx, 3 * ny, m)
-    block_elimination.solve(columns, far, work)
+    inverse.solve(work, transposed)
     return work.reshape(right.shape).astype(np.float64)
 
 
-def jacobian(problem: Problem, state: Array) -> tuple[Single, Single]:
-    """J = dR/dstate of one member by coloured differences.
+def jacobian(problem: Problem, state: Array) -> BlockJacobian | SparseJacobian:
+    """J = dR/dstate of one member by coloured differences; sparse on grids of WIDE_FROM rows or more.
 
     Single precision is enough: the factors only lead to the root; the residual in double precision decides what it is.
-
-    Parameters
-    ----------
-    problem, state
-        Of one member; state (nx, 3, ny, 1).
-
-    Returns
-    -------
-    blocks, far
-        Columns i - 1, i and i + 1 of row block i (nx, 3, n, n), n = 3 ny, and the diagonal of column i - 2 (nx, n).
     """
     nx, _, ny, _ = state.shape
+    wide = ny >= WIDE_FROM
     base, depth = residual(problem, state)[..., 0], cell_depths(problem, state)
-    columns, far = np.zeros((nx, 3, 3 * ny, 3 * ny), np.float32), np.zeros((nx, 3 * ny), np.float32)
     colours = np.array(list(np.ndindex(3, ALONG_PERIOD, ACROSS_PERIOD)))
     many = take(problem, np.zeros(COLOUR_SLOTS, dtype=np.int64))
     slots = np.empty((nx, 3, ny, COLOUR_SLOTS))
+    if wide:
+        values, far = np.zeros((nx, ny, 3, 5, 3, 3), np.float32), np.zeros((nx, ny, 3), np.float32)
+    else:
+        values, far = np.zeros((nx, 3, 3 * ny, 3 * ny), np.float32), np.zeros((nx, 3 * ny), np.float32)
+    collect = collect_stencil if wide else block_elimination.collect
     for group in np.split(colours, range(COLOUR_SLOTS, len(colours), COLOUR_SLOTS)):
         slots[...] = state
         for slot, (kind, column, row) in enumerate(group):
             slots[column::ALONG_PERIOD, kind, row::ACROSS_PERIOD, slot] += COLOUR_STEP
         rates = residual(with_kept_shares(many, depth, cell_depths(many, slots)), slots)
-        block_elimination.collect(columns, far, base, rates, group, COLOUR_STEP)
+        collect(values, far, base, rates, group, COLOUR_STEP)
+    sharings = [sharing_at(problem, state, inflow) for inflow in shared_inflows(problem)]
+    if wide:
+        slopes = np.zeros((nx, 3, ny, len(sharings)), np.float32)
+        for n, one in enumerate(sharings):
+            slopes[one.column, LEVEL, one.row, n] = one.slope
+        answers = [one.answer.reshape(nx, 3 * ny) for one in sharings] or [np.zeros((nx, 3 * ny))]
+        shape = (nx, 3 * ny, len(sharings))
+        stacked = np.stack(answers, axis=2)[:, :, : len(sharings)].astype(np.float32)
+        return SparseJacobian(values, far, stacked, slopes.reshape(shape))
     # - dR/d ln Q (d ln W/dx)' of inflows shared by depth. All of it is there for an inflow from the west; through a
     # side, what blocks cannot hold is put down to levels that they can.
-    for inflow in shared_inflows(problem):
-        one = sharing_at(problem, state, inflow)
+    for one in sharings:
         for i in np.flatnonzero(one.answer.any(axis=(1, 2))):
             of_levels = np.zeros((3, ny))
             np.add.at(of_levels, (column_held(one.column, int(i)) - i + 1, one.row), one.slope)
-            columns[i, :, :, :ny] -= one.answer[i].reshape(-1)[:, None] * of_levels[:, None]
-    return columns, far
+            values[i, :, :, :ny] -= one.answer[i].reshape(-1)[:, None] * of_levels[:, None]
+    return BlockJacobian(values, far)
 
 
 def column_held(column: NDArray[np.int64], block: int) -> NDArray[np.int64]:
@@ -196,6 +296,5 @@ def column_held(column: NDArray[np.int64], block: int) -> NDArray[np.int64]:
 
 def factors(problem: Problem, state: Array) -> Factors:
     """Factors of J at a state (nx, 3, ny, 1) of one member."""
-    columns, far = jacobian(problem, state)
-    eliminate(columns, far)
-    return Factors(columns, far, slope_of_friction(problem, state), *thickness(problem, state))
+    inverse = jacobian(problem, state).inverse()
+    return Factors(inverse, slope_of_friction(problem, state), *thickness(problem, state))

@@ -12,7 +12,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.flow.chord import LONGEST_CORRECTION, ChordSolution, chord
 from vegglue.flow.equations import storage
-from vegglue.flow.jacobian import Factors, eliminate, factors, jacobian, solved
+from vegglue.flow.jacobian import Factors, factors, jacobian, solved
 from vegglue.flow.problem import LEVEL, Problem
 from vegglue.flow.thin_water import eased, slope_of_friction
 
@@ -77,17 +77,14 @@ def newton(problem: Problem, start: Array, tolerance: float, how: Beginning = FR
     state, size, time_step = start, np.inf, how.time_step
     nx, _, ny, _ = start.shape
     # Not at the outlet: levels of dry land there have no storage that would hold them while velocities are still far.
-    nowhere, diagonal = np.zeros(ny, dtype=bool), np.arange(3 * ny)
+    nowhere = np.zeros(ny, dtype=bool)
     for iteration in range(1, how.most + 1):
         slope = slope_of_friction(problem, state)
-        rates, (columns, far) = eased(problem, state, slope, nowhere), jacobian(problem, state)
+        rates, system = eased(problem, state, slope, nowhere), jacobian(problem, state)
         stored = np.ones((nx, 3, ny), np.float32)  # D: dh/dz_s of each level, 1 for velocities
         stored[:, LEVEL] = storage(problem, state[:, LEVEL])[..., 0]
         for _ in range(MOST_CUTS):
-            shifted = columns.copy()
-            shifted[:, 1, diagonal, diagonal] += stored.reshape(nx, 3 * ny) / np.float32(time_step)
-            eliminate(shifted, far)
-            step = -solved(shifted, far, rates)
+            step = -solved(system.inverse(stored / np.float32(time_step)), rates)
             size = float(np.abs(step).max())
             if size < LONGEST_CORRECTION:
                 break

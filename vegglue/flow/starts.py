@@ -1,6 +1,7 @@
 """States to begin from: a backwater curve, and a state from a coarser grid."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.effects import physical_constants
@@ -68,6 +69,28 @@ def on_grid(state: Array, shape: tuple[int, int]) -> Array:
         state = np.repeat(state, 2, axis=2)
         state[:, ACROSS, 1:-1:2] = 0.5 * (state[:, ACROSS, :-2:2] + state[:, ACROSS, 2::2])
     return state
+
+
+def between_cells(state: Array, shape: tuple[int, int]) -> Array:
+    """A state (nx, 3, ny, m) on a grid of any `shape` of the same reach, linear between its levels and velocities."""
+    (nx, _, ny, _), (fine_x, fine_y) = state.shape, shape
+    # Levels stand at cell centres, v on the south side of cells, u on their east side.
+    places = {LEVEL: (0.5, 0.5), ACROSS: (0.5, 0.0), ALONG: (1.0, 0.5)}
+    found = np.zeros((fine_x, 3, fine_y, state.shape[3]))
+    for kind, (along, across) in places.items():
+        first, share = _lower_and_share(nx, fine_x, along)
+        of_kind = state[first, kind] * (1.0 - share)[:, None, None] + state[first + 1, kind] * share[:, None, None]
+        first, share = _lower_and_share(ny, fine_y, across)
+        found[:, kind] = of_kind[:, first] * (1.0 - share)[:, None] + of_kind[:, first + 1] * share[:, None]
+    found[:, ACROSS, 0] = 0.0
+    return found
+
+
+def _lower_and_share(coarse: int, fine: int, offset: float) -> tuple[NDArray[np.int64], Array]:
+    """The lower of two coarse points around each fine one, and the share of the upper; flat beyond the ends."""
+    at = np.clip((np.arange(fine) + offset) * coarse / fine - offset, 0.0, coarse - 1.0)
+    first = np.minimum(at.astype(np.int64), coarse - 2)
+    return first, at - first
 
 
 def lifted_flows(coarse: Problem, state: Array, fine: Problem) -> Array:

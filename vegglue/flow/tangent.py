@@ -11,9 +11,8 @@ conjugate residuals: if a cell is about to fall dry they can be so far off that 
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.flow import block_elimination
 from vegglue.flow.equations import residual
-from vegglue.flow.jacobian import Factors, column_held, shared_inflows, sharing_at
+from vegglue.flow.jacobian import Factors, SharedFactors, column_held, shared_inflows, sharing_at, solved
 from vegglue.flow.problem import LEVEL, Problem, take
 
 # Step [m, m/s] of the central difference along a direction scaled to one: chosen, not measured. Tangents agree with
@@ -23,6 +22,9 @@ DIRECTION_STEP = 1e-5
 MOST_ROUNDS = 12
 # Causes answered together [-]: what has been tried for each is kept, so that more need more memory.
 CAUSE_SLOTS = 16
+# Sparse factors are those of a matrix near J: what the last correction leaves is up to 0.3 of it [-], of others a
+# hundredth, so that corrections go on to a smaller one.
+FURTHER_IF_SPARSE = 0.1
 # Corrections of adjoints beside side inflows [-]: each leaves less than a hundredth of what the last one did.
 REPEATS = 2
 
@@ -51,6 +53,8 @@ def tangents(problem: Problem, state: Array, shared: Factors, causes: Array, tol
     Eisenstat, Elman and Schultz (1983), doi:10.1137/0720023.
     """
     found = np.empty_like(causes)
+    if isinstance(shared.inverse, SharedFactors):
+        tolerance *= FURTHER_IF_SPARSE
     for first in range(0, causes.shape[3], CAUSE_SLOTS):
         some = slice(first, first + CAUSE_SLOTS)
         left = -np.ascontiguousarray(causes[..., some])
@@ -101,8 +105,9 @@ def adjoints(problem: Problem, state: Array, shared: Factors, weights: Array) ->
         l (nx, 3, ny, p).
     """
     sides = [inflow for inflow in shared_inflows(problem) if inflow.side != "west"]
-    sharings = [sharing_at(problem, state, inflow) for inflow in sides]
-    answer = correction = _solved_transposed(shared, weights)
+    exact = isinstance(shared.inverse, SharedFactors)
+    sharings = [] if exact else [sharing_at(problem, state, inflow) for inflow in sides]
+    answer = correction = solved(shared.inverse, weights, transposed=True)
     for _ in range(REPEATS if sharings else 0):
         left = np.zeros_like(correction)  # (A - J)' l: what A puts down to columns that its blocks hold
         levels = left[:, LEVEL]
@@ -113,16 +118,9 @@ def adjoints(problem: Problem, state: Array, shared: Factors, weights: Array) ->
                 change = one.slope[:, None] * weight
                 np.add.at(levels, (one.column, one.row), change)
                 np.add.at(levels, (column_held(one.column, int(block)), one.row), -change)
-        correction = _solved_transposed(shared, left)
+        correction = solved(shared.inverse, left, transposed=True)
         answer = answer + correction
     return answer
-
-
-def _solved_transposed(shared: Factors, weights: Array) -> Array:
-    nx, _, ny, p = weights.shape
-    work = weights.astype(np.float32).reshape(nx, 3 * ny, p)
-    block_elimination.solve_transposed(shared.columns, shared.far, work)
-    return work.reshape(weights.shape).astype(np.float64)
 
 
 def _product(one: Array, other: Array) -> Array:

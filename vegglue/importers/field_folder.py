@@ -256,9 +256,9 @@ def _refuse_standing_water(path: Path, site: FieldSite) -> None:
             speed = flow.discharge_m3_s / area if area > 0.0 else 0.0
             if depth > DEEPEST_CHANNEL * channel.bottom_width_m and speed < STANDING_WATER:
                 raise InputError(
-                    f"{shown_path(path)}: `{key}.{name}` expected a level in m above the floor at x = 0, got "
-                    f"{flow.downstream_level_m:g} m, which makes the outlet {depth:.3g} m deep and its water move at "
-                    f"{speed:.1g} m/s; subtract the level of that floor here and from all levels, or mend the unit."
+                    f"{shown_path(path)}: `{key}.{name}` expected a level above the floor at x = 0, got "
+                    f"{flow.downstream_level_m:g} m (outlet {depth:.3g} m deep at {speed:.1g} m/s); subtract that "
+                    "floor from all levels."
                 )
 
 

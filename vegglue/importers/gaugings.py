@@ -53,7 +53,29 @@ OF_THE_RULE, LEAST_ERROR = 0.05, 0.005
 
 
 def read_flowtracker2(path: Path, options: FileOptions) -> MeasuredRows:
-    """Verticals at their place on the tape, which `line` lays on the map. InputError."""
+    """Verticals of a FlowTracker2 (.ft), at their place on the tape.
+
+    Parameters
+    ----------
+    path
+        A ZIP with DataFile.json, in SI or with units in its keys.
+    options
+        `line`, the ends of the tape [m].
+
+    Returns
+    -------
+    MeasuredRows
+        Depths [m], velocities and their errors [m/s] of verticals that were measured.
+
+    Raises
+    ------
+    InputError
+        If the file holds no stations, or `line` is not given.
+
+    References
+    ----------
+    FlowTracker2 User's Manual (SonTek, January 2019), section 12.1.
+    """
     with (
         read_by_library(path, "a FlowTracker2 file, a ZIP with DataFile.json and its Stations"),
         ZipFile(path) as packed,
@@ -121,7 +143,25 @@ def is_gauging(text: str) -> bool:
 
 
 def read_gauging(path: Path, options: FileOptions) -> MeasuredRows:
-    """Verticals at their place on the tape, which `line` lays on the map. InputError."""
+    """Verticals of a FlowTracker, a RiverSurveyor Stationary or an AquaCalc, at their place on the tape.
+
+    Parameters
+    ----------
+    path
+        A text with settings and one table of verticals.
+    options
+        `line`, the ends of the tape [m].
+
+    Returns
+    -------
+    MeasuredRows
+        Depths [m], velocities and their errors [m/s] of verticals that were measured.
+
+    Raises
+    ------
+    InputError
+        If there is no such table, or `line` is not given.
+    """
     text = readable_text(path)
     if AQUACALC.search(text):
         table = _aquacalc_table(path, text)

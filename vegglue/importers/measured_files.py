@@ -77,7 +77,7 @@ def measured_files(
     known = KnownExperiments(tuple(site.experiments), site_file(folder).name, EXPERIMENTS, tuple(site.holdout))
     found = _read(_candidates(folder, options, used), options, target, place, known, bed)
     if not found.observations:
-        raise InputError(f"{shown_path(folder)}: {_nothing_measured(found)}")
+        raise _nothing_measured(found, shown_path(folder))
     return found
 
 
@@ -92,24 +92,22 @@ def held_out_measurements(
     known = KnownExperiments(tuple(site.holdout), site_file(folder).name, HELD_OUT, tuple(site.experiments))
     found = _read(paths, _options(folder, site), target, place, known, bed)
     if paths and not found.observations:
-        raise InputError(f"{shown_path(folder)}: of what is held out, {_nothing_measured(found)}")
+        raise _nothing_measured(found, f"{shown_path(folder)}, held out")
     return found
 
 
-def _nothing_measured(found: MeasuredFiles) -> str:
-    """The end of a message about a folder without measurements: what its tables hold, if there are any."""
+def _nothing_measured(found: MeasuredFiles, where: str) -> InputError:
+    """An error about a folder without measurements: what its tables hold, if there are any."""
     if not found.imported:
         files = ", ".join(kind.file for kind in KINDS.values())
-        return f"expected one of {files}, or other tables of measurements, got none; put what was measured there."
+        return InputError(f"{where}: expected one of {files}, or other tables, got none; add measurements.")
     held = " ".join(f"{one['name']}: {one['taken']}." for one in found.imported)
-    kinds = ", ".join(kind.words for kind in KINDS.values())
     headings = "; ".join(
         f"{kind.words} as {', '.join(ROLES[kind.column].names[:HEADINGS_SHOWN])}" for kind in KINDS.values()
     )
-    return (
-        f"expected columns of {kinds}, got none that is known. {held} Name the column by what it holds, such as "
-        "`columns: {u: ...}` of its file in `files` of the site file, or give it a heading that is understood, "
-        f"among them {headings}."
+    return InputError(
+        f"{where}: expected a column of measurements, got none. {held} Name it, such as `columns: {{u: ...}}` of its "
+        f"file in `files`, or head it as usual: {headings}."
     )
 
 

@@ -62,7 +62,25 @@ def _header(path: Path) -> Path | None:
 
 
 def read_nortek(path: Path, options: FileOptions) -> MeasuredRows:
-    """One row: the mean of an ASCII record at its `position`. InputError."""
+    """One row: the mean of an ASCII record of a Vectrino or a Vector.
+
+    Parameters
+    ----------
+    path
+        The .dat, with its .hdr beside it.
+    options
+        `position` of the probe [m].
+
+    Returns
+    -------
+    MeasuredRows
+        Mean velocities and the standard deviation of the first [m/s], and the length of the sound samples [s].
+
+    Raises
+    ------
+    InputError
+        For other axes than XYZ or ENU, a record without its rate, and one without a sound sample.
+    """
     _refuse_without_position(path, options)
     lines = [line.split() for line in readable_text(path).splitlines() if line.strip()]
     layout = next((one for one in _LAYOUTS if lines and len(lines[0]) >= one.columns), None)
@@ -92,9 +110,24 @@ def read_nortek(path: Path, options: FileOptions) -> MeasuredRows:
 
 
 def read_vector(path: Path, options: FileOptions) -> MeasuredRows:
-    """One row of a binary record of a Vector, along the axes x, y and z of the probe.
+    """One row: the mean of a binary record of a Vector (.vec), along the axes x, y and z of the probe.
 
-    InputError, also for other axes, and without mhkit.
+    Parameters
+    ----------
+    path
+        The record.
+    options
+        `position` of the probe [m].
+
+    Returns
+    -------
+    MeasuredRows
+        As `read_nortek`.
+
+    Raises
+    ------
+    InputError
+        Also for other axes, and without mhkit.
     """
     _refuse_without_position(path, options)
     most = path.stat().st_size // BYTES_OF_A_SAMPLE

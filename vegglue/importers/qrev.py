@@ -79,7 +79,25 @@ def is_qrev_summary(text: str) -> bool:
 
 
 def read_qrev_summary(path: Path, options: FileOptions) -> MeasuredRows:
-    """The discharge of all transects and its standard error, at `start`. InputError."""
+    """The discharge of all transects, and half of its 95 % uncertainty as standard error.
+
+    Parameters
+    ----------
+    path
+        *_QRev.xml.
+    options
+        `start` of the boat [m], where the discharge stands.
+
+    Returns
+    -------
+    MeasuredRows
+        One row: x, y [m], discharge and its error [m3/s], NaN if the file states none.
+
+    Raises
+    ------
+    InputError
+        If there is no total, or `start` is not given.
+    """
     if options.start is None:
         raise InputError(
             f"{shown_path(path)}: expected where the boat started, `start: [x, y]`, which no summary holds; add it to "

@@ -191,10 +191,9 @@ def refuse_confounded_replicates(taken: MeasuredRows, places: Sequence[Hashable]
                 known = list(dict.fromkeys(names))
                 more = [f"{len(known) - MOST_TEXTS} more"] if len(known) > MOST_TEXTS else []
                 raise InputError(
-                    f"{file}: expected repeats at one place to differ by chance, got velocities that differ with "
-                    f"{heading!r} ({listed([*known[:MOST_TEXTS], *more])}); name it in `columns` of this file in "
-                    "`files` of the site file, by what it holds (`experiment`, `section`, `y`, `z`, `height`, "
-                    "`below`), keep the rows of one, or take the column out where they are repeats of one flow."
+                    f"{file}: expected repeats that differ by chance, got velocities that differ with {heading!r} "
+                    f"({listed([*known[:MOST_TEXTS], *more])}); name it in `columns`, by what it holds "
+                    "(`experiment`, `section`, `y`, `z`), or keep one."
                 )
 
 

@@ -170,11 +170,9 @@ def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str]
     # Headings that hold the name of an experiment: `12 mei`, `level low`, `12 mei [m+NAP]`.
     words = [name for one in experiments if (name := words_of(one))]
     wide = [heading for heading in taken.others if any(f" {name} " in f" {words_of(heading)} " for name in words)]
-    written_long = (
-        f"{where} expected a row for each place and experiment, with the name of the experiment "
-        f"({', '.join(experiments)}) in one column and the value in another, got a column of values for each, "
-        f"{listed(wide) if wide else ''}; write them one below the other, levels of gauges in the columns gauge, x, y, "
-        "experiment and level."
+    written_long = InputError(
+        f"{where} expected a column of experiments ({', '.join(experiments)}) and one of values, got a column for "
+        f"each, {listed(wide)}; write them below one another (gauges: gauge, x, y, experiment, level)."
     )
     if "x" not in place:
         headings = ", ".join(taken.headings)
@@ -182,16 +180,14 @@ def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str]
             raise InputError(f"{where} expected a column of x in metres, got places in {NO_DEGREES}")
         if [kind.column for kind in KINDS.values() if kind.column in taken.numbers] == ["discharge"]:
             raise InputError(
-                f"{where} expected a column of x beside the discharges, got none in {headings}; write the discharge of "
-                f"each experiment into the site file, `experiments: {{{experiments[0]}: {{discharge: 620 l/s, level: "
-                "...}}`, and move this file out of the folder; only discharges measured at sections have x, in a "
-                "column, or as `x: 12 m` of this file in `files`."
+                f"{where} expected a column of x beside the discharges, got none in {headings}; add it, or `x: 12 m` "
+                f"of this file in `files`, or write `discharge` of {experiments[0]} into the site file."
             )
         if "level" not in taken.numbers and wide:
-            raise InputError(written_long)
+            raise written_long
         raise InputError(
             f"{where} expected a column of x, got none in {headings}; name it by `columns: {{x: ...}}` of this file in "
-            "`files` of the site file, or give there `x: 12 m` of all rows, `line` of a tape or `position` of a probe."
+            "`files`, or give there `x: 12 m`, `line` or `position`."
         )
     taken = taken.only(np.all([np.isfinite(taken.numbers[role]) for role in place], axis=0))
     if options.experiment is not None:
@@ -201,7 +197,7 @@ def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str]
     elif len(experiments) == 1:
         names = [experiments[0]] * taken.size
     elif wide:
-        raise InputError(written_long)
+        raise written_long
     else:
         file = where.removesuffix(":").rpartition("/")[2]
         alike = ""  # an unread column of repeated words may hold the experiments by other names
@@ -214,7 +210,7 @@ def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str]
                 break
         raise InputError(
             f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none{alike}; "
-            f"add one, or say in the site file, under `files`, `{file}: {{experiment: {experiments[0]}}}` of all rows."
+            f"add one, or `{file}: {{experiment: {experiments[0]}}}` under `files`."
         )
     sections = [options.section] * taken.size if options.section is not None else taken.texts.get("section")
     if sections is None or "" in sections:
@@ -277,11 +273,9 @@ def _refuse_lost_places(taken: MeasuredRows, file: str) -> None:
         for place, length in zip(places, values.tolist(), strict=True):
             if np.isfinite(length) and seen.setdefault(place, length) != length:
                 raise InputError(
-                    f"{file}: expected where across the channel each velocity was measured, got no column of y, and "
-                    f"velocities at x = {place[2]:g} m that differ in {heading!r}; name it by "
-                    "`columns: {y: ...}` of this file in `files` of the site file, with `flip: y` and `zero: [0, 2.5]` "
-                    "where it counts from a left bank 2.5 m off the axis (or by `height` or `z`, if it is one), or "
-                    "take it out where they are repeats at one place."
+                    f"{file}: expected a column of y, got velocities at x = {place[2]:g} m that differ in {heading!r}; "
+                    "name it by `columns: {y: ...}` (with `flip: y`, `zero: [0, 2.5]` from a left bank), or take it "
+                    "out if they are repeats."
                 )
 
 
@@ -304,10 +298,8 @@ def _refuse_lost_heights(taken: MeasuredRows, places: Sequence[Hashable], file: 
             low, high = sorted((seen.setdefault(place, height), height))
             if high > APART * low:
                 raise InputError(
-                    f"{file}: expected how high above the bed each velocity was measured, got several at one place "
-                    f"that differ in {heading!r}; name it in `columns` of this file in `files` of the site file, as "
-                    "`z` (a level), `height` (above the bed) or `below` (the surface, beside `depth` of the water), "
-                    "or take it out where they are repeats."
+                    f"{file}: expected one velocity at a place, or its height, got several that differ in {heading!r}; "
+                    "name it in `columns` as `z`, `height` (above the bed) or `below` (the surface), or take it out."
                 )
 
 

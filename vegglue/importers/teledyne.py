@@ -204,7 +204,29 @@ def is_winriver(text: str) -> bool:
 
 
 def read_winriver(path: Path, options: FileOptions) -> MeasuredRows:
-    """Stations of a transect. InputError."""
+    """Stations of a transect, from classic ASCII output.
+
+    Parameters
+    ----------
+    path
+        Velocities over ground (reference BT, GGA or VTG), in cm or ft.
+    options
+        `start` of the boat [m].
+
+    Returns
+    -------
+    MeasuredRows
+        Velocities east and north at up to 15 stations, with errors [m/s].
+
+    Raises
+    ------
+    InputError
+        For velocities against the boat, a file that is cut short, and a boat that leaps.
+
+    References
+    ----------
+    WinRiver II User's Guide (P/N 957-6231-00), Classic ASCII Output.
+    """
     text = readable_text(path).replace(",", ".")  # decimal commas: spaces part the fields
     lines = [line for line in text.splitlines() if line.strip()]
     profiles, at = [], 3

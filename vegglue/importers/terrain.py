@@ -280,7 +280,29 @@ def filled(terrain: Terrain, x: Array, y: Array) -> Array:
 
 
 def read_terrain(path: Path, place: Placement, options: FileOptions, sections: bool) -> Terrain:
-    """The bed in a file. sections: whether its points stand in cross-sections. InputError."""
+    """The bed in a file.
+
+    Parameters
+    ----------
+    path
+        A GeoTIFF, an ESRI ASCII grid, or a table of points.
+    place
+        Of the channel on the map.
+    options
+        Columns, units and coordinates of a table.
+    sections
+        Whether its points stand in cross-sections.
+
+    Returns
+    -------
+    Terrain
+        Levels in the channel, NaN beyond the survey [m].
+
+    Raises
+    ------
+    InputError
+        For another file, coordinate system or unit, and too few points.
+    """
     ending = path.suffix.lower()
     if ending in RASTERS:
         if ending not in (".tif", ".tiff") and (system := path.with_suffix(".prj")).is_file():
@@ -396,9 +418,28 @@ def _without_fill(raster: Raster) -> tuple[Raster, str]:
 
 
 def read_geotiff(path: Path, frame: Frame | None = None) -> Raster:
-    """The first band of a GeoTIFF whose rows run along the map, in m, with the scale and offset that GDAL keeps.
+    """The first band of a GeoTIFF whose rows run along the map, with the scale and offset that GDAL keeps.
 
-    InputError for another or a turned one, and for one in another system than the frame.
+    Parameters
+    ----------
+    path
+        The file.
+    frame
+        Of the model on the map, whose coordinate system the file has to have.
+
+    Returns
+    -------
+    Raster
+        Levels [m], NaN for none.
+
+    Raises
+    ------
+    InputError
+        For a turned one, oblong pixels, and another system than that of the frame.
+
+    References
+    ----------
+    OGC GeoTIFF 1.1 (19-008).
     """
     with importing("tifffile", path, "GeoTIFFs", "field", "save it as an ESRI ASCII grid"):
         import tifffile

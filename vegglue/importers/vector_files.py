@@ -478,7 +478,25 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
 
 
 def read_line(path: Path, frame: Frame | None = None) -> MeasuredRows:
-    """The one line in a file of a map program."""
+    """The one line in a file of a map program.
+
+    Parameters
+    ----------
+    path
+        GeoJSON or a shapefile.
+    frame
+        Of the model on the map, whose coordinate system the file has to have.
+
+    Returns
+    -------
+    MeasuredRows
+        x and y of its points, in their order [m].
+
+    Raises
+    ------
+    InputError
+        For several lines, degrees, and another system than that of the frame.
+    """
     if path.suffix.lower() == ".shp":
         with shapes_and_records(path, "POLYLINE", frame) as records:
             shapes = [one.shape for one in records]

@@ -70,6 +70,8 @@ class CaseRun:
         Receives the progress of long computations.
     force : bool
         Whether a child that was edited by hand, and a larger ensemble, may be replaced.
+    memory : float, optional
+        Gigabytes that a diagnosis may use, else most of what the machine has. No result depends on it.
     beside : CaseRun, optional
         A run whose measurements and site are used here too, if the case has the same.
     """
@@ -79,6 +81,7 @@ class CaseRun:
     jobs: int = -1
     watch: Watch = silent
     force: bool = False
+    memory: float | None = None
     beside: "CaseRun | None" = None
 
     @property
@@ -137,9 +140,16 @@ class CaseRun:
         unseen = Model(case, there.site, there.observations.table, NEWTON)
         return unseen_with_command(unseen, self.model, self.folder, self.watch)
 
-    def with_settings(self, runs: Path | str, jobs: int = -1, watch: Watch = silent, force: bool = False) -> "CaseRun":
+    def with_settings(
+        self,
+        runs: Path | str,
+        jobs: int = -1,
+        watch: Watch = silent,
+        force: bool = False,
+        memory: float | None = None,
+    ) -> "CaseRun":
         """The same case in another folder of runs, or with other settings, and what was read of it."""
-        return CaseRun(self.case, Path(runs), jobs, watch, force, beside=self)
+        return CaseRun(self.case, Path(runs), jobs, watch, force, memory, beside=self)
 
     def of(self, case: Case) -> "CaseRun":
         """Another case in the same runs, such as a child: with these measurements and this site if it has the same."""

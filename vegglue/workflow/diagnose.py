@@ -6,10 +6,11 @@ from vegglue.calibration.candidates import Candidate, cause_of
 from vegglue.case.resolved_config import resolved_yaml
 from vegglue.case.schema import Case
 from vegglue.diagnosis.diagnose import diagnose_model
+from vegglue.diagnosis.memory import GIGABYTE, MEMORY_SHARE, jobs_in_memory
 from vegglue.effects.definition import Effect
 from vegglue.engine.interface import responses
 from vegglue.engine.model import with_compilation
-from vegglue.parallel import at_most, import_beside, one_thread
+from vegglue.parallel import at_most, cores_of, import_beside, memory_of_machine, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import diagnosis_that_fits, write_diagnosis
@@ -49,8 +50,11 @@ def diagnose(case: Case | CaseRun, *, runs: Path | str = "runs", jobs: int = -1,
     if kept is not None:
         return kept
     import_beside("vegglue.pages.diagnosis_figures")  # drawing takes a third of a second to import
-    with at_most(run.jobs):
-        model = run.commanded_model
+    model, allowed = (
+        run.commanded_model,
+        MEMORY_SHARE * memory_of_machine() if run.memory is None else run.memory * GIGABYTE,
+    )
+    with at_most(jobs_in_memory(model, cores_of(run.jobs), allowed)):
         found = diagnose_model(model, run.watch, run.validation_model)
         found = with_command_compared(found, model, run.folder, run.watch)
     from vegglue.pages.diagnosis_figures import save_diagnosis_figure

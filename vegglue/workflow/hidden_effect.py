@@ -18,6 +18,7 @@ from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.candidates import Candidate, candidates_of, cause_of, effect_entry
 from vegglue.calibration.noise import Noise, noise_of, with_correlation, with_grid_error
+from vegglue.case.grid import on_cells
 from vegglue.case.gridded_site import build_site
 from vegglue.case.messages import nearest
 from vegglue.case.parameter_space import theta_at
@@ -25,7 +26,7 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.effects.identity import EffectIdentity
 from vegglue.engine.interface import Model, Point, linearise, responses
-from vegglue.engine.model import coarser, on_cells
+from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.workflow import unlisted_objects
