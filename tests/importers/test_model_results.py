@@ -129,7 +129,7 @@ def own_library(name: str):
     return pytest.importorskip(name)
 
 
-@pytest.mark.filterwarnings("ignore:No standard_name")  # of xugrid, on axes without one
+@pytest.mark.filterwarnings("ignore::UserWarning:xugrid")  # of xugrid, on axes without one
 @pytest.mark.parametrize("code", ["selafin", "ugrid"])
 def test_values_of_the_format_s_own_library(tmp_path: Path, code: str) -> None:
     """Ten points, read by xarray-selafin and xugrid, which are no dependency."""
