@@ -929,6 +929,8 @@ class PlanSearch:
                 j for j in free if pieces[j].experiment == flow and pieces[j].work is Work.TRANSECT
                 and pieces[j].x in there
             ]  # fmt: skip
+            # Of a transect and the same with every second vertical the whole one, which stands first.
+            together = list({pieces[j].x: j for j in reversed(together)}.values())[::-1]
             found += [tuple(together[:count]) for count in (2, 3, 5, 8) if len(together) >= count]
         return found
 
