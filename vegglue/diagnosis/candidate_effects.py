@@ -131,7 +131,8 @@ def candidate_laws(
     first: Screening, last: Screening, found: SearchState, beside_first: Callable[[], LawScreening | None]
 ) -> CandidateLaws | None:
     """Laws that stand out against the last model, or against the first one where something was accepted; None where
-    errors alone leave as much, or beside listed effects that were accepted unless it is clearly a law.
+    errors alone leave as much, or beside listed effects that were accepted unless it is clearly a law, or likelier than
+    them with a place.
 
     beside_first: `laws_beside` the first screening, begun before it is known whether it is needed.
     """
@@ -168,7 +169,9 @@ def candidate_laws(
             )
         )
     suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), tuple(laws))
-    return None if found.steps and not clearly_a_law(suspected) else suspected
+    # A place beside a listed effect is what a law looks like; chosen after the twin of docs/discover.md.
+    kept = clearly_a_law(suspected) or (bool(found.places) and suspected.likelier)
+    return None if found.steps and not kept else suspected
 
 
 def clearly_a_law(laws: CandidateLaws | None) -> bool:
