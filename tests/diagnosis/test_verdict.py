@@ -250,6 +250,12 @@ def test_a_name_and_a_place_have_to_be_earned(
         assert verdict_on(places=(an_anomaly(),), **within).kind == "none-of-these"
 
 
+def test_a_place_many_times_as_large_as_plausible_is_none() -> None:
+    found = verdict_on(places=(an_anomaly(amplitude=-4.4),))
+    assert (found.kind, found.reasons) == ("cannot-tell", (AmplitudeBeyondPlausible("drag at a place", 4.4),))
+    assert verdict_on(places=(an_anomaly(amplitude=3.9),)).kind == "none-of-these"
+
+
 @pytest.mark.parametrize(
     "candidates",
     [

@@ -805,6 +805,7 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
     if at_bound:
         return AmplitudeAtBound(tuple(at_bound))
     sizes = [(one.amplitude.relative_size, one.name) for one in inputs.candidates if one.name in names]
+    sizes += [(abs(one.amplitude) / one.plausible, f"{one.term} at a place") for one in inputs.places]
     size, name = max(sizes, default=(0.0, ""))
     return AmplitudeBeyondPlausible(name, float(size)) if size > constants().far_off_prior else inputs.hangs_on
 
