@@ -192,6 +192,14 @@ def test_no_efficiency_is_defined_against_a_constant() -> None:
 ENGINES = Path(__file__).parents[3] / "shared" / "cases" / "files" / "engines"
 
 
+@pytest.mark.skipif(not ENGINES.is_dir(), reason="no folder `shared/cases/files/engines` beside the repository")
+def test_efficiencies_against_constant_values_are_refused_before_anything_is_solved(tmp_path: Path) -> None:
+    case = load_case(ENGINES / "nse_const.yaml")
+    with pytest.raises(InputError, match=r"nse_const\.yaml, infer\.likelihood: .* 15 of 0\.45"):
+        vegglue.simulate(case, runs=tmp_path)
+    assert not list(tmp_path.rglob("ensemble.h5"))
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not ENGINES.is_dir(), reason="no folder `shared/cases/files/engines` beside the repository")
 @pytest.mark.parametrize("name", ["f_dry", "f_const"])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
-from vegglue.errors import InputError, shown_command
+from vegglue.errors import InputError, shown_command, shown_path
 from vegglue.inference.posterior_summary import posterior_of
 from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import kind_of, unstated_errors
@@ -170,6 +170,7 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
     """
     station = observations.table
     check_stations(ensemble, station, case.source)
+    refuse_undefined_efficiency(case, station)
     fit = fit_members(ensemble.prediction, station, case.infer.sigma)
     threshold = -np.inf if case.infer.behavioural is None else case.infer.behavioural
     settings = InferenceSettings(
@@ -193,6 +194,21 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
         prediction=ensemble.prediction,
     )
     return posterior_of(settings, sample, case, station, fit.noise, fit.sigma)
+
+
+def refuse_undefined_efficiency(case: Case, station: pd.DataFrame) -> None:
+    """Raise InputError if `infer` is to weigh by efficiencies, and all measured values of a kind are equal."""
+    settings = case.infer
+    if settings.method != "glue" or (settings.likelihood == "gaussian" and settings.behavioural is None):
+        return
+    value = station["value"].to_numpy(float)
+    for kind, rows in stations_by_kind(station).items():
+        if np.ptp(value[rows]) == 0.0:
+            setting = "likelihood" if settings.likelihood != "gaussian" else "behavioural"
+            raise InputError(
+                f"{shown_path(case.source)}, infer.{setting}: expected values of {kind} that differ, got "
+                f"{rows.size} of {value[rows][0]:g}: no efficiency is defined against them; use gaussian alone."
+            )
 
 
 def check_stations(ensemble: Ensemble, station: pd.DataFrame, config: Path | None = None) -> None:

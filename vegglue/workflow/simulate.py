@@ -12,6 +12,7 @@ from vegglue.engine.command import command_runs
 from vegglue.errors import InputError, StorageError
 from vegglue.flow.status import FAILED
 from vegglue.inference.command_ensemble import run_ensemble
+from vegglue.inference.glue import refuse_undefined_efficiency
 from vegglue.inference.solve_ensemble import ensemble_hash, solve_ensemble
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
@@ -77,6 +78,7 @@ def simulate(
     if run.case.engine is None:
         refuse_command(run.case, "simulate")  # of a finished run: `infer` draws its posterior without members
     refuse_to_shrink(run)
+    refuse_undefined_efficiency(run.case, run.observations.table)
     if not is_simulated(run):
         share_one_beside(run)
     if not is_up_to_date(run):
