@@ -277,6 +277,28 @@ def _vectrino() -> Format:
                   frozenset({*headings} - read))  # fmt: skip
 
 
+def _vector() -> Format:
+    """Burst, counter, three velocities, amplitudes, ratios and correlations of three beams, pressure, two inputs."""
+    random, headings = np.random.default_rng(6), [str(column) for column in range(17)]
+    rows = [
+        dict(
+            zip(
+                headings,
+                map(str, [1, n + 1, *np.round(at, 4), *[120] * 3, *[20] * 3, *[96] * 3, 1.2, 0, 0]),
+                strict=True,
+            )
+        )
+        for n, at in enumerate([0.4, 0.02, 0.0] + 0.03 * random.standard_normal((200, 3)))
+    ]
+
+    def write(path: Path, rows: Sequence[Row]) -> None:
+        path.write_text("\n".join(" ".join(row.values()) for row in rows), encoding="utf-8")
+        path.with_suffix(".hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
+
+    read = {"2", "3", "4", "11", "12", "13"}
+    return Format("w.dat", AT, rows, write, ("NaN", "-32.768", "-999", "99999"), frozenset({*headings} - read))
+
+
 def _profiler() -> Format:
     random = np.random.default_rng(5)
     rows = [
@@ -303,7 +325,7 @@ def _profiler() -> Format:
 FORMATS = {
     made.__name__[1:]: made
     for made in (_table, _points, _workbook, _flowtracker, _stationary, _aquacalc, _flowtracker2, _winriver,
-                 _riversurveyor_mat, _qrev, _vectrino, _profiler)
+                 _riversurveyor_mat, _qrev, _vectrino, _vector, _profiler)
 }  # fmt: skip
 
 
