@@ -36,4 +36,9 @@ def factor_bytes(columns: float, rows: float) -> float:
     """
     if rows >= WIDE_FROM:
         return SPARSE_BYTES * columns * rows * math.log2(rows)
+    return block_bytes(columns, rows)
+
+
+def block_bytes(columns: float, rows: float) -> float:
+    """B = 4 x 3 nx (3 ny)^2: factors by blocks, on any grid [bytes]."""
     return 4.0 * 3.0 * columns * (3.0 * rows) ** 2
