@@ -50,9 +50,7 @@ def path_from(folder: Path, path: Path) -> str:
 def shell_line(words: Sequence[str]) -> str:
     """Words as one line that can be copied into a shell: Windows quotes otherwise, and has backslashes in paths."""
     if sys.platform == "win32":
-        from subprocess import list2cmdline
-
-        return list2cmdline(words)
+        return " ".join(f'"{word}"' if not word or " " in word else word for word in words)
     return shlex.join(words)
 
 

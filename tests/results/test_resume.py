@@ -103,7 +103,7 @@ OTHER_PARAMETERS = {"z_last": np.ones(MEMBERS), "a_first": np.ones(MEMBERS)}
     [
         {"config_hash": "e" * 64},
         {"seed": 6},
-        {"version": "0.1.0"},
+        {"version": "0.1.1"},
         {"chunks": 4},
         {"cut": "otherwise"},
         {"parameters": OTHER_PARAMETERS},

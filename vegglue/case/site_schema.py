@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from vegglue.case.size_limits import LARGEST_FACTORS, MOST_CELLS, factor_bytes
+from vegglue.case.size_limits import MOST_CELLS
 
 
 def _number_or_name(value: Any) -> Any:
@@ -167,9 +167,6 @@ class GridExtent(Part):
         columns, rows = ((high - low) / size for (low, high), size in zip((self.x, self.y), self.cell, strict=True))
         if not columns * rows <= MOST_CELLS:
             raise ValueError(f"at most {MOST_CELLS:,} cells, where these make {columns * rows:.3g}")
-        if not factor_bytes(columns, rows) <= LARGEST_FACTORS:
-            most, these = LARGEST_FACTORS / 1e9, factor_bytes(columns, rows) / 1e9
-            raise ValueError(f"cells whose factors take at most {most:g} GB, where these take {these:.3g}")
         for axis, (low, high), size in (("x", self.x, self.cell[0]), ("y", self.y, self.cell[1])):
             count = (high - low) / size
             if abs(count - round(count)) > 1e-6 or count < 3:

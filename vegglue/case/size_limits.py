@@ -18,8 +18,6 @@ MOST_DIGITS = 30
 LONGEST_CHAIN = 50
 # Cells of a grid: more than twenty times as many as the largest case of this project.
 MOST_CELLS = 1_000_000
-# The factors of one member [bytes], see `factor_bytes`: they must fit into memory beside others.
-LARGEST_FACTORS = 16_000_000_000
 # Rows of cells from which on factors are sparse [-]: measured, see docs/speed.md. SPARSE_BYTES: 390 to 445 on grids of
 # 90 x 37 to 5,000 x 100 cells [bytes a cell and doubling of the rows].
 WIDE_FROM, SPARSE_BYTES = 56, 440.0

@@ -20,9 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve, cholesky, solve_triangular
-from scipy.optimize import minimize
 from scipy.special import logsumexp, ndtri
 
 from vegglue.arrays import Array
@@ -84,6 +82,8 @@ class BedSurvey:
 
         The splines sum to one, which is the level.
         """
+        from scipy.interpolate import BSpline  # late: a case without a survey need not wait for it
+
         x, y = self.points[:, 0], self.points[:, 1]
         each = len(y) / max(len(self.lines), 1) if (self.line >= 0).any() else np.sqrt(len(y))
         low, high, count = y.min(), y.max(), int(np.clip(round(each) - FEWER, *SPLINES))
@@ -132,6 +132,8 @@ def fitted_covariances(survey: BedSurvey) -> list[CovarianceOfBed]:
 
     def best(rough: bool, start: Array, *along: float) -> Array:
         """ln of what is not given of (l_x, l_y, nugget) at the largest likelihood."""
+        from scipy.optimize import minimize  # late: a case without a survey need not wait for it
+
         over = np.array(LENGTHS_OVER_EXTENT)
         bounds = np.log(np.array([over * length, over * width, np.array(NUGGET)]))[len(along) :]
         found = minimize(

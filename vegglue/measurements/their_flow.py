@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import QhullError, cKDTree
 
 from vegglue.arrays import Array, Mask
@@ -59,6 +58,8 @@ class TheirFlow:
         if wet.any():
             found = fields[wet][cKDTree(places).query(to)[1]]
             try:
+                from scipy.interpolate import LinearNDInterpolator  # late: a case of its own flow need not wait for it
+
                 between = LinearNDInterpolator(places, fields[wet])(to)
                 found = np.where(np.isfinite(between), between, found)
             except (QhullError, ValueError):  # fewer than three places, or all on a line
