@@ -255,6 +255,8 @@ def _ensemble(path: Path, rows: list[list[str]]) -> BoatProfile:
             f"{shown_path(path)}: expected velocities over ground (reference BT, GGA or VTG), got NONE; choose a "
             "reference in WinRiver and export it anew."
         )
+    if not rows[5][2][0].isalpha():
+        raise ValueError("a reference that is none")  # a mark of no value: over what these velocities are is unknown
     metres, velocity = SCALES[rows[5][1].lower()]
     beams = np.array([float(text) for text in rows[1][8:12]])
     depth = metres * float(beams[beams > 0.0].mean()) if (beams > 0.0).any() else 0.0
