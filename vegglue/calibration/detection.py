@@ -17,14 +17,14 @@ since parameters and shared errors have standard normal priors (Woodbury's ident
 without the measurements themselves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 from scipy.special import ndtr
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.calibration.score_test import HypothesisKind, log_factors, prior_shrinkage
 
 # Chance with which what is called detectable before measuring is detected [-].
@@ -37,6 +37,15 @@ ROOT_HALVINGS = 40
 SMALL_SHARE = 0.05
 # Independent patterns of shared errors that are kept at most. Chosen: those left out are counted as own errors.
 MOST_PATTERNS = 120
+
+
+def lowest(enough: Callable[[Array], Mask], low: Array, high: Array) -> Array:
+    """The value between low and high (...,) from which on a condition holds, by halving."""
+    for _ in range(ROOT_HALVINGS):
+        middle = 0.5 * (low + high)
+        reached = enough(middle)
+        low, high = np.where(reached, low, middle), np.where(reached, middle, high)
+    return high
 
 
 def detection_chance(length: Array, threshold: Array, only_sign: np.ndarray | int = 0) -> Array:
@@ -63,14 +72,12 @@ def detection_chance(length: Array, threshold: Array, only_sign: np.ndarray | in
 
 
 def detected_length(threshold: Array, chance: float = PLANNED_POWER, only_sign: np.ndarray | int = 0) -> Array:
-    """l at which `detection_chance` is `chance` [standard errors], by halving."""
-    threshold = np.asarray(threshold, dtype=float)
-    low, high = np.zeros_like(threshold), threshold + 10.0
-    for _ in range(ROOT_HALVINGS):
-        middle = 0.5 * (low + high)
-        enough = detection_chance(middle, threshold, only_sign) >= chance
-        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-    return np.asarray(high)
+    """l at which `detection_chance` is `chance` [standard errors]."""
+
+    def enough(length: Array) -> Mask:
+        return np.asarray(detection_chance(length, threshold, only_sign) >= chance)
+
+    return lowest(enough, np.zeros_like(threshold), threshold + 10.0)
 
 
 def chance_over_prior(size: Array, threshold: Array) -> Array:
@@ -78,9 +85,11 @@ def chance_over_prior(size: Array, threshold: Array) -> Array:
     return np.asarray(2.0 * ndtr(-threshold / np.hypot(1.0, size)))
 
 
-def chance_to_separate(distance: Array) -> Array:
-    """Phi(D / 2): chance that of two equally probable hypotheses D standard errors apart the true one is likelier."""
-    return np.asarray(ndtr(0.5 * np.sqrt(np.maximum(distance, 0.0))))
+def chance_to_separate(squared_distance: Array) -> Array:
+    """Phi(D / 2) of D^2: chance that of two equally probable hypotheses, whose predictions lie D standard errors apart,
+    the true one has the larger likelihood [-].
+    """
+    return np.asarray(ndtr(0.5 * np.sqrt(squared_distance)))
 
 
 def alarm_thresholds(kind: HypothesisKind, columns: Sequence[np.ndarray], level: float) -> Array:
@@ -97,13 +106,12 @@ def alarm_thresholds(kind: HypothesisKind, columns: Sequence[np.ndarray], level:
             continue
         cosine = units[:, own].T @ units[:, own]
         size, prior = kind.size[own], kind.log_prior[own]
-        low, high = np.zeros(own.size), found[own]  # others only add
-        for _ in range(ROOT_HALVINGS):
-            middle = 0.5 * (low + high)
-            evidence = log_factors(middle[:, None] * cosine, size) + prior
-            enough = np.logaddexp.reduce(evidence, axis=1) >= level
-            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        found[own] = high
+
+        def enough(score: Array, cosine: Array = cosine, size: Array = size, prior: Array = prior) -> Mask:
+            evidence = log_factors(score[:, None] * cosine, size) + prior
+            return np.asarray(np.logaddexp.reduce(evidence, axis=1) >= level)
+
+        found[own] = lowest(enough, np.zeros(own.size), found[own])  # others only add
     return found
 
 
@@ -158,9 +166,6 @@ class Information:
 
     def __add__(self, other: "Information") -> "Information":
         return Information(self.matrix + other.matrix, self.nuisances)
-
-    def __sub__(self, other: "Information") -> "Information":
-        return Information(self.matrix - other.matrix, self.nuisances)
 
     def visible(self) -> Array:
         """S_perp' S_perp (c, c): lengths and cosines of the traces that calibration cannot mimic."""

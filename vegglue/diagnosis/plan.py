@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.calibration.baseline import FEWEST_CELLS_ACROSS, places_of_prior
 from vegglue.calibration.candidates import (
     Candidate,
@@ -39,6 +39,7 @@ from vegglue.calibration.detection import (
     detected_length,
     detection_chance,
     information,
+    lowest,
     own_and_shared,
     single_threshold,
     trace_distances,
@@ -651,10 +652,10 @@ def _effects(wide: PlanModel, shown: Sequence[ShownByPlan]) -> tuple[PlannedEffe
             gain = abs(size) ** amplitude.power
             return np.asarray(detection_chance(gain * length, threshold, amplitude.only_sign).mean(axis=1))
 
-        def chance_at(draw: int, size: float) -> float:
+        def chance_at(size: float, draw: int) -> float:
             return float(chances(size)[draw])
 
-        of_draws = [_smallest(partial(chance_at, d), amplitude.furthest) for d in range(len(shown))]
+        of_draws = [_smallest(partial(chance_at, draw=d), amplitude.furthest) for d in range(len(shown))]
         others = [
             Confusion(other.name, float(cosines[column, best[k]]))
             for k, other in enumerate(prints.candidates)
@@ -691,11 +692,11 @@ def _smallest(chance: Callable[[float], float], furthest: float) -> float:
     """The size at which a chance that rises with it is PLANNED_POWER; infinite if it is not within `furthest`."""
     if not chance(furthest) >= PLANNED_POWER:
         return float("inf")
-    low, high = np.log(1e-9 * furthest), np.log(furthest)
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if chance(float(np.exp(middle))) >= PLANNED_POWER else (middle, high)
-    return float(np.exp(high))
+
+    def enough(log: Array) -> Mask:
+        return np.array(chance(float(np.exp(log))) >= PLANNED_POWER)
+
+    return float(np.exp(lowest(enough, np.log(1e-9 * furthest), np.log(furthest))))
 
 
 def _chances_at_places(shown: Sequence[ShownByPlan]) -> list[tuple[Places, Array, Array]]:
