@@ -7,28 +7,35 @@ in those that nothing is read from.
 import json
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
+import h5py
 import numpy as np
 import pytest
 from field_folders import CHANNEL, refusal_of
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from instrument_files import VECTRINO_HEADING, flowtracker, pd0, riversurveyor, vectrino, winriver
+from instrument_files import VECTRINO_HEADING, flowtracker, pd0, riversurveyor, vector, vectrino, winriver
 from matlab_files import BELOW, CELLS, DEPTH, SHAPE
-from scipy.io import savemat
+from result_files import a_flow, write_flow_fm, write_hec_ras, write_selafin, write_trim
+from scipy.io import netcdf_file, savemat
+from scipy.spatial import cKDTree
 
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions, read_file_options
+from vegglue.importers.finished_results import read_result
 from vegglue.importers.instruments import reader_of
 from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel
+from vegglue.importers.nortek import read_vector
+from vegglue.importers.qrev import read_qrev_summary
 from vegglue.importers.stations import KnownExperiments, station_tables
 from vegglue.importers.teledyne import read_pd0
 from vegglue.importers.terrain import read_terrain
-from vegglue.importers.vector_files import planted_polygons
+from vegglue.importers.vector_files import planted_polygons, read_line
 
 Row = dict[str, Any]
 Stations = list[tuple[float, ...]]
@@ -604,3 +611,138 @@ def test_a_flow_marked_as_missing_in_a_site_file_is_refused(tmp_path: Path, key:
     flow = {"discharge": "2.0", "level": "0.95"} | {key: mark}
     site = CHANNEL + f"experiments: {{June: {{discharge: {flow['discharge']}, level: {flow['level']}}}}}\n"
     assert "June" in refusal_of(tmp_path, site, a__csv="x,y,u\n8,0,0.4\n9,0,0.4\n")
+
+
+@settings(SOME, max_examples=15)
+@given(sample=st.integers(0, 319), axis=st.integers(0, 2), mark=st.sampled_from([-32768, 32767, -9999]))
+def test_a_sample_marked_as_missing_in_a_vector_record_is_none(
+    tmp_path: Path, sample: int, axis: int, mark: int
+) -> None:
+    """The mean is that of the others: with the sample it would be off by 0.03 m/s and more."""
+    pytest.importorskip("mhkit")
+    content, path = vector((0.4, 0.02, 0.0), 0.03, 320, 0), tmp_path / "p.vec"
+    path.write_bytes(content)
+    whole = read_vector(path, FileOptions(position=(12.0, 0.5, 0.3)))
+    starts = [at for at in range(len(content) - 1) if content[at : at + 2] == b"\xa5\x10"]
+    block = bytearray(content[starts[sample] : starts[sample] + 24])
+    struct.pack_into("<h", block, 10 + 2 * axis, mark)
+    struct.pack_into("<H", block, 22, (0xB58C + sum(struct.unpack("<11H", block[:22]))) & 0xFFFF)
+    path.write_bytes(content[: starts[sample]] + bytes(block) + content[starts[sample] + 24 :])
+    marked = read_vector(path, FileOptions(position=(12.0, 0.5, 0.3)))
+    for role in ("u", "v"):
+        assert marked.numbers[role] == pytest.approx(whole.numbers[role], abs=1e-3)
+    assert marked.notes != whole.notes
+
+
+def _marked_in_hdf5(path: Path, name: str, place: tuple[int, ...], mark: float) -> None:
+    with h5py.File(path, "r+") as file:
+        file[name][place] = mark
+
+
+def _marked_in_netcdf(path: Path, name: str, place: tuple[int, ...], mark: float) -> None:
+    with netcdf_file(path, "a", mmap=False) as file:
+        values = file.variables[name][:].copy()
+        values[place] = mark
+        file.variables[name][:] = values
+
+
+SERIES_OF_AREA = "Results/Unsteady/Output/Output Blocks/Base Output/Unsteady Time Series/2D Flow Areas/reach"
+# Of each finished result: its file, how it is written and marked, and where fields of cell 17 or face 17 stand in it.
+RESULTS: dict[str, tuple[str, Any, Any, dict[str, tuple[int, ...]]]] = {
+    "HEC-RAS": (
+        "reach.p01.hdf", write_hec_ras, _marked_in_hdf5,
+        {f"{SERIES_OF_AREA}/Water Surface": (-1, 17), f"{SERIES_OF_AREA}/Face Velocity": (-1, 17),
+         "Geometry/2D Flow Areas/reach/Cells Minimum Elevation": (17,),
+         "Geometry/2D Flow Areas/reach/Cells Center Manning's n": (17,)},
+    ),
+    "D-Flow FM": (
+        "reach_map.nc", partial(write_flow_fm, classic=False), _marked_in_hdf5,
+        {f"mesh2d_{name}": (-1, 17) for name in ("s1", "waterdepth", "ucx", "ucy", "czs")}
+        | {f"mesh2d_{name}": (17,) for name in ("flowelem_bl", "face_x")},
+    ),
+    "Delft3D-4": (
+        "trim-reach.nc", write_trim, _marked_in_netcdf,
+        {"S1": (-1, 4, 3), "U1": (-1, 0, 4, 3), "V1": (-1, 0, 4, 3), "DPS0": (4, 3), "XZ": (4, 3)},
+    ),
+}  # fmt: skip
+
+
+@settings(SOME, max_examples=40)
+@given(
+    of=st.sampled_from([(code, name) for code, made in RESULTS.items() for name in made[3]]),
+    mark=st.sampled_from([np.nan, -999.0, -9999.0, 1e31]),
+)
+def test_a_field_of_a_finished_result_marked_as_missing_is_no_number(
+    tmp_path: Path, of: tuple[str, str], mark: float
+) -> None:
+    """The place is left out or dry, and counted, or has the values that its other faces give; all others are as they
+    were.
+    """
+    code, name = of
+    file, write, set_mark, fields = RESULTS[code]
+    path, flow = tmp_path / file, a_flow()
+    write(path, flow)
+    whole = read_result(path)
+    set_mark(path, name, fields[name], mark)
+    marked = read_result(path)
+    there = cKDTree(np.column_stack([whole.x, whole.y])).query(np.column_stack([marked.x, marked.y]))[1]
+    changed = np.zeros(marked.x.size, bool)
+    for key in ("bed", "depth", "level", "u", "v"):
+        changed |= ~np.isclose(getattr(marked, key), getattr(whole, key)[there], atol=1e-3, equal_nan=True)
+    gone = whole.x.size - marked.x.size
+    assert gone <= 2, "a face has two cells"
+    assert np.abs(marked.u[changed] - whole.u[there][changed]).max(initial=0.0) < 1.0
+    # A cell with one face less has the velocity of the others, 0.01 m/s apart in this flow; else it is dry.
+    dry = changed & (marked.depth == 0.0)
+    assert dry.sum() + gone <= 2
+    assert (np.abs(marked.u - whole.u[there])[changed & ~dry] < 0.02).all()
+    if dry.any() or (gone and not name.endswith(("Elevation", "bl", "face_x", "DPS0", "XZ"))):
+        assert marked.notes != whole.notes
+
+
+@SOME
+@given(field_of=st.sampled_from(["bed", "u", "v"]), place=st.integers(0, 71))
+def test_a_node_of_a_selafin_file_without_a_value_is_left_out(tmp_path: Path, field_of: str, place: int) -> None:
+    flow, path = a_flow(), tmp_path / "reach.slf"
+    write_selafin(path, flow)
+    whole = read_result(path)
+    values = getattr(flow, field_of).copy()
+    values.ravel()[place] = np.nan
+    write_selafin(path, replace(flow, **{field_of: values}))
+    marked = read_result(path)
+    there = cKDTree(np.column_stack([whole.x, whole.y])).query(np.column_stack([marked.x, marked.y]))[1]
+    for key in ("bed", "depth", "level", "u", "v"):
+        np.testing.assert_allclose(getattr(marked, key), getattr(whole, key)[there], atol=1e-6, equal_nan=True)
+    wet = flow.depth.ravel()[place] > 0.0
+    assert marked.x.size < whole.x.size or (field_of in ("u", "v") and not wet)
+
+
+@pytest.mark.parametrize("mark", ["", "NaN", "-999", "-9999", "1e30", "n/a"])
+@pytest.mark.parametrize("name", ["Discharge", "Uncertainty"])
+def test_a_summary_of_qrev_without_a_value_has_none(tmp_path: Path, mark: str, name: str) -> None:
+    """Without the discharge, or with words, it is refused; without its uncertainty the discharge has no error."""
+    values = {"Discharge": "2.4", "Uncertainty": "6.0"} | {name: mark}
+    parts = "".join(f'<{key}><Total unitsCode="cms">{value}</Total></{key}>' for key, value in values.items())
+    path = tmp_path / "m_QRev.xml"
+    path.write_text(f'<Channel QRevFilename="m"><ChannelSummary>{parts}</ChannelSummary></Channel>', encoding="utf-8")
+    options = FileOptions(start=(10.0, 0.0))
+    if name == "Discharge" or mark == "n/a":
+        with pytest.raises(InputError, match=r"m_QRev\.xml"):
+            read_qrev_summary(path, options)
+    else:
+        assert np.isnan(read_qrev_summary(path, options).numbers["discharge_se"]).all()
+
+
+@SOME
+@given(
+    place=st.integers(0, 3), axis=st.integers(0, 1),
+    mark=st.sampled_from([None, float("nan"), -9999.0, -999.0, 1e30]),
+)  # fmt: skip
+def test_a_centreline_with_a_mark_is_refused(tmp_path: Path, place: int, axis: int, mark: Any) -> None:
+    corners: list[list[Any]] = [[0.0, 0.0], [20.0, 1.0], [40.0, 0.0], [60.0, -2.0]]
+    corners[place][axis] = mark
+    path = tmp_path / "axis.geojson"
+    geometry = {"type": "LineString", "coordinates": corners}
+    path.write_text(json.dumps({"type": "Feature", "properties": {}, "geometry": geometry}), encoding="utf-8")
+    with pytest.raises(InputError, match=r"axis\.geojson"):
+        read_line(path)

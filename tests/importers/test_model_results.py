@@ -5,22 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from result_files import GridFlow, at_nodes, write_flow_fm, write_hec_ras, write_selafin, write_trim
+from result_files import GridFlow, a_flow, at_nodes, write_flow_fm, write_hec_ras, write_selafin, write_trim
 
 from vegglue.errors import InputError
 from vegglue.importers.finished_results import holds_result, read_result
 from vegglue.importers.model_result import DRY_DEPTH
-
-
-def a_flow(angle: float = 30.0) -> GridFlow:
-    """A flow that is linear in x and y, so that means at faces and corners are exact; one bank is dry."""
-    x, y = np.linspace(0.0, 60.0, 13), np.linspace(-6.0, 6.0, 7)
-    cx, cy = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), indexing="ij")
-    depth = np.where(cy > 4.0, 0.0, 1.0 + 0.002 * cx)
-    wet = depth > 0.0
-    u, v = np.where(wet, 0.6 + 0.01 * cy, 0.0), np.where(wet, 0.05 + 0.001 * cx, 0.0)
-    bed = 10.0 - 0.001 * cx + np.where(cy > 4.0, 2.0, 0.0)
-    return GridFlow(x, y, bed, depth, u, v, np.full(bed.shape, 0.03), (683000.0, 247000.0), angle)
 
 
 def compare(result, flow: GridFlow, tolerance: float = 2e-5) -> None:

@@ -61,7 +61,12 @@ def read_delft3d_trim(path: Path) -> ModelResult:
             variables[name].values(times).reshape(shape) > 0 if name in variables else np.ones(shape, bool)
             for name in ("KFU", "KFV")
         )
-        along, across = np.where(open_u, np.nan_to_num(along), 0.0), np.where(open_v, np.nan_to_num(across), 0.0)
+        # Where nothing states which faces are closed, those without a value are.
+        open_u, open_v = (
+            is_open if name in variables else is_open & np.isfinite(speed)
+            for name, is_open, speed in (("KFU", open_u, along), ("KFV", open_v, across))
+        )
+        along, across = np.where(open_u, along, 0.0), np.where(open_v, across, 0.0)
         before_u, before_v = _before(along, 0), _before(across, 1)
         wet = open_u | open_v | (_before(open_u.astype(float), 0) > 0) | (_before(open_v.astype(float), 1) > 0)
         u, v = 0.5 * (along + before_u), 0.5 * (across + before_v)
@@ -85,17 +90,17 @@ def read_delft3d_trim(path: Path) -> ModelResult:
         if "time" in variables:
             time = variables["time"]
             more["time"] = f"{float(np.ravel(time.numbers())[-1]):g} {time.text('units')}"
-        level = np.where(wet, level.reshape(shape), np.nan)
-        bed = bed.reshape(shape)
+        level, bed = level.reshape(shape), bed.reshape(shape)
+        depth = np.where(wet, level - bed, 0.0)
         return model_result(
-            "Delft3D-4", x[active], y[active], bed[active], level[active], (level - bed)[active],
+            "Delft3D-4", x[active], y[active], bed[active], level[active], depth[active],
             east[active], north[active], **more,
         )  # fmt: skip
 
 
 def _of_layers(variables: dict[str, NetcdfVariable], name: str, times: int, shape: tuple[int, ...]) -> Array:
     """Velocities (M, N), averaged over layers by their share THICK of the depth."""
-    found = np.nan_to_num(variables[name].values(times))
+    found = variables[name].values(times)
     layers = found.reshape(-1, *shape)
     share = np.full(len(layers), 1.0 / len(layers))
     if "THICK" in variables and variables["THICK"].shape == (len(layers),):

@@ -22,6 +22,7 @@ from vegglue.importers.model_result import (
     ModelResult,
     model_result,
     text_of,
+    without_marks,
 )
 
 AREAS = "Geometry/2D Flow Areas"
@@ -65,7 +66,7 @@ def read_hec_ras(path: Path) -> ModelResult:
         parts = [_area(geometry[name], results[name], FOOT if customary else 1.0, horizontal) for name in names]
         stamps = file.get(f"{SERIES}/Time Date Stamp")
         time = text_of(stamps[-1]) if stamps is not None and len(stamps) else ""
-        notes = [f"{sum(part['ghosts'] for part in parts)} ghost cells left out"]
+        notes = [f"{sum(part['ghosts'] for part in parts)} cells without a bed left out, as ghost cells are"]
         notes += ["feet turned into metres"] if customary else []
         corners = np.vstack([part.pop("corners") for part in parts])
         joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key not in ("ghosts",)}
@@ -78,18 +79,14 @@ def read_hec_ras(path: Path) -> ModelResult:
 
 def _area(geometry: Any, results: Any, vertical: float, horizontal: float) -> dict[str, Any]:
     """Places, bed, level, depth, velocities and roughness of one area [SI], and how many ghost cells it has."""
-    bed = np.asarray(geometry["Cells Minimum Elevation"], dtype=np.float64) * vertical
+    bed = without_marks(np.asarray(geometry["Cells Minimum Elevation"], dtype=np.float64)) * vertical
     count, real = bed.size, np.isfinite(bed)
-    level = np.asarray(results["Water Surface"][-1], dtype=np.float64)[:count] * _unit(
-        results["Water Surface"], vertical
-    )
-    depth = level - bed
-    if "Depth" in results:
-        depth = np.asarray(results["Depth"][-1], dtype=np.float64)[:count] * _unit(results["Depth"], vertical)
+    level = _last_of(results["Water Surface"], vertical)[:count]
+    depth = _last_of(results["Depth"], vertical)[:count] if "Depth" in results else level - bed
     wet = real & (np.nan_to_num(depth) > DRY_DEPTH)
     cells = np.asarray(geometry["Faces Cell Indexes"], dtype=np.int64)
     normal = np.asarray(geometry["Faces NormalUnitVector and Length"], dtype=np.float64)
-    velocity = np.asarray(results["Face Velocity"][-1], dtype=np.float64) * _unit(results["Face Velocity"], vertical)
+    velocity = _last_of(results["Face Velocity"], vertical)
     inside = (cells >= 0) & (cells < count)
     at = np.where(inside, cells, 0)
     sides = np.where(inside & wet[at], level[at], -np.inf)  # of a dry side, or a ghost cell, the other one counts
@@ -112,6 +109,11 @@ def _area(geometry: Any, results: Any, vertical: float, horizontal: float) -> di
         "u": u[real], "v": v[real], "roughness": rough[real], "ghosts": int((~real).sum()),
         "corners": np.asarray(geometry["FacePoints Coordinate"], dtype=np.float64) * horizontal,
     }  # fmt: skip
+
+
+def _last_of(dataset: Any, default: float) -> Array:
+    """The last state of a series [m or m/s], NaN where there is no value; default: see `_unit`."""
+    return without_marks(np.asarray(dataset[-1], dtype=np.float64)) * _unit(dataset, default)
 
 
 def _unit(dataset: Any, default: float) -> float:
@@ -140,7 +142,9 @@ def _of_faces(geometry: Any, level: Array, vertical: float, length: Array) -> tu
 def _vectors(
     cells: np.ndarray[Any, Any], inside: np.ndarray[Any, Any], normal: Array, speed: Array, weight: Array, count: int
 ) -> tuple[Array, Array]:
-    """min sum_f A_f (n_f . u - v_f)^2 of each cell: u and v (count,), along the only normal if all are parallel."""
+    """min sum_f A_f (n_f . u - v_f)^2 of each cell: u and v (count,), along the only normal if all are parallel; NaN if
+    no wet face of it has a speed.
+    """
     of_face = {
         "xx": normal[:, 0] ** 2, "xy": normal[:, 0] * normal[:, 1], "yy": normal[:, 1] ** 2,
         "x": normal[:, 0] * speed, "y": normal[:, 1] * speed,
@@ -155,4 +159,7 @@ def _vectors(
     matrix = np.stack([np.stack([sums["xx"], sums["xy"]], -1), np.stack([sums["xy"], sums["yy"]], -1)], -2)
     inverse = np.linalg.pinv(matrix, rcond=ONE_HEADING, hermitian=True)
     found = (inverse @ np.stack([sums["x"], sums["y"]], -1)[..., None])[..., 0]
+    unknown = inside & (weight > 0.0)[:, None] & ~np.isfinite(speed)[:, None]
+    lost = np.bincount(cells[unknown], minlength=count)[:count] > 0
+    found[lost & (sums["xx"] + sums["yy"] == 0.0)] = np.nan
     return found[:, 0], found[:, 1]

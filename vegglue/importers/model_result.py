@@ -95,15 +95,35 @@ class ModelResult:
 def model_result(
     code: str, x: Array, y: Array, bed: Array, level: Array, depth: Array, u: Array, v: Array, **more: Any
 ) -> ModelResult:
-    """The result with dry places as `ModelResult` describes them; places without a bed are left out."""
-    known = np.isfinite(x) & np.isfinite(y) & np.isfinite(bed)
-    wet = np.isfinite(level) & (np.nan_to_num(depth, nan=0.0) > DRY_DEPTH)
+    """The result with dry places as `ModelResult` describes them.
+
+    Places without a bed, and those under water without a level, depth or velocity, are left out; without level and
+    depth it is dry. The last two are counted in the notes.
+    """
+    placed = np.isfinite(x) & np.isfinite(y) & np.isfinite(bed)
+    unknown, stated_dry = ~np.isfinite(level) & ~np.isfinite(depth), np.nan_to_num(depth, nan=np.inf) <= DRY_DEPTH
+    wet = ~unknown & ~stated_dry
+    lost = placed & wet & ~np.isfinite(level + depth + u + v)
+    known = placed & ~lost
+    notes = [f"{int(lost.sum())} places without level, depth or velocity left out"] if lost.any() else []
+    if unstated := int((placed & unknown).sum()):
+        notes.append(f"{unstated} places without level and depth taken as dry")
+    more["notes"] = (*more.get("notes", ()), *notes)
     roughness = more.pop("roughness", None)
     return ModelResult(
         code, x[known], y[known], bed[known], np.where(wet, depth, 0.0)[known], np.where(wet, level, np.nan)[known],
-        np.where(wet, np.nan_to_num(u), 0.0)[known], np.where(wet, np.nan_to_num(v), 0.0)[known],
+        np.where(wet, u, 0.0)[known], np.where(wet, v, 0.0)[known],
         roughness=None if roughness is None else roughness[known], **more,
     )  # fmt: skip
+
+
+def without_marks(values: Array) -> Array:
+    """Numbers as they stand in a file, NaN for those that codes write where there is no value."""
+    with np.errstate(invalid="ignore"):
+        marked = np.abs(values) > 1e30
+        for mark in FILLS_OF_CODES:  # to single precision, in which most of them are written
+            marked |= np.abs(values - mark) <= 1e-7 * abs(mark)
+    return np.where(marked, np.nan, values)
 
 
 def text_of(value: Any) -> str:
@@ -132,8 +152,7 @@ class NetcdfVariable:
         raw = np.asarray(self.source[-1] if timed else self.source[()], dtype=np.float64)
         named = [self.attributes[one] for one in ("_FillValue", "missing_value") if one in self.attributes]
         marks = [float(np.ravel(one)[0]) for one in named]
-        with np.errstate(invalid="ignore"):
-            raw = np.where(np.isin(raw, [*marks, *FILLS_OF_CODES]) | (np.abs(raw) > 1e30), np.nan, raw)
+        raw = without_marks(np.where(np.isin(raw, marks), np.nan, raw))
         scale = float(np.ravel(self.attributes.get("scale_factor", 1.0))[0])
         offset = float(np.ravel(self.attributes.get("add_offset", 0.0))[0])
         return (raw * scale + offset) * LENGTHS.get(self.text("units").strip().lower(), 1.0)

@@ -19,6 +19,7 @@ from vegglue.importers.file_options import FileOptions
 from vegglue.importers.library_files import numbers_of_variable, readable_text, reading_structures
 from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.transects import BoatProfile, stations_of_transect
+from vegglue.measurements.plausibility import is_mark_anywhere
 from vegglue.wording.numbers import so_many
 
 QREV_VARIABLE = "meas_struct"  # of such a file
@@ -113,7 +114,10 @@ def read_qrev_summary(path: Path, options: FileOptions) -> MeasuredRows:
             raise ValueError("none")
         unit = total.get("unitsCode", "cms")
         discharge = float(total.text or "")
+        if not np.isfinite(discharge) or is_mark_anywhere(discharge):
+            raise ValueError(f"a mark of no value, {discharge:g}")
         share = float(summary.findtext("ChannelSummary/Uncertainty/Total") or "nan") / 100.0
+        share = share if share > 0.0 and not is_mark_anywhere(100.0 * share) else float("nan")
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError(
             f"{shown_path(path)}: expected ChannelSummary/Discharge/Total of a summary by QRev, got {error}; save it "

@@ -15,7 +15,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.model_result import ModelResult, model_result
+from vegglue.importers.model_result import ModelResult, model_result, without_marks
 
 # Names of variables, English and French, without their units.
 SELAFIN_NAMES = {
@@ -99,7 +99,7 @@ def _result(path: Path, file: BinaryIO, order: str) -> ModelResult:
     found: dict[str, Array] = {}
     for key, known in SELAFIN_NAMES.items():
         if (name := next((name for name in names if name in known), None)) is not None:
-            found[key] = values[name]
+            found[key] = without_marks(values[name])
     missing = [SELAFIN_NAMES[key][0] for key in ("u", "v") if key not in found]
     if len({"bed", "depth", "level"} & found.keys()) < 2:
         missing += [SELAFIN_NAMES[key][0] for key in ("bed", "depth", "level") if key not in found]
