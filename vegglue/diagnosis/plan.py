@@ -15,7 +15,7 @@ that helps (Fedorov 1972; not checked against it).
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 import pandas as pd
@@ -44,7 +44,7 @@ from vegglue.calibration.detection import (
     single_threshold,
     trace_distances,
 )
-from vegglue.calibration.fingerprints import Fingerprints, Places, places_of
+from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Fingerprints, Places, places_of
 from vegglue.calibration.model_error import (
     BED_RADIUS,
     FRICTION_RADIUS,
@@ -60,6 +60,7 @@ from vegglue.calibration.noise import (
 )
 from vegglue.calibration.residual_screening import GROUPS, kind_of_listed, kinds_of_instruments, kinds_of_places
 from vegglue.calibration.score_test import HypothesisKind, Projected, alarm_level, project
+from vegglue.case.case_effects import effect_named
 from vegglue.case.channel_geometry import cells_across, expected_depth, half_width
 from vegglue.case.gridded_site import build_site, in_experiment
 from vegglue.case.parameter_space import refuse_without_parameters, theta_at
@@ -73,7 +74,7 @@ from vegglue.case.schema import (
 )
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.next_measurement import AS_MEASURED, HIGHER, SECTIONS, with_other_discharges
+from vegglue.diagnosis.next_measurement import AS_MEASURED, SECTIONS, with_other_discharges
 from vegglue.effects.definition import Amplitude
 from vegglue.engine.interface import Model, Point, linearise, linearise_from, responses
 from vegglue.engine.model import coarser
@@ -186,6 +187,8 @@ def plan_measurements(
     refuse_without_parameters(model.case)
     planned = model.case.planned or Planned()
     at_hand = model.station[model.station["used"]].reset_index(drop=True)
+    if len(at_hand):
+        noise_of(at_hand)  # raises InputError if a station states no error
     base = planned_pieces(model, planned)
     possible = possible_pieces(model, planned, at_hand, base)
     watch(Progress("computing flows and fingerprints"))
@@ -196,7 +199,7 @@ def plan_measurements(
     if proposed:
         watch(Progress("choosing a first set"))
         search = plan_search(wide, question, planned, level, frozenset())
-        chosen = search.best_set(planned.hours, ())
+        chosen = search.best_set(planned.hours)
         if not chosen:
             raise InputError(
                 f"{model.case.name}: no measurement fits {planned.hours:g} hours of field work; raise `planned.hours`."
@@ -314,7 +317,7 @@ def possible_pieces(
     """Every piece that could be added: transects, gauges, gaugings and points in all flows, at places along the reach
     and at patches; lines of bed levels; and what is measured or planned again.
     """
-    wide = _with_flows(model)
+    wide = _with_flows(model, LOWER_DISCHARGES)
     low, high = model.case.grid.x
     along = np.linspace(low, high, SECTIONS + 2)[1:-1]
     near = AS_MEASURED * float(along[1] - along[0])
@@ -378,9 +381,9 @@ def _usual_spacing(model: Model, planned: Planned, velocity: pd.DataFrame) -> fl
     return float(f"{width / VERTICALS_ACROSS:.1g}")
 
 
-def _with_flows(model: Model, lower: Sequence[float] = LOWER_DISCHARGES) -> Model:
-    """The model with the flows that could be measured besides."""
-    case = with_other_discharges(model, lower) if lower or HIGHER else model.case
+def _with_flows(model: Model, lower: Sequence[float]) -> Model:
+    """The model with the flows that could be measured besides, `lower` ones and HIGHER."""
+    case = with_other_discharges(model, lower)
     return model if case is model.case else replace(model, case=case, site=build_site(case))
 
 
@@ -421,7 +424,7 @@ def plan_model(
 
     Errors: InputError if no flow is found.
     """
-    for wide in (_with_flows(model), _with_flows(model, ()), model):
+    for wide in chain((_with_flows(model, lower) for lower in (LOWER_DISCHARGES, ())), [model]):
         kept = [one for one in possible if not one.experiment or one.experiment in wide.case.experiments]
         found = _plan_model(model, wide, planned, at_hand, base, kept, () if known is None else known.draws)
         if found is not None:
@@ -502,14 +505,10 @@ def _plan_model(
                 difference[(kind == name) & ~np.isfinite(difference)] = usual
     of_stations = here.station["standard_error"].to_numpy(float)
     error = np.concatenate([of_stations, np.full(len(places), planned.errors.survey)])
-    if not (error[: len(at_hand)] > 0).all():
-        noise_of(at_hand)  # which says what lacks an error
 
     def draw(of: Model, point: Point) -> PlanDraw:
         shared = model_error_columns(of, point, of.case.model_error)
-        levels = np.zeros((len(places), shared.shape[1]))
-        if places:
-            levels = _bed_levels(search, np.array(places), levels)
+        levels = _bed_levels(search, np.reshape(places, (-1, 2)), shared.shape[1])
         below = np.zeros((len(places), len(causes)))
         return PlanDraw(
             point,
@@ -526,20 +525,22 @@ def _plan_model(
     )
 
 
-def _bed_levels(model: Model, places: Array, columns: Array) -> Array:
-    """Columns (place, k) of bed levels at places (place, 2): the bed's own error there, in the basis functions of
-    `model_error_columns`, behind those of friction.
+def _bed_levels(model: Model, places: Array, count: int) -> Array:
+    """The bed's own error at places (place, 2): its part of `count` columns of `model_error_columns`, where its basis
+    functions stand behind those of friction (place, count) [m].
     """
+    found = np.zeros((len(places), count))
+    if not places.size:
+        return found
     half, grid = half_width(model.site), model.site.grid
     friction = gaussian_basis(grid, FRICTION_RADIUS * half, FRICTION_RADIUS * half)
     bed = gaussian_basis(grid, BED_RADIUS * half, BED_RADIUS * half)
     along = np.exp(-(((places[:, :1] - bed.x) / bed.length) ** 2))
     across = np.exp(-(((places[:, 1:] - bed.y) / bed.width) ** 2))
     variance = (bed.along**2).sum(axis=0).mean() * (bed.across**2).sum(axis=0).mean()
-    first, count = friction.x.size * friction.y.size, bed.x.size * bed.y.size
-    found = columns.copy()
-    of_bed = (along[:, :, None] * across[:, None, :]).reshape(len(places), count)
-    found[:, first : first + count] = model.case.model_error.bed / np.sqrt(variance) * of_bed
+    of_bed = (along[:, :, None] * across[:, None, :]).reshape(len(places), -1)
+    first = friction.x.size * friction.y.size
+    found[:, first : first + of_bed.shape[1]] = model.case.model_error.bed / np.sqrt(variance) * of_bed
     return found
 
 
@@ -561,7 +562,7 @@ class ShownByPlan:
     spread: Array
 
 
-def shown_by(wide: PlanModel, draw: PlanDraw, level: float | None = None) -> ShownByPlan:
+def shown_by(wide: PlanModel, draw: PlanDraw) -> ShownByPlan:
     """The screening of a diagnosis of the stations of the plan, before there is a residual."""
     known = np.arange(wide.count)
     station = wide.model.station.iloc[known].reset_index(drop=True)
@@ -603,9 +604,8 @@ def shown_by(wide: PlanModel, draw: PlanDraw, level: float | None = None) -> Sho
         *kinds_of_places(prints, in_places),
         *kinds_of_instruments(noise, instruments, of_instruments, ()),
     )
-    if level is None:
-        errors = draw_whitened_errors(noise, ALARM_DRAWS, np.random.default_rng(1))
-        level = alarm_level(kinds, errors, 1, constants().false_alarm_rate)
+    errors = draw_whitened_errors(noise, ALARM_DRAWS, np.random.default_rng(1))
+    level = alarm_level(kinds, errors, 1, constants().false_alarm_rate)
     units = projected.units
     spots: dict[str, Array] = {
         str(term): np.abs(units.T @ one.units).max(axis=1, initial=0.0) for term, one in in_places.items()
@@ -716,14 +716,11 @@ def _chances_at_places(shown: Sequence[ShownByPlan]) -> list[tuple[Places, Array
     return found
 
 
-UNIT_OF_TERM = {"drag": "1/m", "bed": "m", "inflow": "m3/s", "viscosity": "m2/s"}
-
-
 def _places(case: Case, shown: Sequence[ShownByPlan]) -> tuple[PlannedPlaces, ...]:
     return tuple(
         PlannedPlaces(
             places.term,
-            UNIT_OF_TERM[places.term],
+            effect_named(case, EFFECT_AT_PLACE[places.term]).amplitude.unit,
             places.plausible,
             places.x.size,
             float(np.mean(chance >= PLANNED_POWER)) if chance.size else 0.0,
@@ -958,10 +955,10 @@ class PlanSearch:
 
     def extended(self, budget: float) -> ProposedPieces | None:
         """The best set to add for so many hours; None if nothing fits."""
-        chosen = self.best_set(budget, ())
+        chosen = self.best_set(budget)
         return self._proposed(chosen, self.answer(self.with_pieces(self.base, chosen))) if chosen else None
 
-    def best_set(self, budget: float, chosen: Sequence[int]) -> list[int]:
+    def best_set(self, budget: float) -> list[int]:
         """Pieces that fit a budget [h]: greedy by gain for an hour, in any flows and in each flow alone, of which the
         best is exchanged piece by piece while that helps.
         """
@@ -971,7 +968,7 @@ class PlanSearch:
 
         flows = [one for one in self.wide.model.case.experiments if one not in self.present]
         starts = [None, *({*self.present, one} for one in flows if len(flows) > 1)]
-        best = max((self._greedy(budget, list(chosen), start) for start in starts), key=worth)
+        best = max((self._greedy(budget, [], start) for start in starts), key=worth)
         before = worth(best)
         for _ in range(ADDING_ROUNDS):
             for j in list(best):
