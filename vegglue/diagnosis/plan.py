@@ -205,12 +205,8 @@ def plan_measurements(
                 f"{model.case.name}: no measurement fits {planned.hours:g} hours of field work; raise `planned.hours`."
             )
         base = [wide.pieces[j] for j in chosen]
-        taken = {(one.work, one.experiment, one.x) for one in base if one.work is Work.TRANSECT}
-        others = [
-            one
-            for j, one in enumerate(wide.pieces)
-            if j not in chosen and (one.work, one.experiment, one.x) not in taken
-        ]
+        taken = {one.place for one in base}
+        others = [one for one in wide.pieces if one.place not in taken]
         wide = plan_model(model, planned, at_hand, base, others, wide)
         question = _question(wide.candidates, about, size, between)
     watch(Progress("weighing what they show"))
@@ -442,26 +438,23 @@ def _plan_model(
     known: Sequence[PlanDraw],
 ) -> PlanModel | None:
     stations = station_table(at_hand, stations_of(wide, planned, base, at_hand)[0])
-    # A transect with every second vertical is made of stations of the whole one.
-    whole = {(one.experiment, one.x): one for one in reversed(possible) if one.work is Work.TRANSECT}
-    own = [one for one in possible if one.work is not Work.TRANSECT or whole[one.experiment, one.x] is one]
+    # A transect with every second vertical is made of stations of the whole one, which stands first.
+    whole = {one.place: one for one in reversed(possible)}
+    own = [one for one in possible if whole[one.place] is one]
     further, counts = stations_of(wide, planned, own, at_hand)
     here = replace(wide, station=station_table(stations, further.assign(used=False)))
     # Bed levels stand behind all stations, those of the plan first.
     places = [(one.x, y) for one in (*base, *possible) if one.work is Work.SURVEY_LINE for y in one.y]
-    station = len(stations)
+    first = dict(zip((one.place for one in own), np.cumsum([len(stations), *counts])[:-1], strict=True))
     level = len(here.station) + sum(len(one.y) for one in base if one.work is Work.SURVEY_LINE)
-    first = dict(zip(map(id, own), station + np.cumsum([0, *counts[:-1]]), strict=True)) if own else {}
     rows = list[np.ndarray]()
     for piece in possible:
         if piece.work is Work.SURVEY_LINE:
             rows.append(np.arange(level, level + len(piece.y)))
             level += len(piece.y)
-        elif id(piece) in first:
-            rows.append(first[id(piece)] + np.arange(max(len(piece.y), 1)))
         else:
-            dense = whole[piece.experiment, piece.x]
-            rows.append(first[id(dense)] + np.array([dense.y.index(y) for y in piece.y]))
+            across = whole[piece.place].y
+            rows.append(first[piece.place] + np.array([across.index(y) for y in piece.y] or [0]))
     on_coarse = coarser(here)
     search = on_coarse if on_coarse is not None and cells_across(on_coarse.site) >= FEWEST_CELLS_ACROSS else here
     other = here if search is on_coarse else on_coarse
@@ -816,7 +809,8 @@ def plan_search(
     gains = np.repeat([one.amplitude.plausible_gain for one in candidates], counts)
     of_pieces = np.concatenate([np.zeros(0, dtype=int), *wide.rows])
     own = np.setdiff1d(np.arange(wide.error.size), of_pieces)
-    correlation, base, pieces = constants().grid_error_correlation, [], []
+    correlation = constants().grid_error_correlation
+    base, pieces = [], []
     for draw in wide.draws:
         shared = np.column_stack([np.sqrt(correlation) * wide.grid_error, draw.shared])
         variance, patterns = own_and_shared(wide.error**2 + (1.0 - correlation) * wide.grid_error**2, shared)
@@ -908,13 +902,8 @@ class PlanSearch:
     def moves(self, chosen: Sequence[int]) -> list[tuple[int, ...]]:
         """What could be added at once: each piece, and for each flow without measurements the places of the others."""
         pieces = self.wide.pieces
-        taken = {(pieces[j].work, pieces[j].experiment, pieces[j].x, pieces[j].y[:1]) for j in chosen}
-        taken |= {(*one[:3], ()) for one in taken if one[0] is Work.TRANSECT}
-        free = [
-            j
-            for j, one in enumerate(pieces)
-            if (one.work, one.experiment, one.x, () if one.work is Work.TRANSECT else one.y[:1]) not in taken
-        ]
+        taken = {pieces[j].place for j in chosen}
+        free = [j for j, one in enumerate(pieces) if one.place not in taken]
         found: list[tuple[int, ...]] = [(j,) for j in free]
         present = self.present | {pieces[j].experiment for j in chosen}
         known = self.wide.model.station.iloc[: self.wide.count]

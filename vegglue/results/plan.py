@@ -38,6 +38,11 @@ class PlannedPiece:
     new: bool = False
     again: bool = False
 
+    @property
+    def place(self) -> tuple[Work, str, float, tuple[float, ...]]:
+        """What is planned once only: of transects at one x, however dense their verticals are, one."""
+        return self.work, self.experiment, self.x, () if self.work is Work.TRANSECT else self.y[:1]
+
 
 @dataclass(frozen=True)
 class Confusion:
