@@ -12,10 +12,12 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Planned
 from vegglue.diagnosis.plan import (
+    USUAL_ALARM,
     PlanModel,
     _after_survey,
     plan_measurements,
     plan_model,
+    plan_search,
     planned_pieces,
     possible_pieces,
     shown_by,
@@ -25,7 +27,7 @@ from vegglue.diagnosis.plan import (
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.plain_json import plain
-from vegglue.results.plan import FieldPlan, PlannedPiece, Work, hours_of, plan_json
+from vegglue.results.plan import EffectsInGeneral, FieldPlan, PlannedPiece, Work, hours_of, plan_json
 from vegglue.workflow.case_run import CaseRun
 
 PLANNED = """
@@ -121,13 +123,13 @@ def test_more_stations_never_hide_an_effect(model: Model, found: FieldPlan) -> N
 
 
 @pytest.mark.parametrize(
-    ("question", "most"),
-    [({"about": "bank_vegetation", "size": 0.03}, 1.0), ({"between": ("undergrowth", "foliage")}, 1.0)],
+    "question", [{"about": "bank_vegetation", "size": 0.03}, {"between": ("undergrowth", "foliage")}]
 )
-def test_a_question_has_a_chance_as_its_answer(model: Model, question: dict[str, object], most: float) -> None:
+def test_a_question_has_a_chance_as_its_answer(model: Model, question: dict[str, object]) -> None:
     found = plan_measurements(model, **question)  # type: ignore[arg-type]
-    assert 0.0 < found.answer <= most
-    assert all(found.answer < one.after <= most for one in found.further)
+    assert 0.0 < found.answer <= 1.0
+    assert found.further
+    assert all(found.answer < one.after <= 1.0 for one in found.further)
 
 
 @pytest.mark.parametrize(
@@ -162,6 +164,17 @@ def test_measurements_at_hand_are_a_plan_too(model: Model) -> None:
     assert found.pieces == ()
     planned_ones = {one.name: one.smallest for one in plan_measurements(model).effects}
     assert {one.name: one.smallest for one in found.effects} == pytest.approx(planned_ones)
+
+
+def test_sections_beside_a_decimetre_are_measured_together_in_another_flow(model: Model) -> None:
+    planned = model.case.planned
+    assert planned is not None
+    table, _ = stations_of(model, planned, planned_pieces(model, planned), model.station)
+    table = table.assign(x=table["x"] + 0.03)
+    wide = plan_model(model, planned, table, [], possible_pieces(model, planned, table, []))
+    search = plan_search(wide, EffectsInGeneral(1), planned, USUAL_ALARM, frozenset(table["experiment"]))
+    together = [[wide.pieces[j].x for j in move] for move in search.moves(()) if len(move) > 1]
+    assert [9.0, 12.0, 16.0] in together
 
 
 def test_a_line_of_bed_levels_makes_errors_smaller_as_conditioning_does(wide: PlanModel) -> None:
@@ -213,8 +226,3 @@ def test_places_and_experiments_that_are_not_there_are_refused(tmp_path: Path, o
 
     with pytest.raises(InputError, match="planned"):
         pieces_of(PLANNED.replace(old, new, 1))
-
-
-def test_pieces_are_values() -> None:
-    piece = PlannedPiece(Work.GAUGE, "low", 3.0, (0.0,), 0.5)
-    assert piece == replace(piece)

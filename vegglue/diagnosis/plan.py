@@ -262,6 +262,11 @@ def verticals_at(
     return tuple(float(one) for one in places[deep])
 
 
+def place_along(case: Case, x: float) -> float:
+    """x of a section to a decimetre, or to a centimetre on a reach of 20 m at most [m]: a boat does not hold it."""
+    return round(float(x), 1 if case.grid.x[1] - case.grid.x[0] > 20.0 else 2)
+
+
 def planned_pieces(model: Model, planned: Planned) -> list[PlannedPiece]:
     """The pieces that a case plans, one for each experiment. Raises InputError if one has no station under water."""
     found = []
@@ -317,11 +322,11 @@ def possible_pieces(
     low, high = model.case.grid.x
     along = np.linspace(low, high, SECTIONS + 2)[1:-1]
     near = AS_MEASURED * float(along[1] - along[0])
-    digits = 1 if high - low > 20.0 else 2
     velocity = at_hand[at_hand["kind"] == STREAMWISE]
     measured: dict[float, tuple[str, ...]] = {}
-    for (experiment, x), _ in velocity.assign(x=section_places(velocity)).groupby(["experiment", "x"]):
-        measured[round(float(x), digits)] = (*measured.get(round(float(x), digits), ()), str(experiment))
+    for (experiment, at), _ in velocity.assign(x=section_places(velocity)).groupby(["experiment", "x"]):
+        x = place_along(model.case, at)
+        measured[x] = (*measured.get(x, ()), str(experiment))
     for one in base:
         if one.work is Work.TRANSECT:
             measured[one.x] = (*measured.get(one.x, ()), one.experiment)
@@ -329,7 +334,7 @@ def possible_pieces(
     beside = [x for ends in patches for x in (0.5 * (ends.min() + ends.max()), ends.max() + 0.5 * np.ptp(ends))]
     places = list(measured)
     for x in (*along, *beside):
-        x = round(float(x), digits)
+        x = place_along(model.case, x)
         if low < x < high and len(places) < MOST_ADDED_PLACES and all(abs(x - other) > near for other in places):
             places.append(x)
     spacing = _usual_spacing(wide, planned, velocity)
@@ -347,7 +352,7 @@ def possible_pieces(
             middle = 0.5 * (low + high)
             for x in sorted(places)[::2]:
                 found.append(_piece(wide, planned, PlannedGauge(x=x), experiment))
-            found.append(_piece(wide, planned, PlannedDischarge(x=round(middle, digits)), experiment))
+            found.append(_piece(wide, planned, PlannedDischarge(x=place_along(model.case, middle)), experiment))
             for ends in model.case.plants.patches[:MOST_PATCHES]:
                 x, y = corners_of(model.case, ends).mean(axis=0)
                 point = PlannedPoint(x=round(float(x), 2), y=round(float(y), 2))
@@ -866,6 +871,13 @@ class PlanSearch:
         """The answer without a further piece."""
         return self.answer(self.base)
 
+    @cached_property
+    def sections(self) -> frozenset[float]:
+        """Where velocities are measured or planned along the reach, see `place_along`."""
+        known = self.wide.model.station.iloc[: self.wide.count]
+        velocity = known[known["kind"] == STREAMWISE]
+        return frozenset(place_along(self.wide.model.case, x) for x in section_places(velocity).unique())
+
     def answer(self, known: Sequence[Information]) -> PlanAnswer:
         """The answer to the question with some information at each draw [-]."""
         found = np.array([self._answer(one) for one in known])
@@ -906,15 +918,14 @@ class PlanSearch:
         free = [j for j, one in enumerate(pieces) if one.place not in taken]
         found: list[tuple[int, ...]] = [(j,) for j in free]
         present = self.present | {pieces[j].experiment for j in chosen}
-        known = self.wide.model.station.iloc[: self.wide.count]
-        there = {round(float(x), 2) for x in known.loc[known["kind"] == STREAMWISE, "x"].unique()}
-        there |= {pieces[j].x for j in chosen if pieces[j].work is Work.TRANSECT}
-        for flow in self.wide.model.case.experiments:
+        case = self.wide.model.case
+        there = self.sections | {place_along(case, pieces[j].x) for j in chosen if pieces[j].work is Work.TRANSECT}
+        for flow in case.experiments:
             if flow in present:
                 continue
             together = [
                 j for j in free if pieces[j].experiment == flow and pieces[j].work is Work.TRANSECT
-                and pieces[j].x in there
+                and place_along(case, pieces[j].x) in there
             ]  # fmt: skip
             # Of a transect and the same with every second vertical the whole one, which stands first.
             together = list({pieces[j].x: j for j in reversed(together)}.values())[::-1]
