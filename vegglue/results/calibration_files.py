@@ -34,7 +34,7 @@ LOG_PRIORS = ("loguniform", "lognormal")
 
 
 def pest_names(names: Iterable[str], longest: int = LONGEST_PARAMETER) -> dict[str, str]:
-    """Names of at most so many letters a-z, 0-9 and _, each another one, by the names they stand for."""
+    """Distinct names of at most `longest` letters a-z, 0-9 and _, by the names that they stand for."""
     found: dict[str, str] = {}
     for name in names:
         plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "x"
@@ -78,7 +78,7 @@ def write_pest(
     predictions : str
         The file that the command writes, seen from the folder.
     ensembles : mapping of str to (mapping of str to ndarray (member,), ndarray (member, station) or None)
-        Parameters and predictions of members by the name of their files.
+        Parameters and predictions of members by the name of their files, `prior` among them.
 
     Returns
     -------
@@ -94,14 +94,13 @@ def write_pest(
     groups = pest_names(dict.fromkeys(station["kind"]))
     weights = weights_of(station)
     texts: dict[str, str] = {}
-    options = {"parcov": f"{case.name}.unc"}
     for name, (theta, prediction) in ensembles.items():
         texts[f"{name}.csv"] = ensemble_table({names[one]: theta[one] for one in case.parameters})
         if prediction is not None:
             columns = dict(zip(observed, prediction.T, strict=True))
             texts[f"{name}_obs.csv"] = ensemble_table(columns)
-    if "prior" in ensembles:
-        options |= {"ies_parameter_ensemble": "prior.csv", "ies_num_reals": str(_members(ensembles["prior"][0]))}
+    members = len(next(iter(ensembles["prior"][0].values())))
+    options = {"parcov": f"{case.name}.unc", "ies_parameter_ensemble": "prior.csv", "ies_num_reals": members}
     rows, spread = [], []
     for name, prior in case.parameters.items():
         low, high = bounds_of(prior)
@@ -177,10 +176,6 @@ def standard_deviation(prior: Parameter) -> float:
     """Of the prior, of its log10 if PEST++ is to estimate that; of a uniform one a quarter of its 95 % range."""
     low, high = np.asarray(quantile(prior, [0.025, 0.975]))
     return float(0.25 * (np.log10(high / low) if prior.distribution in LOG_PRIORS else high - low))
-
-
-def _members(theta: Mapping[str, Array]) -> int:
-    return len(next(iter(theta.values())))
 
 
 def ensemble_table(columns: Mapping[str, Array], members: NDArray[np.int64] | None = None) -> str:

@@ -2,7 +2,7 @@
 or the case and its ensembles as PEST++ and SPOTPY read them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -31,10 +31,8 @@ from vegglue.results.calibration_files import (
     write_pest,
     write_spotpy,
 )
-from vegglue.results.ensemble import Ensemble
 from vegglue.results.field_exports import quantities, write_field_table, write_geotiff, write_mesh, write_station_table
 from vegglue.results.labelled_arrays import extra_library
-from vegglue.results.posterior import Posterior
 from vegglue.results.result_files import read_ensemble, read_posterior, stored_hash
 from vegglue.version import VERSION
 from vegglue.whole_files import folder_within
@@ -144,31 +142,34 @@ def export(
     return Exported(tuple(files), words)
 
 
-def members_to_export(run: CaseRun) -> tuple[Ensemble | None, Posterior | None]:
-    """The ensemble and the posterior that fit the case; None for one that is not there or is of another state."""
+def members_to_export(run: CaseRun, valued: Array) -> dict[str, tuple[dict[str, Array], Array, Array]]:
+    """Parameters (member,), predictions at the valued stations (member, station) and chains (member,) of the members
+    that were solved, and of the draws of the posterior; of each of them that fits the case.
+    """
     case, folder = as_solved(run.case, run.folder), run.folder
-    ensemble, posterior = folder / "ensemble.h5", folder / "posterior.h5"
-    found = read_ensemble(ensemble) if stored_hash(ensemble) == simulation_hash(case) else None
-    wanted = case_hash(case)
-    return found, read_posterior(posterior, wanted) if stored_hash(posterior) == wanted else None
+    found, wanted = {}, case_hash(case)
+    if stored_hash(folder / "ensemble.h5") == simulation_hash(case):
+        ensemble = read_ensemble(folder / "ensemble.h5")
+        solved = solved_rows(ensemble)
+        theta = {name: values[solved] for name, values in ensemble.parameters.items()}
+        found["ensemble"] = theta, ensemble.prediction[solved][:, valued], np.ones(len(solved))
+    if stored_hash(folder / "posterior.h5") == wanted:
+        posterior = read_posterior(folder / "posterior.h5", wanted)
+        (chains, draws), drawn = posterior.predicted.draws.shape, posterior.predicted.draws.ravel()
+        theta = {name: values[drawn] for name, values in posterior.sample.theta.items()}
+        chain = np.repeat(np.arange(1, chains + 1), draws)
+        found["posterior"] = theta, posterior.sample.prediction[drawn][:, valued], chain
+    return found
 
 
 def export_to_pest(run: CaseRun) -> Exported:
     """Control file, template, instructions and ensembles for PEST++; its model is `simulate` with its parameters."""
-    case, (ensemble, posterior) = run.case, members_to_export(run)
-    table = without_stations(run.observations.table, excluded_in(run))
+    case, table = run.case, without_stations(run.observations.table, excluded_in(run))
     valued = table["value"].notna().to_numpy()
-    members: dict[str, tuple[dict[str, Array], Array | None]] = {}
-    if ensemble is None:
-        members["prior"] = sobol_sample(case).theta, None
-    else:
-        solved = solved_rows(ensemble)
-        theta = {name: values[solved] for name, values in ensemble.parameters.items()}
-        members["prior"] = theta, ensemble.prediction[solved][:, valued]
-    if posterior is not None:
-        drawn = posterior.predicted.draws.ravel()
-        theta = {name: values[drawn] for name, values in posterior.sample.theta.items()}
-        members["posterior"] = theta, posterior.sample.prediction[drawn][:, valued]
+    found = members_to_export(run, valued)
+    members: dict[str, tuple[dict[str, Array], Array | None]] = {"prior": (sobol_sample(case).theta, None)}
+    for name, (theta, prediction, _) in found.items():
+        members["prior" if name == "ensemble" else name] = theta, prediction
     trust = ["--trust"] if case.engine is not None or case.effect_file is not None else []
     words = ["vegglue", "simulate", str(case.source.resolve()), "--parameters", "parameters.csv", "--runs", "model"]
     command = " ".join(f'"{one}"' if " " in one else one for one in [*words, "--quiet", *trust])
@@ -180,30 +181,19 @@ def export_to_pest(run: CaseRun) -> Exported:
 
 def export_to_spotpy(run: CaseRun) -> Exported:
     """A database of the ensemble, one of the posterior's draws, and the measurements that both are compared with."""
-    case, (ensemble, posterior) = run.case, members_to_export(run)
-    if ensemble is None and posterior is None:
+    case, table = run.case, without_stations(run.observations.table, excluded_in(run))
+    valued = table["value"].notna().to_numpy()
+    members = members_to_export(run, valued)
+    if not members:
         raise InputError(
             f"{shown_path(case.source)}: expected an ensemble or a posterior of this case, found none; run "
             f"{shown_command('simulate', case.source)} or {shown_command('infer', case.source)} first."
         )
-    members: dict[str, tuple[Mapping[str, Array], Array, Array]] = {}
-    if ensemble is not None:
-        solved = solved_rows(ensemble)
-        of_ensemble = {name: values[solved] for name, values in ensemble.parameters.items()}
-        members["ensemble"] = of_ensemble, ensemble.prediction[solved], np.ones(len(solved))
-    if posterior is not None:
-        chains, draws = posterior.predicted.draws.shape
-        drawn = posterior.predicted.draws.ravel()
-        of_draws = {name: values[drawn] for name, values in posterior.sample.theta.items()}
-        members["posterior"] = of_draws, posterior.sample.prediction[drawn], np.repeat(np.arange(1, chains + 1), draws)
-    table = without_stations(run.observations.table, excluded_in(run))
-    valued = table["value"].notna().to_numpy()
     names, into = pest_names(case.parameters, LONGEST_IN_FILES), folder_within(run.folder, "export/spotpy")
     files = [into / "evaluation.csv", *(into / f"{name}.csv" for name in members)]
     write_evaluation(files[0], table[valued])
     for path, (theta, prediction, chain) in zip(files[1:], members.values(), strict=True):
-        like = log_likelihood(table[valued], prediction[:, valued])
-        write_spotpy(path, names, theta, prediction[:, valued], like, chain)
+        write_spotpy(path, names, theta, prediction, log_likelihood(table[valued], prediction), chain)
     return Exported(tuple(files), " and ".join(f"the {name}" for name in members))
 
 
