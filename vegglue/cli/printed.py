@@ -117,7 +117,7 @@ def show(case: Case, runs: Path, result: Any, details: bool = False, more: str =
             show_ladder(result.comparison)
             print(sentence(result.sentence))
             print(sentence(result.reason))
-            print(f"Last config: {result.cases[-1].source}")
+            print(f"Last config: {shown_path(result.cases[-1].source)}")
         case FieldPlan():
             show_plan(result, details, more)
             print(phrase("files_of_plan", folder / "plan"))

@@ -32,6 +32,8 @@ from vegglue.pages.svg import FEWEST_TICKS, round_ticks
 from vegglue.wording.numbers import no_formula, symbol_math, unit_math
 from vegglue.wording.sentences import phrase
 
+# Letters in a line beside the peak of a density: two lines each.
+LETTERS_OF_DENSITY = 16
 # Points of a drawn density: its curve looks smooth at the width of a column.
 DENSITY_POINTS = 240
 # Width of the kernel of a density over the range drawn, at least [-]: a quarter of a pixel.
@@ -227,7 +229,7 @@ def draw_cylinder(inferred: Array, weights: Array, cylinder: Array, low: float, 
         axes.fill_between(grid, height, color=COLOUR[face], linewidth=0, alpha=0.75)
         axes.plot(grid, height, color=COLOUR[line], linewidth=1.4)
         at = int(np.argmax(height))
-        text = phrase("label", name).replace(" (", "\n(").replace(" from", "\nfrom")
+        text = textwrap.fill(phrase("label", name), LETTERS_OF_DENSITY)
         label(axes, grid[at], height[at], text, line, ha=side, xytext=(8 if side == "left" else -8, -8))
     axes.set(xlim=(low, high), yticks=[])
     formula_labels(axes, f"{symbol_math(symbol)} [–]")

@@ -50,10 +50,8 @@ def diagnose(case: Case | CaseRun, *, runs: Path | str = "runs", jobs: int = -1,
     if kept is not None:
         return kept
     import_beside("vegglue.pages.diagnosis_figures")  # drawing takes a third of a second to import
-    model, allowed = (
-        run.commanded_model,
-        MEMORY_SHARE * memory_of_machine() if run.memory is None else run.memory * GIGABYTE,
-    )
+    model = run.commanded_model
+    allowed = MEMORY_SHARE * memory_of_machine() if run.memory is None else run.memory * GIGABYTE
     with at_most(jobs_in_memory(model, cores_of(run.jobs), allowed)):
         found = diagnose_model(model, run.watch, run.validation_model)
         found = with_command_compared(found, model, run.folder, run.watch)

@@ -257,8 +257,8 @@ class ExtensionReason:
     added
         Names of what was added, in order.
     nothing
-        Why nothing was tried: the kind of the verdict, `law` if `discover` would add one, `at-work` if all is in the
-        model; empty if something was tried.
+        Why nothing was tried: `law` if `discover` would add one, else the kind of the verdict; empty if something was
+        tried.
     spread
         Name, half length and half width [m] of each added place, over which it is spread.
     unclear

@@ -6,7 +6,7 @@ from typing import Any
 
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import held_out_rmse
-from vegglue.errors import InputError
+from vegglue.errors import InputError, shown_path
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.resume import begun_or_finished
@@ -32,7 +32,7 @@ def run(
     show: Show = silent,
     force: bool = False,
 ) -> StepwiseExtension:
-    """Diagnose a case, add what is missing while errors fall, diagnose again; then infer, report and plan.
+    """Diagnose a case, add what is missing while errors fall, diagnose again; infer and report.
 
     Posterior and report are of the last child, or of the case if there is none. If no listed effect and no place
     explains the misfit, a law is searched, and kept if errors fall with it. What is up to date is not made again.
@@ -81,7 +81,7 @@ def run(
         show(last.case, diagnose(last))
     for each in (whole, last) if last is not whole else (whole,):
         show(each.case, next_measurement(each))
-    show(last.case, f"Ladder drawn in {last.folder / 'ladder.png'}; last config: {last.case.source}")
+    show(last.case, f"Errors drawn in {last.folder / 'ladder.png'}; last config: {shown_path(last.case.source)}")
     # A posterior of the case without what it lacks would be of a model that is known to be wrong. What the diagnosis
     # found is of the case, whatever its size.
     if make_posterior(last, members, show):
