@@ -324,6 +324,8 @@ QUESTIONS = (
     Question(OneOfRivals("wind", ("waves", "weir")), (three_days(2.1),)),
     Question(HiddenEffect("bed_trend", "n_b"), (ProposedMeasurement("gauge", "June", 1.0, 1, 0.5, 12.0, 60.0),), 25.0),
     Question(HiddenEffect("bed_trend", "n_b"), (ProposedMeasurement("gauge", "June", 1.0, 1, 0.5, 26.0, 60.0),), 25.0),
+    Question(HiddenEffect("bed_trend", "n_b"), (ProposedMeasurement("gauge", "June", 1.0, 1, 0.5, 17.0, 18.0),), 25.0),
+    Question(RivalEffects(("wind", "waves")), (ProposedMeasurement("gauge", "June", 1.0, 1, 0.5, 17.0, 18.0),)),
 )
 
 
