@@ -143,7 +143,7 @@ from vegglue.results.verdict import (
     TooShallow,
     UncertainBetweenSections,
 )
-from vegglue.wording.sentences import layout, page_sentence, sentence
+from vegglue.wording.sentences import layout, page_sentence, phrase, sentence
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.extend import ExtensionReason
 
@@ -380,6 +380,12 @@ def plan() -> str:
     )
 
 
+def senses() -> str:
+    """What both signs of an amplitude mean, of all effects that state it."""
+    found = [(one.name, a, str(phrase("sense", one.name, a))) for one in SHIPPED for a in (1.1, -1.1)]
+    return "\n".join(f"{name} {a:+g}: {text}" for name, a, text in found if text)
+
+
 def page() -> str:
     return "\n".join(page_sentence(one) for one in (brook().verdict, *STATEMENTS[4:6], *STEPS[6:9]))
 
@@ -409,6 +415,7 @@ RENDERED: dict[str, Callable[[], str]] = {
     "questions": lambda: printed(lambda: (show_questions("brook", QUESTIONS), show_questions("brook", []))[0]),
     "effect": lambda: layout("effect_described", STEEP),
     "plan": plan,
+    "senses": senses,
     "page": page,
 }
 

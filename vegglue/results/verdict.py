@@ -249,6 +249,11 @@ class EffectFound:
     likelier: LocalAnomaly | None = None
     likelier_probability: float = float("nan")
 
+    @property
+    def effect(self) -> str:
+        """Name in the library, without the place or instrument that it is limited to."""
+        return EffectIdentity.parse(self.name).name
+
 
 @dataclass(frozen=True)
 class EffectsTested:

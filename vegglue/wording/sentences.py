@@ -149,7 +149,7 @@ WRITTEN_BY: dict[str, Callable[..., Any]] = {
     "plus_minus": lambda value, sd: Written(
         f"{in_digits(value, telling_digits(value - sd, value + sd))} ± {in_digits(sd, 2)}", plus_minus(value, sd)
     ),
-    "as_factor": lambda log: math.exp(abs(log)),
+    "exponential": math.exp,
     "power_of_ten": lambda value, sd: Written(f"10^({value:.2f} ± {sd:.2f})", f"10<sup>{plus_minus(value, sd)}</sup>"),
     "as_given": lambda value, sd=float("nan"): as_given(value, sd),
     "interval": lambda ends: Written(
