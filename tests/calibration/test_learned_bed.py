@@ -11,7 +11,7 @@ from vegglue.calibration.baseline import baseline
 from vegglue.calibration.learned_bed import changed_by, learned_bed
 from vegglue.calibration.model_error import cell_responses, model_error_columns
 from vegglue.case.bed_error import bed_error_columns, without_surveys
-from vegglue.case.schema import ModelError
+from vegglue.case.schema import ModelError, Planned, PlannedErrors
 from vegglue.case.site_schema import BedLayer, CovarianceOfBed, SurveyOfBed
 from vegglue.case.survey_error import BedSurvey, bed_survey_text
 from vegglue.diagnosis.next_measurement import surveys
@@ -89,3 +89,8 @@ def test_a_line_midway_takes_its_share_of_the_error(surveyed: tuple[Model, Point
         assert np.linalg.eigvalsh(left).min() > -1e-6 * np.trace(whole)
         assert 0.0 < np.trace(left) < np.trace(whole)
     assert not surveys(replace(model, case=without_surveys(model.case)), point)
+    rough = model.case.model_copy(update={"planned": Planned(errors=PlannedErrors(survey=0.5))})
+    for exact, one in zip(found, surveys(replace(model, case=rough), point), strict=False):
+        assert exact.less is not None
+        assert one.less is not None
+        assert np.trace(one.less @ one.less.T) < 0.5 * np.trace(exact.less @ exact.less.T)

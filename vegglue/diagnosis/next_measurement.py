@@ -36,9 +36,9 @@ from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocit
 from vegglue.measurements.observations import section_places, station_table
 from vegglue.wording.numbers import in_digits
 
-# Standard error of a point of a new line [m], how near to a line a new one is the same [m], and hours of work by which
-# outlines of plants are taken with a total station. Chosen.
-POINT_ERROR, SAME_LINE, OUTLINES = 0.01, 1.0, 2.0
+# How near to a line of bed levels a new one is the same [m], and hours of work by which outlines of plants are taken
+# with a total station. Chosen.
+SAME_LINE, OUTLINES = 1.0, 2.0
 # Places along the reach where a section is thought of, and how near to one that was measured it is that one, over the
 # distance between these places. Chosen, not measured.
 SECTIONS, AS_MEASURED = 12, 0.3
@@ -153,7 +153,7 @@ def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
     """
     case, grid, nothing = model.case, model.site.grid, np.zeros(0, dtype=int)
     found, no_station = [], model.station.iloc[:0]
-    hours = (case.planned or Planned()).costs.survey_line
+    of_work = case.planned or Planned()
     columns = bed_error_columns(case, grid)
     if columns.any():
         own = model.station["experiment"].isin(model.site.own).to_numpy()
@@ -167,9 +167,10 @@ def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
             x = 0.5 * (before + after)
             at = columns.reshape(*model.site.bed.shape, -1)[int(np.abs(grid.x - x).argmin())]
             # A_l' (B_l B_l' + s^2 I)^(-1/2) of the answers A = F.
-            lower = np.linalg.cholesky(at @ at.T + POINT_ERROR**2 * np.eye(len(at)))
+            lower = np.linalg.cholesky(at @ at.T + of_work.errors.survey**2 * np.eye(len(at)))
             less = answers @ scipy.linalg.solve_triangular(lower, at, lower=True).T
             name = f"a surveyed line of the bed at x = {x:.0f} m"
+            hours = of_work.costs.survey_line
             found.append(MeasurementPlan(name, nothing, no_station, hours, float(x), "", less))
     if case.model_error.edges and case.plants.patches:
         drag = cell_responses(model, point, ("friction", "drag"))
