@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from vegglue.calibration.score_test import alike_groups
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of
-from vegglue.decision_constants import constants
 from vegglue.pages.page import write_page
 from vegglue.pages.style import COLOUR, inline, palette_css
 from vegglue.pages.svg import Scale, linear_scale, round_ticks, svg_document, svg_element, svg_words, tick_labels
@@ -68,6 +68,7 @@ def render_plan(case: Case, site: Site, plan: FieldPlan, files: FieldFiles) -> s
         map=inline(draw_plan_map(case, site, places, plan.chances_of_places, title), "plan-map", title),
         places=places,
         days=days_of_work(case, plan, places),
+        hours_of_day=DAY,
         seen=[one for one in plan.effects if one.seen],
         larger=[one for one in plan.effects if not one.seen and one.testable],
         rest=[one for one in plan.effects if not one.testable],
@@ -76,23 +77,16 @@ def render_plan(case: Case, site: Site, plan: FieldPlan, files: FieldFiles) -> s
     )
 
 
-def confusions(effects: Sequence[PlannedEffect]) -> list[tuple[str, ...]]:
-    """Groups of effects that are detected and that the data cannot tell from each other, as a diagnosis groups them."""
-    names, alike = [one.name for one in effects if one.testable], constants().alike_cosine
-    near = {
-        one.name: {other.name for other in one.confused if other.cosine > alike and other.name in names}
-        for one in effects
-        if one.testable
-    }
-    groups: list[set[str]] = []
-    for name in names:
-        joined = [group for group in groups if group & (near[name] | {name})]
-        merged = {name} | near[name]
-        for group in joined:
-            merged |= group
-            groups.remove(group)
-        groups.append(merged)
-    return [tuple(name for name in names if name in group) for group in groups if len(group) > 1]
+def confusions(effects: Sequence[PlannedEffect]) -> list[list[str]]:
+    """Groups of testable effects that the data cannot separate, as a diagnosis groups them."""
+    names = [one.name for one in effects if one.testable]
+    cosine = np.eye(len(names))
+    for one in effects:
+        for other in one.confused:
+            if one.testable and other.name in names:
+                i, j = names.index(one.name), names.index(other.name)
+                cosine[i, j] = cosine[j, i] = other.cosine
+    return [group for group in alike_groups(names, cosine) if len(group) > 1]
 
 
 def days_of_work(case: Case, plan: FieldPlan, places: Sequence[FieldPlace]) -> list[DayOfWork]:
@@ -102,10 +96,9 @@ def days_of_work(case: Case, plan: FieldPlan, places: Sequence[FieldPlace]) -> l
     for flow in [*flows, ""]:
         of_flow = [one for one in plan.pieces if one.experiment == flow]
         order = {Work.GAUGE: 0, Work.DISCHARGE: 1}
-        of_flow = sorted(of_flow, key=lambda one: (order.get(one.work, 2), -one.x))
         work: list[WorkInFlow] = []
         begins = 0.0
-        for piece in of_flow:
+        for piece in sorted(of_flow, key=lambda one: (order.get(one.work, 2), -one.x)):
             place = next(
                 one for one in places
                 if one.work is piece.work and one.x == piece.x and set(piece.y) <= set(one.y)

@@ -56,7 +56,7 @@ class Confusion:
 class PlannedEffect:
     """An effect as the planned measurements would show it.
 
-    smallest: distance of its amplitude from off that is detected nine times of ten, over all draws of the priors [unit
+    smallest: distance of its amplitude from off that is detected with 90 %, averaged over all draws of the priors [unit
     of the amplitude], infinite if no size is; best, worst: the same in the draws where it is least and largest.
     plausible: a plausible distance; furthest: the largest possible one. chance_plausible: that the plausible size is
     detected; chance: that a size drawn from the prior of the amplitude is. visibility: share of the trace that
@@ -82,24 +82,24 @@ class PlannedEffect:
 
     @property
     def testable(self) -> bool:
-        """Whether twice a plausible size is detected and possible, as a diagnosis means it."""
+        """Whether twice a plausible size is possible and is detected with 90 %; a diagnosis requires 95 %."""
         return self.smallest < min(2.0 * self.plausible, self.furthest)
 
     @property
     def seen(self) -> bool:
-        """Whether a plausible size is detected nine times of ten."""
+        """Whether a plausible size is detected with 90 %."""
         return self.smallest <= min(self.plausible, self.furthest)
 
     @property
     def hidden(self) -> bool:
-        """Whether a plausible size is detected one time of ten at most."""
+        """Whether a plausible size is detected with 10 % at most."""
         return self.chance_plausible <= 0.1
 
 
 @dataclass(frozen=True)
 class PlannedPlaces:
     """Something unlisted at a place that changes a term: how large a plausible one is [unit], the share of the places
-    under water where that is detected nine times of ten, and the size that is at half of them.
+    under water where that is detected with 90 %, and the size that is at half of them.
     """
 
     term: str
@@ -125,7 +125,7 @@ class PlaceChances:
 
 @dataclass(frozen=True)
 class PlannedInstruments:
-    """Instruments of one kind: how many, the offset that is detected nine times of ten in half of them, and a plausible
+    """Instruments of one kind: how many, the offset that is detected with 90 % in half of them, and a plausible
     one, both over the standard error of a reading [-].
     """
 
@@ -199,8 +199,8 @@ class FieldPlan:
     """What planned measurements would show, and which ones to add.
 
     at_hand: stations measured before; proposed: whether the pieces are proposed for a budget of hours, as none were
-    planned. draws: places of the prior that all is computed at. first: the answer to the question now; further: the
-    best single additions, the most for an hour first; extended: the best set for the hours that are left, and its
+    planned. draws: places of the prior that all is computed at. answer: to the question now; further: the best
+    single additions, the largest gain per hour first; extended: the best set for the hours that are left, and its
     answer.
     """
 

@@ -165,7 +165,7 @@ def sheets(folder: Path, case: Case, plan: FieldPlan) -> dict[str, str]:
         of, stated = KINDS[kind], getattr(planned.errors, kind)
         rows = []
         for one in plan.pieces:
-            if KIND_OF_WORK.get(one.work) != kind or one.new:
+            if KIND_OF_WORK.get(one.work) != kind:
                 continue
             section = "points" if one.work is Work.POINT else f"x{one.x:g}"
             error = of.usual_error if stated is None else stated
@@ -176,7 +176,7 @@ def sheets(folder: Path, case: Case, plan: FieldPlan) -> dict[str, str]:
             files[of.file] = {"coordinates": "channel"}
     named = path_from(folder.resolve(), case.source)
     text = yaml_of({OF_CASE: named, "files": files})
-    return {**found, "site.yaml": f"# Fill in the tables beside this file; rows left empty count for nothing.\n{text}"}
+    return {**found, "site.yaml": f"# Fill in the tables beside this file; empty rows are ignored.\n{text}"}
 
 
 def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
