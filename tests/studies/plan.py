@@ -1,7 +1,7 @@
 """Is what `vegglue plan` calls detectable detected? `python tests/studies/plan.py CONFIG --sets 60 --minutes 4`,
 and with `--compare 24` a proposed plan against plans made by hand.
 
-The plan of the stations of a config states for each listed effect the size that is detected nine times of ten, and the
+The plan of the stations of a config states for each listed effect the size that is detected with 90 %, and the
 chance that a plausible size is. Twins of the built-in engine hide testable effects at that size, and effects that are
 hidden to the plan at a plausible size, each with parameters, errors and a sign of its own. An effect counts as detected
 if the diagnosis is alarmed, and as named if it is among the effects of a step, alone or as one of a few. Records are
@@ -22,10 +22,14 @@ import scipy.stats
 import vegglue
 from vegglue.case.schema import Case, Planned, PlannedGauge, PlannedTransect
 from vegglue.case.zones import corners_of
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.plan import plan_measurements, planned_pieces
+from vegglue.effects.definition import Effect
+from vegglue.effects.identity import EffectIdentity
+from vegglue.effects.library import library
 from vegglue.errors import InputError
 from vegglue.plain_json import plain
-from vegglue.results.plan import FieldPlan, PlannedEffect, hours_of
+from vegglue.results.plan import FieldPlan, hours_of
 from vegglue.workflow.case_run import CaseRun
 
 ROOT = Path(__file__).parents[2]
@@ -33,24 +37,18 @@ ROOT = Path(__file__).parents[2]
 HIDDEN_EVERY = 3
 
 
-def candidates(plan: FieldPlan) -> tuple[list[PlannedEffect], list[PlannedEffect]]:
-    """Effects of the whole case, of experiments and patches, that are said to be detected, and to be hidden."""
-    seen = [one for one in plan.effects if one.testable]
-    return seen, [one for one in plan.effects if one.hidden and np.isfinite(one.plausible)]
-
-
-def one_set(config: Path, plan: FieldPlan, number: int) -> dict[str, Any] | None:
-    """The record of one twin; None if it cannot be made."""
-    seen, hidden = candidates(plan)
+def one_set(config: Path, plan: FieldPlan, number: int) -> dict[str, Any]:
+    """The record of one twin, or why it cannot be made."""
+    hidden = [one for one in plan.effects if one.hidden]
     said_hidden = number % HIDDEN_EVERY == HIDDEN_EVERY - 1 and bool(hidden)
     random = np.random.default_rng((number, 63))
-    of = hidden if said_hidden else seen
+    of = hidden if said_hidden else plan.testable
     effect = of[int(random.integers(len(of)))]
     size = min(effect.plausible, effect.furthest) if said_hidden else effect.smallest
     case = vegglue.load_case(config)
-    off, low, high = amplitude_of(case, effect.name)
-    signs = [sign for sign in (1.0, -1.0) if low <= off + sign * size <= high]
-    value = off + float(random.choice(signs)) * size
+    amplitude = listed(case, effect.name).amplitude
+    signs = [sign for sign in (1.0, -1.0) if amplitude.low <= amplitude.off + sign * size <= amplitude.high]
+    value = amplitude.off + float(random.choice(signs)) * size
     with TemporaryDirectory() as name:
         folder = Path(name) / "riddle"
         try:
@@ -63,7 +61,7 @@ def one_set(config: Path, plan: FieldPlan, number: int) -> dict[str, Any] | None
     verdict = found.verdict
     alarmed = verdict.kind in ("identified", "one-of", "none-of-these", "instrument") or bool(found.steps)
     named = sorted({rival for step in found.steps for rival in step.rivals})
-    similar = [other.name for other in effect.confused if other.cosine > 0.9]
+    similar = [other.name for other in effect.confused if other.cosine > constants().alike_cosine]
     return {
         "set": number, "effect": effect.name, "amplitude": value, "said": "hidden" if said_hidden else "detected",
         "kind": verdict.kind, "alarm": alarmed,
@@ -73,13 +71,9 @@ def one_set(config: Path, plan: FieldPlan, number: int) -> dict[str, Any] | None
     }  # fmt: skip
 
 
-def amplitude_of(case: Any, name: str) -> tuple[float, float, float]:
-    """Off, lowest and highest of the amplitude of an effect."""
-    from vegglue.effects.identity import EffectIdentity
-    from vegglue.effects.library import library
-
-    amplitude = library(case.effect_file)[EffectIdentity.parse(name).name].amplitude
-    return amplitude.off, amplitude.low, amplitude.high
+def listed(case: Case, name: str) -> Effect:
+    """The effect of the library that acts under a name."""
+    return library(case.effect_file)[EffectIdentity.parse(name).name]
 
 
 def share(found: list[bool]) -> str:
@@ -104,12 +98,11 @@ def figures(records: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def counted(plan: FieldPlan) -> tuple[int, int]:
+def counted(case: Case, plan: FieldPlan) -> tuple[int, int]:
     """Effects of the case, of experiments and of patches that are testable, and all; those of sections are left out,
     as each section brings its own.
     """
-    of_places = ("probe_gain", "station_shift", "device_gain", "zero_offset")
-    kept = [one for one in plan.effects if not one.name.startswith(of_places)]
+    kept = [one for one in plan.effects if listed(case, one.name).each not in ("section", "device")]
     return sum(one.testable for one in kept), len(kept)
 
 
@@ -120,15 +113,14 @@ def made_by_hand(case: Case, hours: float, beside_plants: bool) -> list[Planned]
     site = CaseRun(case).model
     low, high = case.grid.x
     ends = [corners_of(case, patch)[:, 0] for patch in case.plants.patches]
+    middles = [0.5 * (one.min() + one.max()) for one in ends]
     found, names = [], list(case.experiments)
     for flows in range(1, len(names) + 1):
         best = None
         for count in range(1, 30):
-            x = np.linspace(low, high, count + 2)[1:-1]
-            if beside_plants:
-                middles = [0.5 * (one.min() + one.max()) for one in ends]
-                x = np.array((middles * count)[:count]) if count <= len(middles) else np.array(middles)
-            x = np.round(x, 1)
+            if beside_plants and count > len(middles):
+                break
+            x = np.round(middles[:count] if beside_plants else np.linspace(low, high, count + 2)[1:-1], 1)
             transects = tuple(
                 PlannedTransect(x=float(one), spacing=0.5, experiments=tuple(names[-flows:])) for one in x
             )
@@ -138,8 +130,6 @@ def made_by_hand(case: Case, hours: float, beside_plants: bool) -> list[Planned]
             if hours_of(pieces, planned.costs.discharge) > hours:
                 break
             best = planned
-            if beside_plants and count > len(ends):
-                break
         if best is not None:
             found.append(best)
     return found
@@ -151,7 +141,7 @@ def compare(config: Path, hours: float) -> None:
     began = time.process_time()
     plan = plan_measurements(CaseRun(case).model)
     seconds = time.process_time() - began
-    print(f"proposed: {counted(plan)} testable in {plan.hours:.1f} h ({seconds:.1f} s of CPU)", flush=True)
+    print(f"proposed: {counted(case, plan)} testable in {plan.hours:.1f} h ({seconds:.1f} s of CPU)", flush=True)
     for beside in (False, True):
         shown = []
         for planned in made_by_hand(case, hours, beside):
@@ -159,7 +149,7 @@ def compare(config: Path, hours: float) -> None:
             plan = plan_measurements(CaseRun(with_plan).model)
             flows = len({one.experiment for one in plan.pieces})
             shown.append(
-                f"{counted(plan)} with {len(planned.transects)} transects in {flows} flows, {plan.hours:.1f} h"
+                f"{counted(case, plan)} with {len(planned.transects)} transects in {flows} flows, {plan.hours:.1f} h"
             )
         print(f"{'beside the plants' if beside else 'equally spaced'}: {'; '.join(shown)}", flush=True)
 
@@ -185,11 +175,9 @@ def main() -> None:
     for number in range(given.sets):
         if number in done or plan is None or time.monotonic() - began > 60.0 * given.minutes:
             continue
-        record = one_set(given.config, plan, number)
-        if record is not None:
-            records.append(record)
-            with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(plain(record), allow_nan=False) + "\n")
+        records.append(one_set(given.config, plan, number))
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(plain(records[-1]), allow_nan=False) + "\n")
     print(figures(records))
 
 
