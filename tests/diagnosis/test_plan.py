@@ -11,19 +11,16 @@ from small_case import SMALL
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Planned
-from vegglue.diagnosis.plan import (
-    USUAL_ALARM,
+from vegglue.diagnosis.plan import USUAL_ALARM, _after_survey, plan_measurements, shown_by
+from vegglue.diagnosis.plan_model import (
     PlanModel,
-    _after_survey,
-    plan_measurements,
     plan_model,
-    plan_search,
     planned_pieces,
     possible_pieces,
-    shown_by,
     stations_of,
     verticals_at,
 )
+from vegglue.diagnosis.plan_search import plan_search
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.plain_json import plain

@@ -23,7 +23,8 @@ import vegglue
 from vegglue.case.schema import Case, Planned, PlannedGauge, PlannedTransect
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.plan import plan_measurements, planned_pieces
+from vegglue.diagnosis.plan import plan_measurements
+from vegglue.diagnosis.plan_model import planned_pieces
 from vegglue.effects.definition import Effect
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
