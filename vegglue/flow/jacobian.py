@@ -248,13 +248,13 @@ def solved(inverse: BlockFactors | SharedFactors, right: Array, transposed: bool
     return work.reshape(right.shape).astype(np.float64)
 
 
-def jacobian(problem: Problem, state: Array, by_blocks: bool = False) -> BlockJacobian | SparseJacobian:
-    """J = dR/dstate of one member by coloured differences; sparse on grids of WIDE_FROM rows or more, if not by blocks.
+def jacobian(problem: Problem, state: Array) -> BlockJacobian | SparseJacobian:
+    """J = dR/dstate of one member by coloured differences; sparse on grids of WIDE_FROM rows or more.
 
     Single precision is enough: the factors only lead to the root; the residual in double precision decides what it is.
     """
     nx, _, ny, _ = state.shape
-    wide = ny >= WIDE_FROM and not by_blocks
+    wide = ny >= WIDE_FROM
     base, depth = residual(problem, state)[..., 0], cell_depths(problem, state)
     colours = np.array(list(np.ndindex(3, ALONG_PERIOD, ACROSS_PERIOD)))
     many = take(problem, np.zeros(COLOUR_SLOTS, dtype=np.int64))

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.size_limits import WIDE_FROM, block_bytes
 from vegglue.flow.chord import LONGEST_CORRECTION, ChordSolution, chord
 from vegglue.flow.equations import storage
 from vegglue.flow.jacobian import Factors, factors, jacobian, solved
@@ -34,8 +33,6 @@ MOST_CUTS, CUT = 12, 4.0
 # often, more are wasted where factors made too far away do not pull; four sets leave a member that is not near to
 # Newton early.
 STEPS_PER_FACTORS, MOST_FACTORS = 14, 4
-# Factors by blocks [bytes] up to which a wide grid is tried with them where sparse ones lead nowhere: chosen.
-LARGEST_BLOCKS = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -77,23 +74,13 @@ def newton(problem: Problem, start: Array, tolerance: float, how: Beginning = FR
     ----------
     Kelley and Keyes (1998), doi:10.1137/S0036142996304796.
     """
-    nx, _, ny, _ = start.shape
-    found = _newton(problem, start, tolerance, how, by_blocks=False)
-    if found.converged[0] or ny < WIDE_FROM or block_bytes(nx, ny) > LARGEST_BLOCKS:
-        return found
-    # Sparse factors lump what couples second cells: on cells many times as long as wide they may not lead to the root.
-    return _newton(problem, start, tolerance, how, by_blocks=True)
-
-
-def _newton(problem: Problem, start: Array, tolerance: float, how: Beginning, by_blocks: bool) -> ChordSolution:
-    """`newton`, with factors by blocks or those that the width of the grid asks for."""
     state, size, time_step = start, np.inf, how.time_step
     nx, _, ny, _ = start.shape
     # Not at the outlet: levels of dry land there have no storage that would hold them while velocities are still far.
     nowhere = np.zeros(ny, dtype=bool)
     for iteration in range(1, how.most + 1):
         slope = slope_of_friction(problem, state)
-        rates, system = eased(problem, state, slope, nowhere), jacobian(problem, state, by_blocks)
+        rates, system = eased(problem, state, slope, nowhere), jacobian(problem, state)
         stored = np.ones((nx, 3, ny), np.float32)  # D: dh/dz_s of each level, 1 for velocities
         stored[:, LEVEL] = storage(problem, state[:, LEVEL])[..., 0]
         for _ in range(MOST_CUTS):
