@@ -240,7 +240,7 @@ NOTES = (
     ModelErrorUsed(0.05, 0.01, 0.6, 0.0), LawStandsOut(candidate_laws_of("law_bank_speed_step"), ("steep_bank",)),
     NeighboursCorrelated(0.3), StatedErrorsTooSmall(1.2), InstrumentExcluded(an_instrument(), True, 4.5),
     EffectsUntestable((("k_s", ("wind", "waves")), ("", ("weir",))), 3, 3, False),
-    EffectsUntestable((("k_s", ("wind",)),), 12, 9, True),
+    EffectsUntestable((("k_s", ("wind",)),), 9, 12, True),
     MeasuredStretch(10.0, 30.0, 200.0, ("bed_trend", "wind")), TooShallow(0.02),
     MisfitRemains(ChiSquare(260.0, 150, 1e-8)), CommandCompared(2, 3, 0.4, "", ("k_s",), True, False),
     ResultCompared("HEC-RAS", 0.065, 0.001, 0.02, 0.029, 0.0007, 0.0, 0.003, 0.023, True, (0.15, 0.05, 0.15)),

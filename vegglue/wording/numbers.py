@@ -217,7 +217,9 @@ def with_unit(value: float, unit: str, figures: int = 2) -> Written:
 def sized(value: float, low: float, high: float, unit: str = "-") -> Written:
     """`0.67 m, 95 % 0.54 to 0.79`, to one figure of the standard deviation."""
     places = decimals((high - low) / 4, 1) if math.isfinite(high - low) and high > low else 3
-    middle, least, most = (f"{round(one, places) + 0.0:.{places}f}" for one in (value, low, high))
+    middle, least, most = (fixed(one, places) for one in (value, low, high))
     plain, page = ("", "") if unit in ("", "-") else (f" {unit}", f"{NARROW}{unit_html(unit)}")
-    text = f"{{}}, 95{FIRM}% {least} to {most}"
-    return Written(f"{middle}{plain}, 95 % {least} to {most}", text.format(f"{middle}{page}").replace("-", MINUS))
+    return Written(
+        f"{middle}{plain}, 95 % {least} to {most}".replace(MINUS, "-"),
+        f"{middle}{page}, 95{FIRM}% {least} to {most}",
+    )
