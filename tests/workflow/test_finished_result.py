@@ -11,6 +11,7 @@ import yaml
 from result_files import GridFlow, write_flow_fm, write_hec_ras, write_selafin, write_trim
 
 import vegglue
+from vegglue.case.parameter_space import sobol_sample
 from vegglue.case.schema import Case
 from vegglue.engine.finished import compared_flows, their_predictions
 from vegglue.errors import InputError
@@ -114,6 +115,16 @@ def test_a_flow_that_ours_cannot_follow_is_refused_with_the_number(tmp_path: Pat
             verb(case, runs=tmp_path / "runs", jobs=1)
     with pytest.raises(InputError, match="finished_result"):
         vegglue.simulate(case, runs=tmp_path / "runs", jobs=1)
+
+
+def test_no_members_of_a_finished_run_are_solved_by_ours(tmp_path: Path) -> None:
+    """Predictions for another program would be those of the built-in engine, without a word."""
+    case = imported(folder_with(tmp_path / "reach", uniform()))
+    pd.DataFrame(sobol_sample(case).theta).head(2).to_csv(tmp_path / "draws.csv", index=False)
+    with pytest.raises(InputError, match="finished_result"):
+        vegglue.simulate(case, runs=tmp_path / "runs", jobs=1, parameters=tmp_path / "draws.csv")
+    with pytest.raises(InputError, match="finished_result"):
+        vegglue.export(case, runs=tmp_path / "runs", to="pest")
 
 
 def test_what_import_refuses(tmp_path: Path) -> None:

@@ -39,6 +39,7 @@ from vegglue.whole_files import folder_within
 from vegglue.wording.phases import SOLVING_FLOW
 from vegglue.wording.sentences import phrase
 from vegglue.workflow.case_run import CaseRun, as_solved, case_run, excluded_in, kept_best_fit, median_flow
+from vegglue.workflow.command_model import refuse_command
 
 Form = Literal["csv", "geotiff", "netcdf"]
 Program = Literal["pest", "spotpy"]
@@ -164,7 +165,10 @@ def members_to_export(run: CaseRun, valued: Array) -> dict[str, tuple[dict[str, 
 
 def export_to_pest(run: CaseRun) -> Exported:
     """Control file, template, instructions and ensembles for PEST++; its model is `simulate` with its parameters."""
-    case, table = run.case, without_stations(run.observations.table, excluded_in(run))
+    case = run.case
+    if case.engine is None:
+        refuse_command(case, "export --to pest")  # of a finished run, which no parameters change
+    table = without_stations(run.observations.table, excluded_in(run))
     valued = table["value"].notna().to_numpy()
     found = members_to_export(run, valued)
     members: dict[str, tuple[dict[str, Array], Array | None]] = {"prior": (sobol_sample(case).theta, None)}

@@ -4,7 +4,7 @@ import os
 import shutil
 from pathlib import Path
 
-from vegglue.case.parameter_space import sample_of
+from vegglue.case.parameter_space import PriorSample, sample_of
 from vegglue.case.resolved_config import simulation_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import names_in_files, write_text
@@ -71,25 +71,31 @@ def simulate(
     StorageError
         If another run holds the folder, or if the disk is full.
     """
-    if parameters is not None:
-        return simulate_given(case_run(case, runs, jobs, watch, force), Path(parameters))
-    run = case_run(case, runs, jobs, watch, force).sized(members)
-    path = run.folder / "ensemble.h5"
+    run = case_run(case, runs, jobs, watch, force)
     if run.case.engine is None:
         refuse_command(run.case, "simulate")  # of a finished run: `infer` draws its posterior without members
+    if parameters is not None:
+        return simulate_given(run, Path(parameters))
+    run = run.sized(members)
+    path = run.folder / "ensemble.h5"
     refuse_to_shrink(run)
     refuse_undefined_efficiency(run.case, run.observations.table)
     if not is_simulated(run):
         share_one_beside(run)
     if not is_up_to_date(run):
-        if run.case.engine is None:
-            solve_ensemble(run.case, run.observations, path, run.jobs, run.watch, run.site)
-        else:
-            with at_most(run.jobs):
-                commands = command_runs(run.case, run.folder)
-                run_ensemble(run.case, run.observations, path, commands, run.jobs, run.watch)
+        solve_members(run, path)
     remove_left_over_fields(path)
     return read_ensemble(path)
+
+
+def solve_members(run: CaseRun, path: Path, given: PriorSample | None = None) -> None:
+    """Solve the members of a case, or the given ones, or run its command for each, into a file."""
+    if run.case.engine is None:
+        solve_ensemble(run.case, run.observations, path, run.jobs, run.watch, run.site, given)
+        return
+    with at_most(run.jobs):
+        commands = command_runs(run.case, run.folder)
+        run_ensemble(run.case, run.observations, path, commands, run.jobs, run.watch, given)
 
 
 def simulate_given(run: CaseRun, file: Path) -> Ensemble:
@@ -98,12 +104,7 @@ def simulate_given(run: CaseRun, file: Path) -> Ensemble:
     run, given = run.sized(len(next(iter(theta.values())))), sample_of(run.case, theta)
     path = given_folder(run, file) / "ensemble.h5"
     if stored_hash(path) != ensemble_hash(run.case, given):
-        if run.case.engine is None:
-            solve_ensemble(run.case, run.observations, path, run.jobs, run.watch, run.site, given)
-        else:
-            with at_most(run.jobs):
-                commands = command_runs(run.case, run.folder)
-                run_ensemble(run.case, run.observations, path, commands, run.jobs, run.watch, given)
+        solve_members(run, path, given)
     remove_left_over_fields(path)
     found = read_ensemble(path)
     valued = found.station["value"].notna().to_numpy()
