@@ -1,15 +1,11 @@
-"""Before anyone measures: what planned measurements would show of each effect, place and instrument, and which pieces
-of field work to add.
+"""What planned measurements would show of each effect, place and instrument, and which pieces of field work to add.
 
-Everything a diagnosis would do with the measurements is done without their values: fingerprints of all candidates,
-slopes of the parameters, and the covariance of all errors (of instruments, grid, model, site and bed) give the length
-of each fingerprint after calibration, the alarm of the diagnosis gives the threshold, see `calibration/detection`. All
-of it is computed at several draws of the priors, as the flow is not known before, and averaged. Effects act to first
-order.
+A plan does what a diagnosis does, without measured values. Fingerprints of all candidates, slopes of the parameters and
+the covariance of all errors (instruments, grid, model, site, bed) give the length of each fingerprint after
+calibration. The alarm of the diagnosis gives the threshold, see `calibration/detection`. The flow is not known yet: all
+of it is computed at several draws of the priors and averaged. Effects act to first order.
 
-A line of bed levels measures the bed's own error, which is a field with a prior: its rows are further measurements of
-that field, and make no other difference. Pieces are added by their gain for an hour, and exchanged one by one while
-that helps (Fedorov 1972; not checked against it).
+A line of bed levels conditions the error of the bed, a random field with a prior, and changes nothing else.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -54,7 +50,7 @@ from vegglue.case.schema import (
 )
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.plan_model import PlanDraw, PlanModel, plan_model, planned_pieces, possible_pieces
-from vegglue.diagnosis.plan_search import ADDITIONS_SHOWN, plan_search
+from vegglue.diagnosis.plan_search import plan_search
 from vegglue.engine.interface import Model, Point
 from vegglue.errors import InputError
 from vegglue.normal_range import NORMAL95
@@ -119,10 +115,9 @@ def plan_measurements(
     wide = plan_model(model, planned, at_hand, base, possible)
     question = _question(wide.candidates, about, size, between)
     proposed = not len(at_hand) and not base
-    level = USUAL_ALARM
     if proposed:
         watch(Progress("choosing a first set"))
-        search = plan_search(wide, question, planned, level, frozenset())
+        search = plan_search(wide, question, planned, USUAL_ALARM, frozenset())
         chosen = search.best_set(planned.hours)
         if not chosen:
             raise InputError(
@@ -135,15 +130,13 @@ def plan_measurements(
         question = _question(wide.candidates, about, size, between)
     watch(Progress("weighing what they show"))
     shown = [shown_by(wide, one) for one in wide.draws]
-    level = shown[0].level
-    costs = planned.costs
-    present = frozenset(at_hand["experiment"]) | {one.experiment for one in base if one.experiment}
-    hours = hours_of(base, costs.discharge, frozenset(at_hand["experiment"]))
+    at_places = _chances_at_places(shown)
+    flows = frozenset(at_hand["experiment"])
+    present = flows | {one.experiment for one in base if one.experiment}
+    hours = hours_of(base, planned.costs.discharge, flows)
     watch(Progress("weighing what could be added"))
-    search = plan_search(wide, question, planned, level, present)
-    further = search.ranked()
+    search = plan_search(wide, question, planned, shown[0].level, present)
     left = planned.hours - hours
-    extended = search.extended(left) if left > 0.0 else None
     return FieldPlan(
         case=model.case.name,
         pieces=tuple(base),
@@ -153,14 +146,14 @@ def plan_measurements(
         budget=planned.hours,
         draws=len(wide.draws),
         effects=_effects(wide, shown),
-        places=_places(model.case, shown),
+        places=_places(model.case, at_places),
         instruments=_instruments(wide, shown[0]),
         parameters=_parameters(model.case, shown),
         question=question,
         answer=search.start.mean,
-        further=further[:ADDITIONS_SHOWN],
-        extended=extended,
-        chances_of_places=_chances_of_drag(shown),
+        further=search.ranked(),
+        extended=search.extended(left) if left > 0.0 else None,
+        chances_of_places=_chances_of_drag(at_places),
     )
 
 
@@ -319,8 +312,13 @@ def _smallest(chance: Callable[[float], float], furthest: float) -> float:
     return float(np.exp(lowest(enough, np.log(1e-9 * furthest), np.log(furthest))))
 
 
-def _chances_at_places(shown: Sequence[ShownByPlan]) -> list[tuple[Places, Array, Array]]:
-    """Of each term: its spots at the first draw, the chance that a plausible size is detected, and the size that is."""
+ChancesAtPlaces = list[tuple[Places, Array, Array]]
+
+
+def _chances_at_places(shown: Sequence[ShownByPlan]) -> ChancesAtPlaces:
+    """Of each term: its spots at the first draw, the chance that a plausible size is detected there, and the size that
+    is detected.
+    """
     found = []
     for position, places in enumerate(shown[0].fingerprints.places):
         chance, smallest = [], []
@@ -336,7 +334,7 @@ def _chances_at_places(shown: Sequence[ShownByPlan]) -> list[tuple[Places, Array
     return found
 
 
-def _places(case: Case, shown: Sequence[ShownByPlan]) -> tuple[PlannedPlaces, ...]:
+def _places(case: Case, at_places: ChancesAtPlaces) -> tuple[PlannedPlaces, ...]:
     return tuple(
         PlannedPlaces(
             places.term,
@@ -346,13 +344,13 @@ def _places(case: Case, shown: Sequence[ShownByPlan]) -> tuple[PlannedPlaces, ..
             float(np.mean(chance >= PLANNED_POWER)) if chance.size else 0.0,
             float(np.median(smallest)) if smallest.size else float("inf"),
         )
-        for places, chance, smallest in _chances_at_places(shown)
+        for places, chance, smallest in at_places
     )
 
 
-def _chances_of_drag(shown: Sequence[ShownByPlan]) -> PlaceChances | None:
+def _chances_of_drag(at_places: ChancesAtPlaces) -> PlaceChances | None:
     """Of the smallest spots of drag."""
-    for places, chance, _ in _chances_at_places(shown):
+    for places, chance, _ in at_places:
         if places.term == "drag" and places.x.size:
             small = np.flatnonzero(places.length == places.length.min())
             return PlaceChances(

@@ -153,7 +153,8 @@ class PlanSearch:
                 found.append(self._proposed(move, after))
         found.sort(key=lambda one: -one.per_hour)
         kinds = [(one.pieces[0].work, one.pieces[0].again, one.pieces[0].new, len(one.pieces) > 1) for one in found]
-        return tuple(one for j, one in enumerate(found) if kinds[:j].count(kinds[j]) < OF_A_KIND)
+        few = [one for j, one in enumerate(found) if kinds[:j].count(kinds[j]) < OF_A_KIND]
+        return tuple(few[:ADDITIONS_SHOWN])
 
     def _proposed(self, move: Sequence[int], after: PlanAnswer) -> ProposedPieces:
         pieces = tuple(self.wide.pieces[j] for j in move)
