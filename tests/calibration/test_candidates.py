@@ -1,6 +1,7 @@
 """Effects and instruments as candidates: however much of an effect the config states, and what an offset changes."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,7 @@ from vegglue.calibration.candidates import (
     patch_candidate,
     with_effect,
 )
-from vegglue.case.schema import Case, EffectEntry, Parameter
+from vegglue.case.schema import Case, EffectEntry, Observation, Parameter
 from vegglue.case.site_schema import FrictionClass, Plants, Value
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.effects.library import SHIPPED, library
@@ -64,6 +65,18 @@ def test_an_excluded_effect_is_no_candidate() -> None:
     both = {one.name for one in candidates_of(CASE, STATION)}
     without = CASE.model_copy(update={"exclude": {"wind": "indoors", "unlisted_bed": "a flume of glass"}})
     assert both - {one.name for one in candidates_of(without, STATION)} == {"wind"}
+
+
+@pytest.mark.parametrize(("heights", "offered"), [(2, True), (3, False)])
+def test_heights_of_a_section_with_a_number_for_a_name_are_counted(tmp_path: Path, heights: int, offered: bool) -> None:
+    """pandas took the column for numbers, found no row of case "1", and partial sampling was a candidate anywhere."""
+    rows = [f"1, adv, 5.0, {y}, {0.1 * (1 + k)}, 0.3\n" for y in (-0.5, 0.5) for k in range(heights)]
+    (tmp_path / "points.csv").write_text("case, device, x, y, z, u\n" + "".join(rows), encoding="utf-8")
+    points = Observation(
+        kind="adv", file=tmp_path / "points.csv", experiment="low", section="A", case="1", average="profile"
+    )
+    case = CASE.model_copy(update={"observations": (points,)})
+    assert any(one.effect.name == "partial_depth" for one in candidates_of(case, STATION)) == offered
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ An instrument is found by its offset. A probe may be off by a factor, too: once 
 import itertools
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -27,6 +26,7 @@ from vegglue.effects.definition import Amplitude, Effect, Need
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.engine.interface import Cause
+from vegglue.measurements.csv_table import read_table
 from vegglue.measurements.kinds import kind_of, velocity_rows
 
 # Combinations of shapes of an effect that a search tries at most. Chosen, not measured: each is a tangent of the flow.
@@ -125,6 +125,10 @@ def missing_needs(case: Case, station: pd.DataFrame) -> set[Need]:
     used = station[station["used"]]
     kinds = [kind_of(str(name)) for name in used["kind"].unique()]
     averaged = [one for one in case.observations if one.kind == "adv"]
+    heights = []  # points in the median vertical of each section
+    for file in {one.file for one in averaged}:
+        verticals = read_table(file, ("case",), ("x", "y")).groupby(["case", "x", "y"]).size()
+        heights += [float(verticals[one.case].median()) for one in averaged if one.file == file]
     has: dict[Need, bool] = {
         "open air": case.friction.walls is None,
         "open ground": case.friction.walls is None,
@@ -134,18 +138,9 @@ def missing_needs(case: Case, station: pd.DataFrame) -> set[Need]:
         "gauges": any(kind.instrument == "gauge" for kind in kinds),
         "few heights": not averaged
         or len(averaged) < sum(kind_of(one.kind).velocity for one in case.observations if one.kind != "adv")
-        or min(heights_in_verticals(str(one.file), one.case) for one in averaged) < ENOUGH_HEIGHTS,
+        or min(heights) < ENOUGH_HEIGHTS,
     }
     return {need for need, there in has.items() if not there}
-
-
-@lru_cache
-def heights_in_verticals(file: str, case: str | None) -> float:
-    """Median number of points in the verticals of a table of ADV points; case: the rows of it that count."""
-    rows = pd.read_csv(file)
-    rows = rows[rows["case"] == case] if case is not None and "case" in rows else rows
-    place = [name for name in ("experiment", "section", "x", "y") if name in rows]
-    return float(rows.groupby(place).size().median()) if place and len(rows) else 0.0
 
 
 def at_work(case: Case, candidate: Candidate) -> bool:
