@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from coarse_twin import coarse_twin
 
-from vegglue.calibration.baseline import baseline
-from vegglue.calibration.learned_bed import changed_by, learned_bed
+from vegglue.calibration.baseline import baseline, model_that_errs
+from vegglue.calibration.fingerprints import least_depth
+from vegglue.calibration.learned_bed import changed_by, learned_bed, wet_cells
 from vegglue.calibration.model_error import cell_responses, model_error_columns
 from vegglue.case.bed_error import bed_error_columns, without_surveys
 from vegglue.case.schema import ModelError, Planned, PlannedErrors
@@ -73,6 +75,33 @@ def test_the_flow_finds_a_bed_that_was_drawn(surveyed: tuple[Model, Point]) -> N
     assert np.mean(np.abs(left) <= 2.5 * found.error.ravel() + 1e-3) > 0.9
     better = value - before.fitted.point.prediction - changed_by(found, model, before.fitted.point)[0]
     assert np.sum(better**2) < 0.7 * np.sum(answers**2)
+
+
+def test_bed_and_parameters_are_known_as_in_their_joint_gaussian(surveyed: tuple[Model, Point]) -> None:
+    """The error of the bed was that of known parameters: in some cells less than half of it."""
+    model, _ = surveyed
+    base = baseline(model)
+    found, where = learned_bed(base), model_that_errs(base)
+    assert found is not None
+    columns = bed_error_columns(where.model.case, where.model.site.grid)
+    bed = cell_responses(where.model, where.point, ("bed",)).of["bed"].reshape(len(where.model.station), -1) @ columns
+    both = where.noise.used(np.hstack([bed, where.point.slope]))
+    other = where.noise.lower @ where.noise.lower.T - both[:, : bed.shape[1]] @ both[:, : bed.shape[1]].T
+    known = np.linalg.inv(np.eye(both.shape[1]) + both.T @ np.linalg.solve(other, both))
+    error = np.sqrt(np.diag(columns @ known[: bed.shape[1], : bed.shape[1]] @ columns.T))
+    assert found.error.ravel() == pytest.approx(error, rel=1e-3, abs=1e-6)
+
+
+def test_shallow_water_of_a_shallow_site_is_water(
+    surveyed: tuple[Model, Point], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The limit was 5 cm, whatever the depth: in a flume of 5 cm of water no cell was wet, and no correction stated."""
+    base, flow = baseline(surveyed[0]), SimpleNamespace(depth=np.array([[0.9, 1.1]]) * least_depth(surveyed[0]))
+    monkeypatch.setattr("vegglue.calibration.learned_bed.flow_at_centres", lambda *_: flow)
+    monkeypatch.setattr("vegglue.calibration.fingerprints.LEAST_DEPTH", 0.01)
+    assert wet_cells(base).tolist() == [[True, True]]
+    monkeypatch.setattr("vegglue.calibration.fingerprints.LEAST_DEPTH", 0.05)
+    assert wet_cells(base).tolist() == [[False, True]]
 
 
 def test_a_line_midway_takes_its_share_of_the_error(surveyed: tuple[Model, Point]) -> None:

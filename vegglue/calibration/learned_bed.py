@@ -1,27 +1,26 @@
-"""What measured flow says about the bed between the points of a survey.
+"""The bed between the points of a survey, as measured flow corrects it.
 
-    dz = B F' C^-1 (y - f(z)),   F = R B,   cov = B (I - F' C^-1 F) B'
+    dz = B F' C^-1 (y - f(z)),   F = R B,   cov = B (I - F' (C + J J')^-1 F) B'
 
 B B' is the covariance of the error of the bed that its survey leaves (case/survey_error.py), R how predictions answer
-to the bed of each cell, C the covariance of all errors of the measurements, M included, at the calibrated parameters z:
-one linear step of the best bed and parameters together. Source: Tarantola (2005), Inverse Problem Theory, section 3.2;
-not checked against it.
+to the bed of each cell, C the covariance of all errors of the measurements, M included, J the slopes at the calibrated
+parameters z, whose prior is N(0, I): one linear step of the best bed and parameters together, of which neither is known
+better than both. Source: Tarantola (2005), Inverse Problem Theory, section 3.2; not checked against it, the tests
+compare with the joint Gaussian.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from vegglue.arrays import Array, Mask
 from vegglue.calibration.baseline import Baseline, model_that_errs
+from vegglue.calibration.fingerprints import least_depth
 from vegglue.calibration.model_error import cell_responses
+from vegglue.calibration.score_test import project
 from vegglue.case.bed_error import bed_error_columns
 from vegglue.case.grid import Grid
 from vegglue.engine.interface import Model, Point, flow_at_centres
-
-# Depth above which a cell counts as under water [m].
-LEAST_WATER = 0.05
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class LearnedBed:
 def learned_bed(base: Baseline) -> LearnedBed | None:
     """That of a calibrated model, on the cells on which its own error was computed; None if no survey states an error.
 
-    Experiments with a bed of their own say nothing about that of the others, and are left out.
+    Experiments with a bed of their own are left out: their flow does not depend on the bed of the others.
     """
     where = model_that_errs(base)
     model, grid = where.model, where.model.site.grid
@@ -50,19 +49,20 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
         return None
     answers = cell_responses(model, where.point, ("bed",)).of["bed"].reshape(len(model.station), -1) @ columns
     answers[model.station["experiment"].isin(model.site.own)] = 0.0
-    white = scipy.linalg.solve_triangular(where.noise.lower, answers[where.noise.rows], lower=True)
-    residual = where.noise.residual(where.point.prediction)
-    amounts = white.T @ scipy.linalg.solve_triangular(where.noise.lower, residual, lower=True)
-    values, vectors = np.linalg.eigh(np.eye(columns.shape[1]) - white.T @ white)
+    residual = where.noise.whiten(where.noise.residual(where.point.prediction))
+    slope, white = (where.noise.whiten(where.noise.used(part)) for part in (where.point.slope, answers))
+    amounts = white.T @ residual
+    seen = project(slope, residual, where.point.z, white).fingerprints  # seen' seen = F' (C + J J')^-1 F
+    values, vectors = np.linalg.eigh(np.eye(columns.shape[1]) - seen.T @ seen)
     left = columns @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     return LearnedBed(grid, (columns @ amounts).reshape(grid.x.size, grid.y.size), left)
 
 
 def wet_cells(base: Baseline) -> Mask:
-    """Cells of the grid of `learned_bed` under more than LEAST_WATER of water in any experiment (nx, ny)."""
+    """Cells of the grid of `learned_bed` that are under water in any experiment (nx, ny), see `least_depth`."""
     where = model_that_errs(base)
     flows = [flow_at_centres(where.model, where.point, experiment) for experiment in where.point.flows]
-    return np.asarray(np.any([flow.depth > LEAST_WATER for flow in flows], axis=0))
+    return np.asarray(np.any([flow.depth > least_depth(where.model) for flow in flows], axis=0))
 
 
 def changed_by(learned: LearnedBed, model: Model, point: Point) -> tuple[Array, Array]:
