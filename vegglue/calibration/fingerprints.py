@@ -32,16 +32,15 @@ from vegglue.case.gridded_site import in_experiment
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.effects.definition import Amplitude
+from vegglue.effects.scales import SPOT_WIDTH
 from vegglue.engine.interface import Cause, Model, Point, flow_at_centres, responses
 from vegglue.errors import InputError
 from vegglue.flow.local_changes import Term
 from vegglue.flow.problem_setup import share_under_water
 from vegglue.parallel import in_threads
 
-# Half width of a spot over the half width of the floor [-], and its half lengths over its half width: an object, a bar,
-# and a stretch of bank, as in open-m, after which the longest was added. Smaller ones separate places more closely, and
-# are more tests.
-SPOT_WIDTH = 0.3
+# Half lengths of a spot over its half width [-]: an object, a bar, and a stretch of bank, as in open-m, after which the
+# longest was added. Smaller ones separate places more closely, and are more tests.
 SPOT_LENGTHS: Mapping[Term, tuple[float, ...]] = {
     "drag": (1.0, 4.0, 12.0),
     "bed": (1.0, 4.0, 12.0),
@@ -159,7 +158,6 @@ def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ..
         term: [gaussian_basis(grid, length * width, width, SPOT_CELLS) for length in lengths]
         for term, lengths in SPOT_LENGTHS.items()
         if term not in excluded
-        and not (term == "inflow" and model.case.friction.walls is not None)  # no water passes a wall
     }
     return _places_over(model, point, rasters, beside_ends=False)
 

@@ -14,7 +14,7 @@ from vegglue.effects.surroundings import Cells
 LEAST_RELATIVE_DEPTH = 0.2
 # Secondary currents fade out from here, in half widths from the axis: on the banks they have no room to turn.
 CURRENTS_END = 1.5
-# Speed over that of the site [-], whose square is added to |U|^2: the direction of slower water shows no a bend.
+# Speed over that of the site [-], whose square is added to |U|^2: slower water has no direction that would show a bend.
 STILL = 0.1
 # a [-] at which b of `helical_flow` is held: the formula is for smoother beds.
 LARGEST_ROUGHNESS = 0.5

@@ -50,9 +50,8 @@ def depth_dependent_bed(cells: Cells, exponent: Array, reference_depth: Array) -
     dict
         `rate` (nx, ny, m) [1/m].
     """
-    open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
     depth = cells.depth.clip(LEAST_DEPTH_OF_POWER * cells.geometry.depth_scale)
-    return {"rate": cells.rate * (depth / reference_depth) ** (exponent * open_floor)}
+    return {"rate": cells.rate * (depth / reference_depth) ** (exponent * cells.geometry.open_floor)}
 
 
 def bank_trend(cells: Cells, trend: Array) -> dict[str, Array]:
@@ -105,8 +104,7 @@ def bed_trend(cells: Cells, trend: Array) -> dict[str, Array]:
     dict
         `rate` (nx, ny, m) [1/m].
     """
-    open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
-    return {"rate": cells.rate * np.exp(trend * open_floor * cells.geometry.share_along)}
+    return {"rate": cells.rate * np.exp(trend * cells.geometry.open_floor * cells.geometry.share_along)}
 
 
 def bank_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
@@ -157,8 +155,7 @@ def floor_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
     dict
         `rate` (nx, ny, m) [1/m].
     """
-    open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
-    return {"rate": cells.rate * np.exp(0.5 * log_ratio * open_floor * np.sign(cells.geometry.offset))}
+    return {"rate": cells.rate * np.exp(0.5 * log_ratio * cells.geometry.open_floor * np.sign(cells.geometry.offset))}
 
 
 def bed_stretch(cells: Cells, log_ratio: Array, middle: Array, share: Array) -> dict[str, Array]:
@@ -179,9 +176,8 @@ def bed_stretch(cells: Cells, log_ratio: Array, middle: Array, share: Array) -> 
     dict
         `rate` (nx, ny, m) [1/m].
     """
-    open_floor = (1.0 - cells.geometry.bank) * (1.0 - cells.geometry.planted)
     within = np.exp(-(((cells.geometry.share_along - middle) / (0.5 * share)) ** 4))
-    return {"rate": cells.rate * np.exp(log_ratio * open_floor * within)}
+    return {"rate": cells.rate * np.exp(log_ratio * cells.geometry.open_floor * within)}
 
 
 def steep_bank(cells: Cells, share: Array) -> dict[str, Array]:

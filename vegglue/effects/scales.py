@@ -10,16 +10,18 @@ from vegglue.effects.definition import Amplitude, Effect, Shape
 SIZE_DIGITS = 2
 # Diameter of a stem over the height of its plant [-]: shrubs and reeds of 1 to 2 m have stems of some centimetre.
 SLENDER = 0.01
+# Half width of a spot over that of the floor [-].
+SPOT_WIDTH = 0.3
 
 
 @dataclass(frozen=True)
 class SiteScales:
-    """Sizes of a site and of the flow of its middle experiment.
+    """Sizes of a site and of its flow, as means over the experiments.
 
     Parameters
     ----------
     depth
-        Depth on the floor h [m], the mean of the experiments.
+        Depth on the floor h [m].
     mean_depth
         Area over width of the wet cross-section A / B [m].
     half_width
@@ -59,7 +61,7 @@ class SiteScales:
         """A scale by the name that `of` of an amplitude or a shape gives, in its unit; those that are made of others:
 
         eddy h u* [m2/s]; friction (u*/U)^2 / h [1/m]; slowness 1/U [s/m]; tilt h/b [-]; stem, its diameter [m]; object
-        1/(2 l) [1/m], the drag per length of a cylinder of C_D = 1 as long as a spot of half length l = 0.3 b.
+        1/(2 l) [1/m], the drag per length of a cylinder of C_D = 1 as long as a spot of half length l = SPOT_WIDTH b.
         """
         made = {
             "eddy": self.depth * self.shear_velocity,
@@ -67,7 +69,7 @@ class SiteScales:
             "slowness": 1.0 / self.speed,
             "tilt": self.depth / self.half_width,
             "stem": SLENDER * self.canopy,
-            "object": 1.0 / (2.0 * 0.3 * self.half_width),
+            "object": 1.0 / (2.0 * SPOT_WIDTH * self.half_width),
         }
         return made[name] if name in made else float(getattr(self, name))
 

@@ -56,7 +56,8 @@ class ChannelGeometry:
     turning
         Curvature of that line along the row of a cell [1/m]; empty on a straight grid.
     depth_scale, speed_scale
-        Depth on the floor [m] and mean speed [m/s] of the site, of which laws keep to a share where water all but ends.
+        Depth on the floor [m] and mean speed [m/s] of the site; shares of them are the least depth and speed of some
+        laws.
     """
 
     x: Array
@@ -80,6 +81,11 @@ class ChannelGeometry:
     turning: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     depth_scale: float = 1.0
     speed_scale: float = 0.5
+
+    @property
+    def open_floor(self) -> Array:
+        """Share of a cell that is floor without plants (nx, ny, 1) [-]."""
+        return (1.0 - self.bank) * (1.0 - self.planted)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Act, Amplitude, Effect, Shape, Stage
+from vegglue.effects.scales import SPOT_WIDTH
 from vegglue.effects.surroundings import Cells, ChannelGeometry
 
 
@@ -89,8 +90,8 @@ def unlisted_viscosity(cells: Cells, viscosity: Array, **place: Array) -> dict[s
 PLACE = (
     Shape("x", "m", "where along the channel", 0.0, -1e5, 1e5),
     Shape("y", "m", "where across it", 0.0, -1e5, 1e5),
-    Shape("length", "m", "its half length l", 0.3, 0.006, 1e4, of="half_width"),
-    Shape("width", "m", "its half width w", 0.3, 0.006, 1e4, of="half_width"),
+    Shape("length", "m", "its half length l", SPOT_WIDTH, 0.006, 1e4, of="half_width"),
+    Shape("width", "m", "its half width w", SPOT_WIDTH, 0.006, 1e4, of="half_width"),
 )
 SPOT = "exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2)"
 
