@@ -12,6 +12,7 @@ from vegglue.calibration.baseline import SearchModel, search_model
 from vegglue.calibration.model_error import CellResponses, field_columns, gaussian_basis
 from vegglue.calibration.noise import covariance_of
 from vegglue.case.gridded_site import build_site
+from vegglue.case.site_schema import FrictionClass
 from vegglue.diagnosis.field_scan import FIELD_SIZES, FieldHypothesis, best_field, map_of_field, scanned_fields
 from vegglue.flow.local_changes import Term
 
@@ -115,3 +116,14 @@ def test_the_field_is_known_better_where_it_is_seen() -> None:
     assert error[-6, 20] == pytest.approx(one.size, rel=0.3)
     noisy = replace(search, noise=replace(search.noise, scale=30.0))
     assert np.mean([map_of_field(noisy, responses(), one).error[cell] for cell in SEEN[12:24]]) > seen
+
+
+def test_no_water_passes_the_walls_of_a_flume() -> None:
+    """Water that enters at a place was no hypothesis between walls, but water that enters over a field was."""
+    search, walls = (
+        searched(),
+        CASE_OF_TWINS.friction.model_copy(update={"walls": FrictionClass(law="manning", n=0.01)}),
+    )
+    case = search.model.case.model_copy(update={"friction": walls})
+    fields, _ = scanned_fields(replace(search, model=replace(search.model, case=case)), 1.5)
+    assert {one.term for one in fields} == set(FIELD_SIZES) - {"inflow"}

@@ -75,8 +75,9 @@ class CellResponses:
 
 
 def excluded_terms(case: Case) -> set[Term]:
-    """Terms that no place and no field may change, as the case excludes their effect."""
-    return {TERM_OF[name] for name in case.exclude or () if name in TERM_OF}
+    """Terms that no place and no field may change: the case excludes their effect, or walls keep water out."""
+    excluded = {TERM_OF[name] for name in case.exclude or () if name in TERM_OF}
+    return excluded if case.friction.walls is None else excluded | {"inflow"}
 
 
 def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellResponses:
