@@ -2,6 +2,7 @@
 what of it is known before anything flows: discharges that have entered, and expected depths.
 """
 
+import math
 from collections import OrderedDict
 from functools import lru_cache
 
@@ -187,6 +188,17 @@ def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
     return level[:, None] - site.bed
 
 
+def chezy(case: Case, of: FrictionClass, coefficient: float, depth: float) -> float:
+    """C [m^1/2/s] of a friction class with a value of its coefficient: h^(1/6)/n, 18 log10(12 h/k_s), or given."""
+    if of.law == "manning":
+        return depth ** (1.0 / 6.0) / coefficient
+    if of.law == "keulegan":
+        return 18.0 * math.log10(max(12.0 * depth / coefficient, case.numerics.bank_argument_minimum))
+    return coefficient
+
+
+# Share of a prior without bounds that lies beyond what counts as its end [-].
+TAIL = 1e-3
 # Cases whose scales are kept: one, its children and those of held-out experiments.
 SCALES_KEPT = 16
 _kept: OrderedDict[tuple[int, ...], tuple[tuple[object, ...], SiteScales]] = OrderedDict()
@@ -199,12 +211,12 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
 
     with a water surface parallel to the floor, as `expected_depth` has it, and S the slope of the bed if Manning's n or
     the roughness between the ends of its prior can balance it, else S = (U / (C h^(1/2)))^2 of the middle of the prior.
-    Kept by the parts of the case that they hang on, which its children and its coarser grids share.
+    Kept for the parts of the case on which they depend, which its children and its coarser grids share.
     """
     parts = (case.bed, case.experiments, case.friction, case.plants, case.eddy_viscosity)
     key = tuple(map(id, parts))
-    if key in _kept:
-        return _kept[key][1]
+    if kept := _kept.get(key):
+        return kept[1]
     found = _scales(case, build_site(case) if site is None else site)
     _kept[key] = (parts, found)  # with the parts, whose identities are theirs as long as they are kept
     while len(_kept) > SCALES_KEPT:
@@ -233,7 +245,13 @@ def _scales(case: Case, site: Site) -> SiteScales:
     depth = float(np.mean(depths)) if depths else width
     speed = max(float(np.mean(speeds)) if speeds else 1.0, 1e-3 * (GRAVITY * depth) ** 0.5)
     of_floor = case.friction.classes[case.friction.default]
-    slopes = sorted((speed / (_chezy(case, of_floor, share, depth) * depth**0.5)) ** 2 for share in (0.0, 0.5, 1.0))
+    slopes = []
+    for share in (0.0, 0.5, 1.0):
+        coefficient = value_at(case, of_floor.coefficient, share)
+        if not 0.0 < coefficient < np.inf:  # a prior without bounds
+            coefficient = value_at(case, of_floor.coefficient, min(max(share, TAIL), 1.0 - TAIL))
+        slopes.append((speed / (chezy(case, of_floor, coefficient, depth) * depth**0.5)) ** 2)
+    slopes.sort()
     level = (site.bed * ~banks).sum(axis=1) / np.maximum((~banks).sum(axis=1), 1)
     has_floor = (~banks).any(axis=1)
     fall = -float(np.polyfit(site.grid.x[has_floor], level[has_floor], 1)[0]) if has_floor.sum() > 1 else 0.0
@@ -256,19 +274,3 @@ def _scales(case: Case, site: Site) -> SiteScales:
         patch_width=float(np.median(widths)) if widths else width,
         banks=bool(banks.any()),
     )
-
-
-# Share of a prior without bounds that lies beyond what counts as its end [-].
-TAIL = 1e-3
-
-
-def _chezy(case: Case, of: FrictionClass, share: float, depth: float) -> float:
-    """C [m^1/2/s] at a share of the prior of its coefficient: h^(1/6)/n, 18 log10(12 h/k_s), or given."""
-    value = value_at(case, of.coefficient, share)
-    if not 0.0 < value < np.inf:  # a prior without bounds
-        value = value_at(case, of.coefficient, min(max(share, TAIL), 1.0 - TAIL))
-    if of.law == "manning":
-        return depth ** (1.0 / 6.0) / value
-    if of.law == "keulegan":
-        return 18.0 * float(np.log10(max(12.0 * depth / value, case.numerics.bank_argument_minimum)))
-    return value

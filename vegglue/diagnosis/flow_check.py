@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.case.channel_geometry import expected_depth, half_width
+from vegglue.case.channel_geometry import chezy, expected_depth, half_width
 from vegglue.case.grid import curvature_of
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import middle_value, prior_range
@@ -255,24 +255,19 @@ def floor_slope(site: Site) -> float:
 def even_froude(case: Case, site: Site, experiment: Experiment, slope: float) -> float:
     """Fr = C (S/g)^(1/2) of even flow on the floor, C at its depth h = (q / (C S^(1/2)))^(2/3) [-]; 0 without a fall.
 
-    q: discharge over the width of the floor, all of it, as if there were neither banks nor plants. C of the friction
-    class of the floor [m^1/2/s]: h^(1/6)/n, 18 log10(12 h/k_s), or given.
+    q: discharge over the width of the floor, all of it, as if there were neither banks nor plants. C: `chezy` of the
+    friction class of the floor.
     """
     if slope <= 0.0:
         return 0.0
     per_width = _discharge(case, experiment) / (2.0 * half_width(site))
     lowest = site.friction_class[np.arange(site.bed.shape[0]), site.bed.argmin(axis=1)]
     law = case.friction.classes[site.class_names[int(np.bincount(lowest).argmax())]]
-    coefficient, depth, chezy = middle_value(case, law.coefficient), 1.0, 1.0
+    coefficient, depth, of_floor = middle_value(case, law.coefficient), 1.0, 1.0
     for _ in range(ROUNDS):
-        if law.law == "manning":
-            chezy = float(depth ** (1.0 / 6.0) / coefficient)
-        elif law.law == "keulegan":
-            chezy = float(18.0 * math.log10(max(12.0 * depth / coefficient, case.numerics.bank_argument_minimum)))
-        else:
-            chezy = float(coefficient)
-        depth = (per_width / (chezy * math.sqrt(slope))) ** (2.0 / 3.0)
-    return chezy * math.sqrt(slope / GRAVITY)
+        of_floor = chezy(case, law, coefficient, depth)
+        depth = (per_width / (of_floor * math.sqrt(slope))) ** (2.0 / 3.0)
+    return of_floor * math.sqrt(slope / GRAVITY)
 
 
 def remarks_on_outlet_levels(case: Case, site: Site, observations: Observations) -> Iterator[OutletAboveGauge]:
@@ -388,6 +383,17 @@ class ProbeTurned:
     sections: int
 
 
+def to_one_side(angles: Array, errors: float, share: float) -> bool:
+    """Whether FEWEST_CROSSED angles [degrees] or more have a mean beyond LEAST_ANGLE and so many of its standard errors
+    [-], and a share of them [-] its sign.
+    """
+    if len(angles) < FEWEST_CROSSED:
+        return False
+    mean, error = float(angles.mean()), float(angles.std(ddof=1)) / float(np.sqrt(len(angles)))
+    alike = int((np.sign(angles) == np.sign(mean)).sum())
+    return abs(mean) > max(LEAST_ANGLE, errors * error) and alike >= share * len(angles)
+
+
 def remarks_on_turned_probes(observations: Observations) -> Iterator[ProbeTurned]:
     """Positions whose v/u is off that of their neighbours, alike in FEWEST_CROSSED sections or more."""
     used = observations.table[observations.table["used"]]
@@ -401,11 +407,9 @@ def remarks_on_turned_probes(observations: Observations) -> Iterator[ProbeTurned
     both["off"] = both["angle"] - 0.5 * (angle.shift(1) + angle.shift(-1))
     for y, rows in both.dropna(subset="off").groupby(both["y"].round(3)):
         off = rows["off"].to_numpy(float)
-        if len(off) < FEWEST_CROSSED or rows["section"].nunique() < 2:
-            continue
-        mean, error = float(off.mean()), float(off.std(ddof=1)) / float(np.sqrt(len(off)))
         # Both neighbours of a turned probe look turned by half of it the other way.
-        if abs(mean) > max(LEAST_ANGLE, SURE_OF_A_PROBE * error) and (np.sign(off) == np.sign(mean)).all():
+        if rows["section"].nunique() > 1 and to_one_side(off, SURE_OF_A_PROBE, 1.0):
+            mean = float(off.mean())
             yield ProbeTurned(float(y), "left" if mean > 0.0 else "right", abs(mean), len(off))
 
 
@@ -413,18 +417,11 @@ def remarks_on_turned_velocities(case: Case, observations: Observations) -> Iter
     """Experiments whose velocities are turned to one side at nearly all sections, by more than chance makes; none with
     odd directions besides.
     """
-
-    def to_one_side(angles: Array) -> bool:
-        if len(angles) < FEWEST_CROSSED:
-            return False
-        mean, error = float(angles.mean()), float(angles.std(ddof=1)) / float(np.sqrt(len(angles)))
-        alike = int((np.sign(angles) == np.sign(mean)).sum())
-        return abs(mean) > max(LEAST_ANGLE, SURE_OF_AN_ANGLE * error) and alike >= MOST_ON_ONE_SIDE * len(angles)
-
     odd = misdirected(case, observations)
     by = {name: rows for name, rows in _by_experiment(case, observations).items() if name not in odd}
     angles = {name: _section_angles(rows) for name, rows in by.items()}
-    turned = {name: one for name, one in angles.items() if to_one_side(one.to_numpy())}
+    sure = SURE_OF_AN_ANGLE, MOST_ON_ONE_SIDE
+    turned = {name: one for name, one in angles.items() if to_one_side(one.to_numpy(), *sure)}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         ones = {name: one for name, one in turned.items() if sign * one.mean() > 0.0}
         sections = {section for one in ones.values() for section in one.index}
