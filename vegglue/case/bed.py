@@ -55,9 +55,11 @@ def read_raster(path: Path) -> Raster:
     while first < len(lines) and (words := lines[first].split()) and words[0].lower() in HEADER:
         if len(words) != 2:
             raise InputError(f"{path}, line {first + 1}: expected `{words[0]}` and one number, got {lines[first]!r}.")
-        key, of_nothing = words[0].lower(), WORDS_FOR_NO_LEVEL.fullmatch(words[1])
-        nothing = key == "nodata_value" and of_nothing
-        header[key] = math.nan if nothing else _number(path, first + 1, words[1].replace(",", "."), words[0])
+        key = words[0].lower()
+        if key == "nodata_value" and WORDS_FOR_NO_LEVEL.fullmatch(words[1]):
+            header[key] = math.nan
+        else:
+            header[key] = _number(path, first + 1, words[1].replace(",", "."), words[0])
         first += 1
     if "cellsize" not in header and header.get("dx") == header.get("dy"):
         header["cellsize"] = header.get("dx", 0.0)
@@ -78,9 +80,8 @@ def read_raster(path: Path) -> Raster:
         corner[axis] = header.get(f"{axis}llcorner", header.get(f"{axis}llcenter", 0.0) - 0.5 * size)
     found = [np.empty(0)]  # a line at a time, so that a large file takes little more than its numbers do
     for number, line in enumerate(lines[first:], first + 1):
-        plain = WORDS_FOR_NO_LEVEL.sub("nan", FORTRAN_EXPONENT.sub("e", line.replace(",", ".")))
         try:
-            found.append(np.array(plain.split(), dtype=np.float64))
+            found.append(_levels_in(line))
         except ValueError as error:
             word = str(error).rpartition(": ")[2]
             raise InputError(f"{path}, line {number}: expected numbers, got {word}.") from None
@@ -95,6 +96,15 @@ def read_raster(path: Path) -> Raster:
     values = values.reshape(rows, columns)[::-1].T
     values = np.where(values == header.get("nodata_value", -9999.0), np.nan, values)
     return Raster(centres(corner["x"], size, columns), centres(corner["y"], size, rows), size, values)
+
+
+def _levels_in(line: str) -> Array:
+    """The numbers of a line [m]. Errors: ValueError for what is none."""
+    try:
+        return np.array(line.split(), dtype=np.float64)
+    except ValueError:  # decimal commas, exponents of Fortran, words for no level: rare, and slow to look for
+        plain = WORDS_FOR_NO_LEVEL.sub("nan", FORTRAN_EXPONENT.sub("e", line.replace(",", ".")))
+        return np.array(plain.split(), dtype=np.float64)
 
 
 def levels_at(raster: Raster, x: Array, y: Array) -> Array:
