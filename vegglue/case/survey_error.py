@@ -5,8 +5,8 @@
     rough:   M = exp(-|dx| / l_x) m(|dy| / l_y),   m(r) = (1 + q + q^2 / 3) exp(-q),   q = 5^(1/2) r
 
 X are a slope along the channel and a mean cross-section of B-splines; beta is not known. s, l_y and s_e are those of
-the largest restricted likelihood for each l_x. Lines that stand far apart say little about l_x and whether the bed is
-smooth along: mean and covariance are averages over both by likelihood and prior, ln l_x ~ N(ln(RATIO l_y), LOG_SD^2),
+the largest restricted likelihood for each l_x. Lines far apart hardly determine l_x and whether the bed is smooth
+along: mean and covariance are averages over both by likelihood and prior, ln l_x ~ N(ln(RATIO l_y), LOG_SD^2),
 smooth and rough alike. A line i that is left out misses its prediction by (Q_ii)^-1 (Q z)_i with covariance (Q_ii)^-1,
 Q = K^-1 - K^-1 X (X' K^-1 X)^-1 X' K^-1, K = s^2 M + s_e^2 I.
 Sources: Rasmussen and Williams (2006), Gaussian Processes for Machine Learning, sections 2.7 and 4.2; Dubrule (1983),
@@ -28,7 +28,7 @@ from vegglue.case.bed import read_points
 from vegglue.case.site_schema import CovarianceOfBed, LinesLeftOut
 from vegglue.errors import InputError, shown_path
 
-# Length along over that across where the survey says nothing: bars and pools are longer than wide. Chosen.
+# Length along over that across if the survey does not determine it: bars and pools are longer than wide. Chosen.
 # The rough alternative and the spread were chosen after river-a, b and d, whose lines of every 12 m meet bars of 23 m.
 RATIO, LOG_SD = 2.5, 0.35
 # Lengths along that are tried, over RATIO l_y [-], and the least chance of one that is kept.
@@ -36,7 +36,7 @@ LENGTHS_TRIED, LEAST_CHANCE = np.geomspace(0.25, 4.0, 9), 0.01
 # Fewest and most B-splines of the mean cross-section, and by how many fewer they are than the points of a line: of
 # fewer, what the mean leaves is the same on all lines and looks like a great length along.
 SPLINES, FEWER = (8, 24), 3
-# A smaller survey says too little about its own error; of a larger one the covariance is too much work.
+# A smaller survey does not determine its own error; of a larger one the covariance is too much work.
 FEWEST_SURVEYED, MOST_SURVEYED, FEWEST_LINES = 40, 1000, 4
 # Most points whose likelihood is computed.
 MOST_FITTED = 300
@@ -171,12 +171,10 @@ def left_out(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple
     """Reading less prediction and its standard deviation (n,) [m] of each point, with its line left out; of a point in
     no line with itself left out. The standard deviation is that of the reading, with the error of its point.
     """
-    basis, z = survey.basis(survey.points), survey.points[:, 2]
+    z = survey.points[:, 2]
     errors, squares = (np.zeros((len(covariances), len(z))) for _ in range(2))
     for index, one in enumerate(covariances):
-        inverse = np.linalg.inv(_of_readings(survey, one))
-        projected = inverse @ basis
-        q = inverse - projected @ np.linalg.solve(basis.T @ projected, projected.T)
+        q = _precision_beside_mean(survey, one)
         for rows in [*survey.lines, *np.flatnonzero(survey.line < 0)[:, None]]:
             own = np.linalg.pinv(q[np.ix_(rows, rows)], hermitian=True)
             errors[index, rows], squares[index, rows] = own @ (q[rows] @ z), np.diag(own)
@@ -213,12 +211,10 @@ def line_offsets(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> t
     """d = 1'(Q z)_i / 1' Q_ii 1 and its standard error (1' Q_ii 1)^(-1/2) of each line i (lines,) [m]: by how much the
     whole line is too high.
     """
-    basis, z, lines = survey.basis(survey.points), survey.points[:, 2], survey.lines
-    off, squares = np.zeros((len(covariances), len(lines))), np.zeros((len(covariances), len(lines)))
+    z, lines = survey.points[:, 2], survey.lines
+    off, squares = (np.zeros((len(covariances), len(lines))) for _ in range(2))
     for index, one in enumerate(covariances):
-        inverse = np.linalg.inv(_of_readings(survey, one))
-        projected = inverse @ basis
-        q = inverse - projected @ np.linalg.solve(basis.T @ projected, projected.T)
+        q = _precision_beside_mean(survey, one)
         for number, rows in enumerate(lines):
             weight = float(q[np.ix_(rows, rows)].sum())
             off[index, number], squares[index, number] = float((q[rows] @ z).sum()) / weight, 1.0 / weight
@@ -322,6 +318,13 @@ def conditional(
 
 def _between(places: Array, others: Array, one: CovarianceOfBed) -> Array:
     return correlation_of_bed(places, others, one.along, one.across, one.rough)
+
+
+def _precision_beside_mean(survey: BedSurvey, one: CovarianceOfBed) -> Array:
+    """Q = K^-1 - K^-1 X (X' K^-1 X)^-1 X' K^-1 (n, n) [1/m2]."""
+    basis, inverse = survey.basis(survey.points), np.linalg.inv(_of_readings(survey, one))
+    projected = inverse @ basis
+    return np.asarray(inverse - projected @ np.linalg.solve(basis.T @ projected, projected.T))
 
 
 def _of_readings(survey: BedSurvey, one: CovarianceOfBed) -> Array:
