@@ -53,9 +53,6 @@ FREE_SIZE = 1e4
 # Longest that it is made, before what calibration can mimic is taken off [standard errors]: at the largest of the sizes
 # that are tried, ten, its square is 1e15, the last that is factored beside errors of 1.
 LONGEST_FREE = 3e6
-# Weight of a common omission beside others [-]: two surfaces stated as one. Chosen, after the compound channel of
-# docs/measured.md, whose grass four effects explain alike.
-COMMON = 3.0
 # Groups of kinds that are as likely before the data [-]: listed effects, places, instruments, fields (`field_scan`).
 GROUPS = 4
 # Standard deviations of its prior from which a parameter is off, and conditional screenings at most, of those furthest
@@ -186,8 +183,7 @@ def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) 
     """Listed effects: as likely before, but for common omissions, and so are the settings of one."""
     plausible = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     prior = np.empty(plausible.size)
-    weights = [COMMON if "common" in one.effect.tags else 1.0 for one in fingerprints.candidates]
-    weights = weights or [1.0] * len(fingerprints.columns)  # of columns alone, all are alike
+    weights = [constants().common_omission if "common" in one.effect.tags else 1.0 for one in fingerprints.candidates]
     for weight, columns in zip(weights, fingerprints.columns, strict=True):
         prior[columns] = weight / (GROUPS * sum(weights) * columns.size)
     return kind_of_hypotheses("effect", projected, plausible, prior, fingerprints.only_sign)
