@@ -74,6 +74,15 @@ def test_beside_a_listed_effect_a_law_has_to_explain_clearly_more() -> None:
     assert suspected(SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, 1.0),))) is not None
 
 
+@pytest.mark.parametrize(("gained", "reported"), [(7.0, True), (12.0, False)])
+def test_beside_an_effect_and_a_place_the_likelier_law_is_reported(gained: float, reported: bool) -> None:
+    """A law that is likelier than both, but not ten times as likely, is a remark beside both, not beside the effect."""
+    step = Step("wind", ("wind",), (1.0,), (("wind",),), 200.0, 5.0, 1e-4)
+    alone = SearchState(steps=(step,), prior_weights=(PriorWeight("any", 0.0, gained),))
+    assert suspected(alone) is None
+    assert (suspected(replace(alone, places=(an_anomaly(),))) is not None) == reported
+
+
 def test_a_place_is_compared_with_laws_by_what_it_explained() -> None:
     """To explain more than laws it has to have gained more evidence."""
     chances = []
