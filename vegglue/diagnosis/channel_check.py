@@ -133,8 +133,8 @@ class SurveyLeftOut:
 
 @dataclass(frozen=True)
 class ErrorsAssumed:
-    """Errors that nothing states and a config of a natural reach has: of the sides of polygons of plants and of how far
-    across verticals stood [m].
+    """Errors that an import assumes for a natural reach, as no file states them: of the sides of patches and of the
+    places of verticals across [m].
     """
 
     edges: float
@@ -288,9 +288,9 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[object]:
         area, share = area_of(corners), share_in_patch(case, patch, site.grid)
         covered, hidden = float(share.sum() * cell), int(((share > 0.5) & (site.patch != index)).sum())
         beyond = None
-        for axis, along, (low, high) in reversed([*zip("xy", corners.T, (case.grid.x, case.grid.y), strict=True)]):
+        for axis, along, (low, high) in zip("xy", corners.T, (case.grid.x, case.grid.y), strict=True):
             first, last = float(along.min()), float(along.max())
-            if first < low or last > high:
+            if beyond is None and (first < low or last > high):
                 beyond = BeyondGrid(axis, (first, last), (low, high), last <= low or first >= high)
         if not share.any():
             on_map = False
@@ -333,7 +333,7 @@ def remarks_on_friction_classes(site: Site) -> Iterator[object]:
 
 
 def remarks_on_survey(case: Case) -> Iterator[SurveyLeftOut]:
-    """What the surveys of the bed say about their own error."""
+    """How well each survey of the bed predicts its own lines."""
     for layer in beds_of(case):
         if layer.survey is not None and (found := layer.survey.left_out) is not None:
             suspect = bool(layer.survey.loose)

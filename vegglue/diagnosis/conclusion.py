@@ -199,8 +199,8 @@ def assemble_diagnosis(
 
 
 def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]]:
-    """What measurements change a surveyed bed by, as a map, and its largest clear corrections under water: one at most
-    of each stretch between lines, three in all.
+    """The correction of a surveyed bed as a map, and notes: lines levelled wrongly, and the largest clear values under
+    water, one between two lines at most and BED_CORRECTIONS in all.
     """
     learned = learned_bed(base)
     if learned is None:
@@ -209,8 +209,9 @@ def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]
     grid, change, error = learned.grid, learned.correction, learned.error
     kept = FieldMapKept(grid.x, grid.y, change, error)
     clear = np.where(wet_cells(base) & (np.abs(change) > NORMAL95 * error), np.abs(change), 0.0)
-    surveys = [read_bed_survey(one.survey.file) for one in base.model.case.bed if one.survey is not None]
-    lines = [float(one.points[rows, 0].mean()) for one in surveys for rows in one.lines]
+    surveys = [one.survey for one in base.model.case.bed if one.survey is not None]
+    points = [read_bed_survey(one.file) for one in surveys]
+    lines = [float(one.points[rows, 0].mean()) for one in points for rows in one.lines]
     for low, high in itertools.pairwise([-np.inf, *sorted(lines), np.inf]):
         own = np.where(((grid.x >= low) & (grid.x < high))[:, None], clear, 0.0)
         if own.any():
@@ -219,11 +220,11 @@ def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]
             between = (low, high) if np.isfinite([low, high]).all() else (float("nan"), float("nan"))
             place = float(grid.x[i]), float(grid.y[j])
             found.append(BedCorrected(*place, value, (value - half, value + half), between))
-    wrong = [one.survey.left_out for one in base.model.case.bed if one.survey is not None and one.survey.loose]
-    levelled: list[Note] = [
-        LineLevelledWrongly(one.offset_at, one.offset, (one.offset - half, one.offset + half))
-        for one in wrong if one is not None for half in (NORMAL95 * one.offset_error,)
-    ]  # fmt: skip
+    levelled: list[Note] = []
+    for survey in surveys:
+        if survey.loose and (off := survey.left_out) is not None:
+            half = NORMAL95 * off.offset_error
+            levelled.append(LineLevelledWrongly(off.offset_at, off.offset, (off.offset - half, off.offset + half)))
     return kept, [*levelled, *sorted(found, key=lambda one: -abs(one.change))[:BED_CORRECTIONS]]
 
 
@@ -291,16 +292,16 @@ def _verdict(
 
 
 def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnSection | None:
-    """The section without whose readings another listed effect leads the first accepted one, to first order; None where
-    the name survives each, where no effect was accepted first, and where there are more than FEW_SECTIONS.
+    """The first section without which another listed effect leads the accepted one by same_kind_odds, to first order.
 
-    Scores and evidence are those of the first screening, with the rows of one section taken out.
+    None if there is no such section, if no effect was accepted first or a place beside it, and for more than
+    FEW_SECTIONS; a section counts once for each experiment. Scores and evidence are those of the first screening
+    without its rows.
     """
     base, prints = first.base, first.fingerprints
     used = base.model.station.iloc[base.noise.rows]
-    velocity = velocity_rows(used)
-    label = (used["experiment"] + "\n" + used["section"]).to_numpy()
-    sections = [str(name) for name in dict.fromkeys(label[velocity])]
+    section_of = used.groupby(["experiment", "section"], sort=False).ngroup().to_numpy()
+    sections = np.unique(section_of[velocity_rows(used)])
     names = [one.name for one in prints.candidates]
     if not found.steps or found.places or not 1 < len(sections) <= FEW_SECTIONS:
         return None
@@ -313,10 +314,10 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
     columns = base.noise.used(point.slope), base.noise.used(prints.values)
     residual = base.noise.residual(point.prediction)
     for section in sections:
-        kept = label != section
-        lower = np.linalg.cholesky(covariance[np.ix_(kept, kept)])
-        slope, changes = (np.linalg.solve(lower, part[kept]) for part in columns)
-        projected = score_test.project(slope, np.linalg.solve(lower, residual[kept]), point.z, changes)
+        kept = section_of != section
+        noise = replace(base.noise, lower=np.linalg.cholesky(covariance[np.ix_(kept, kept)]))
+        slope, changes, left = (noise.whiten(part[kept]) for part in (*columns, residual))
+        projected = score_test.project(slope, left, point.z, changes)
         scores = score_test.scores(projected, prints.only_sign)
         evidence = score_test.log_factors(scores, plausible * projected.length)
         of_each = np.array([float(evidence[some].max()) for some in prints.columns])
@@ -324,7 +325,7 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
         own = max(float(of_each[names.index(name)]) for name in together if name in names)
         ahead = (float(of_each[best]) - own) / float(tempering(np.array(own)))
         if names[best] not in together and ahead > np.log(constants().same_kind_odds):
-            return NameHangsOnSection(step.accepted, section.rpartition("\n")[2], names[best])
+            return NameHangsOnSection(step.accepted, str(used["section"].to_numpy()[~kept][0]), names[best])
     return None
 
 
