@@ -14,7 +14,8 @@ from vegglue.results.verdict import BeyondHandbook, EstimateAtBound, EstimateOff
 
 # Share of the prior beyond an estimate [-] below which its bound decides it. Chosen, not measured.
 PRESSES = 0.02
-# Standard deviations of a prior that states something, off which an estimate is told. Chosen: one in 80 by chance.
+# Distance from a normal or lognormal prior beyond which an estimate is reported [standard deviations]. Chosen: one
+# in 80 by chance.
 OFF_STATED = 2.5
 # Widest a stream may be at its surface [m] that Chow (1959) calls minor.
 MINOR_STREAM = 30.0
@@ -65,11 +66,12 @@ def _at_bound(name: str, prior: Parameter, value: float) -> Iterator[EstimateAtB
 
 
 def _handbook(case: Case, scales: SiteScales, name: str) -> HandbookRange | None:
-    """The range of what a parameter stands for in the case; None for what no handbook knows."""
+    """The range of what a parameter stands for in the case; None if no handbook gives one."""
     walls = case.friction.walls
     if walls is not None and walls.n == name:
         return OF_WALLS
     if case.eddy_viscosity == name:
+        # Not checked against it: 0.15 to 0.3 of straight channels to 1 to 3 of sharp bends, here with wider ends.
         eddy = scales.of("eddy")
         return HandbookRange(0.05 * eddy, 3.5 * eddy, "0.05 to 3.5 h u*, Rutherford (1994) for flumes to sharp bends")
     of_classes = [one for one in case.friction.classes.values() if one.coefficient == name]

@@ -108,7 +108,7 @@ class AmplitudeAtBound:
 
 @dataclass(frozen=True)
 class AmplitudeBeyondPlausible:
-    """An effect whose amplitude is so many times a plausible one [-], as of something else in its place."""
+    """An effect, or something at a place, of so many times a plausible size [-]: something else is missing."""
 
     effect: str
     times: float
@@ -116,7 +116,7 @@ class AmplitudeBeyondPlausible:
 
 @dataclass(frozen=True)
 class NameHangsOnSection:
-    """Without the readings of one section another effect leads the accepted one."""
+    """Without the readings of one section in one experiment another effect leads the accepted one."""
 
     effect: str
     section: str
@@ -421,8 +421,8 @@ class PlacesOnMap:
 
 @dataclass(frozen=True)
 class BedCorrected:
-    """The largest clear correction of a surveyed bed under water that the measurements ask for: change with its 95 %
-    interval [m] at x, y [m]; between: x of the surveyed lines on both sides [m], NaN beyond the last.
+    """The largest clear correction of a surveyed bed between two lines: change with its 95 % interval [m] at x, y [m];
+    between: x of the surveyed lines on both sides [m], NaN beyond the last.
     """
 
     x: float
@@ -823,7 +823,7 @@ def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt
     used, absurd = inputs.model_error, math.sqrt(constants().absurd_misfit)
     if inputs.errors.scale > absurd:
         doubt = doubt or ErrorsLargerThanStated(inputs.errors.scale)
-    if used is not None and used.needed > 2.0 * absurd:
+    if used is not None and used.needed > 2.0 * absurd:  # four times what is allowed; chosen, not measured
         doubt = doubt or ModelErrorExceeded(used.needed, used.friction)
     if inputs.neighbours and not laws.likelier:
         doubt = doubt or NeighboursExcluded()
