@@ -33,8 +33,9 @@ from vegglue.diagnosis.conclusion import (
     significant_effects,
 )
 from vegglue.diagnosis.search_state import SearchState, Undecided
+from vegglue.effects.definition import Amplitude
 from vegglue.results.causes import Rival
-from vegglue.results.verdict import MeasuredStretch, PlacesOnMap
+from vegglue.results.verdict import MeasuredStretch, NameHangsOnSection, PlacesOnMap
 
 WEST, EAST = CASE_OF_TWINS.grid.x
 
@@ -73,6 +74,24 @@ def test_what_is_significant_in_the_last_model_is_kept_unless_it_is_in_it() -> N
     )  # fmt: skip
     assert significant_effects(last, SearchState(steps=(step("jet"),))) == {"wind": 0.008}
     assert significant_effects(last, SearchState(steps=(step("jet"),)), slack=1.0) == {}
+
+
+@pytest.mark.parametrize(("other", "named"), [(0.1, True), (0.0, False)])
+def test_a_name_that_one_section_alone_gives_is_found(other: float, named: bool) -> None:
+    """The first section shows one effect, by 20 standard errors of each reading, and the second another or none."""
+    station = stations_of(CASE_OF_TWINS, ("A", "B"), 4)
+    station = station[station["experiment"] == station["experiment"].iloc[0]].reset_index(drop=True)
+    first = (station["section"] == "A").to_numpy(float)
+    traces = np.column_stack([0.2 * first, 0.1 * (1.0 - first)])
+    base = at_best(CASE_OF_TWINS, station, 0.2 * first + other * (1.0 - first), np.zeros((len(station), 2)))
+    amplitude = Amplitude("a", "-", "", 1.0, -9.0, 9.0)
+    prints: Any = SimpleNamespace(
+        candidates=[SimpleNamespace(name="wind"), SimpleNamespace(name="waves")], amplitudes=[amplitude] * 2,
+        columns=[np.array([0]), np.array([1])], only_sign=np.zeros(2, int), values=traces,
+    )  # fmt: skip
+    screening: Any = SimpleNamespace(base=base, fingerprints=prints)
+    found = conclusion.name_without_a_section(screening, SearchState(steps=(step("wind"),)))
+    assert found == (NameHangsOnSection("wind", "A", "waves") if named else None)
 
 
 def test_a_misfit_is_in_the_errors_of_the_last_model() -> None:

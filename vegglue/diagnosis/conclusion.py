@@ -315,7 +315,7 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
     residual = base.noise.residual(point.prediction)
     for section in sections:
         kept = section_of != section
-        noise = replace(base.noise, lower=np.linalg.cholesky(covariance[np.ix_(kept, kept)]))
+        noise = replace(base.noise, lower=np.asarray(np.linalg.cholesky(covariance[np.ix_(kept, kept)]), float))
         slope, changes, left = (noise.whiten(part[kept]) for part in (*columns, residual))
         projected = score_test.project(slope, left, point.z, changes)
         scores = score_test.scores(projected, prints.only_sign)
