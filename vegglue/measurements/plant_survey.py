@@ -129,8 +129,10 @@ def rigid_cylinder(
     -------
     RigidCylinder
 
-    References ---------- Berends et al. (2020), section 3.2; Baptist et al. (2007), doi 10.1080/00221686.2007.9521778;
-    bending after Verschoren et al. (2016).
+    References
+    ----------
+    Berends et al. (2020), section 3.2; Baptist et al. (2007), doi 10.1080/00221686.2007.9521778; bending after
+    Verschoren et al. (2016).
     """
     generator, drawn = np.random.default_rng(seed), {}
     for name in SURVEYED:

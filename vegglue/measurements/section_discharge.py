@@ -235,8 +235,10 @@ def neighbour_error(position: Array, average: Array) -> float:
     float
         [m/s]; NaN below three verticals.
 
-    References ---------- Cohn, Kiang and Mason (2013), doi 10.1061/(ASCE)HY.1943-7900.0000695: the interpolated
-    variance estimator, which takes the straight line.
+    References
+    ----------
+    Cohn, Kiang and Mason (2013), doi 10.1061/(ASCE)HY.1943-7900.0000695: the interpolated variance estimator, which
+    takes the straight line.
     """
     count = len(position)
     each_side = 2 if count >= 5 else 1
