@@ -6,7 +6,6 @@ lies between the U points m - 1 and m; KFU and KFV are 0 at dry faces; ALFAS is 
 """
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,8 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.model_result import (
     ModelResult,
     NetcdfVariable,
+    RoughnessKind,
+    last_time,
     model_result,
     netcdf_variables,
     refuse_degrees,
@@ -82,19 +83,20 @@ def read_delft3d_trim(path: Path) -> ModelResult:
         if "XCOR" in variables and "YCOR" in variables:
             at = np.column_stack([variables[name].values().ravel() for name in ("XCOR", "YCOR")])
             corners = at[np.isfinite(at).all(axis=1) & (at != 0.0).any(axis=1)]
-        more: dict[str, Any] = {"corners": corners, "notes": turned}
-        for name in ("CFUROU",):
-            if name in variables and "chezy" in variables[name].text("long_name").lower():
-                of_faces = variables[name].values(times).reshape(shape)
-                more |= {"roughness": _mean_of_both(of_faces)[active], "roughness_kind": "chezy"}
-        if "time" in variables:
-            time = variables["time"]
-            more["time"] = f"{float(np.ravel(time.numbers())[-1]):g} {time.text('units')}"
+        roughness: Array | None = None
+        kind: RoughnessKind = "not-stated"
+        if "CFUROU" in variables and "chezy" in variables["CFUROU"].text("long_name").lower():
+            of_faces = variables["CFUROU"].values(times).reshape(shape)
+            both = np.stack([of_faces, _before(of_faces, 0)])  # the mean of those above 0
+            known = np.isfinite(both) & (both > 0.0)
+            total, count = np.where(known, both, 0.0).sum(axis=0), known.sum(axis=0)
+            roughness, kind = np.where(count > 0, total / np.maximum(count, 1), np.nan)[active], "chezy"
         level, bed = level.reshape(shape), bed.reshape(shape)
         depth = np.where(wet, level - bed, 0.0)
         return model_result(
             "Delft3D-4", x[active], y[active], bed[active], level[active], depth[active],
-            east[active], north[active], **more,
+            east[active], north[active], roughness=roughness, roughness_kind=kind, corners=corners,
+            time=last_time(variables), notes=turned,
         )  # fmt: skip
 
 
@@ -113,14 +115,6 @@ def _before(field: Array, axis: int) -> Array:
     moved = np.roll(np.asarray(field, dtype=np.float64), 1, axis=axis)
     moved[(slice(None),) * axis + (0,)] = 0.0
     return moved
-
-
-def _mean_of_both(of_faces: Array) -> Array:
-    """The mean of both faces of a centre, of those that have a value above 0."""
-    both = np.stack([of_faces, _before(of_faces, 0)])
-    known = np.isfinite(both) & (both > 0.0)
-    count = known.sum(axis=0)
-    return np.where(count > 0, np.where(known, both, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
 def _turned_as_the_grid(x: Array, y: Array, active: Mask, angle: Array) -> tuple[tuple[str, ...], Array]:

@@ -53,7 +53,7 @@ def read_hec_ras(path: Path) -> ModelResult:
     with h5py.File(path) as file:
         results = file.get(f"{SERIES}/2D Flow Areas")
         geometry = file.get(AREAS)
-        held = () if geometry is None else geometry
+        held = geometry or ()
         names = [name for name in results or () if f"{name}/Cells Center Coordinate" in held]
         if not names:
             what = "results" if geometry is not None and results is None else "2D flow areas with their geometry"
@@ -61,19 +61,18 @@ def read_hec_ras(path: Path) -> ModelResult:
                 f"{shown_path(path)}: expected a computed plan of HEC-RAS 2D, got no {what}; compute it anew."
             )
         system, projection = text_of(file.attrs.get("Units System")), text_of(file.attrs.get("Projection"))
-        customary = "SI" not in system.upper() if system else False
+        customary = system != "" and "SI" not in system.upper()
         horizontal = 1.0 if not customary else US_SURVEY_FOOT if "FOOT_US" in projection.upper() else FOOT
         parts = [_area(geometry[name], results[name], FOOT if customary else 1.0, horizontal) for name in names]
         stamps = file.get(f"{SERIES}/Time Date Stamp")
         time = text_of(stamps[-1]) if stamps is not None and len(stamps) else ""
         notes = [f"{sum(part['ghosts'] for part in parts)} cells without a bed left out, as ghost cells are"]
         notes += ["feet turned into metres"] if customary else []
-        corners = np.vstack([part.pop("corners") for part in parts])
-        joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key not in ("ghosts",)}
+        joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key != "ghosts"}
         rough = joined.pop("roughness")
         return model_result(
-            "HEC-RAS", **joined, corners=corners, roughness=rough if np.isfinite(rough).any() else None,
-            roughness_kind="manning", crs=projection if not customary else "", time=time, notes=tuple(notes),
+            "HEC-RAS", **joined, roughness=rough if np.isfinite(rough).any() else None, roughness_kind="manning",
+            crs=projection if not customary else "", time=time, notes=tuple(notes),
         )  # fmt: skip
 
 
@@ -92,12 +91,11 @@ def _area(geometry: Any, results: Any, vertical: float, horizontal: float) -> di
     sides = np.where(inside & wet[at], level[at], -np.inf)  # of a dry side, or a ghost cell, the other one counts
     area, n_face = _of_faces(geometry, sides.max(axis=1), vertical, normal[:, 2] * horizontal)
     u, v = _vectors(cells, inside, normal[:, :2], velocity, area, count)
-    rough = np.full(count, np.nan)
     if "Cells Center Manning's n" in geometry:
         rough = np.asarray(geometry["Cells Center Manning's n"], dtype=np.float64)
     else:
         n_face = np.where(np.isfinite(n_face), n_face, 0.0)
-        total, faces = (np.zeros(count), np.zeros(count))
+        total, faces = np.zeros(count), np.zeros(count)
         for side in range(2):
             ok = inside[:, side] & (n_face > 0.0)
             total += np.bincount(at[ok, side], n_face[ok], count)

@@ -117,6 +117,19 @@ def model_result(
     )  # fmt: skip
 
 
+def lacking_fields(found: Mapping[str, Array]) -> list[str]:
+    """Fields that a result lacks: u, v, and those of bed, level and depth if it has fewer than two of these."""
+    of_three = [key for key in ("bed", "level", "depth") if key not in found]
+    return [key for key in ("u", "v") if key not in found] + (of_three if len(of_three) > 1 else [])
+
+
+def bed_level_depth(found: Mapping[str, Array]) -> tuple[Array, Array, Array]:
+    """z_b, z_s = z_b + h, and h (n,) [m], from two of them."""
+    bed = found["bed"] if "bed" in found else found["level"] - found["depth"]
+    level = found["level"] if "level" in found else bed + found["depth"]
+    return bed, level, found["depth"] if "depth" in found else level - bed
+
+
 def without_marks(values: Array) -> Array:
     """Numbers as they stand in a file, NaN for those that codes write where there is no value."""
     with np.errstate(invalid="ignore"):
@@ -179,6 +192,12 @@ def netcdf_variables(path: Path) -> Iterator[dict[str, NetcdfVariable]]:
             for name, one in file.items()
             if isinstance(one, h5py.Dataset)
         }
+
+
+def last_time(variables: Mapping[str, NetcdfVariable]) -> str:
+    """The last time with its unit; '' if there is none."""
+    time = variables.get("time")
+    return "" if time is None else f"{float(np.ravel(time.numbers())[-1]):g} {time.text('units')}"
 
 
 def refuse_degrees(path: Path, x: NetcdfVariable) -> None:

@@ -9,13 +9,19 @@ each time one record for it and one for each variable. Reals have 4 or 8 bytes: 
 
 import struct
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.model_result import ModelResult, model_result, without_marks
+from vegglue.importers.model_result import (
+    ModelResult,
+    bed_level_depth,
+    lacking_fields,
+    model_result,
+    without_marks,
+)
 
 # Names of variables, English and French, without their units.
 SELAFIN_NAMES = {
@@ -100,17 +106,12 @@ def _result(path: Path, file: BinaryIO, order: str) -> ModelResult:
     for key, known in SELAFIN_NAMES.items():
         if (name := next((name for name in names if name in known), None)) is not None:
             found[key] = without_marks(values[name])
-    missing = [SELAFIN_NAMES[key][0] for key in ("u", "v") if key not in found]
-    if len({"bed", "depth", "level"} & found.keys()) < 2:
-        missing += [SELAFIN_NAMES[key][0] for key in ("bed", "depth", "level") if key not in found]
-    if missing:
+    if missing := [SELAFIN_NAMES[key][0] for key in lacking_fields(found)]:
         raise InputError(
             f"{shown_path(path)}: expected the variables {', '.join(missing)}, got {', '.join(names) or 'none'}; add "
             "them to VARIABLES FOR GRAPHIC PRINTOUTS."
         )
-    bed = found["bed"] if "bed" in found else found["level"] - found["depth"]
-    depth = found["depth"] if "depth" in found else found["level"] - bed
-    level = found["level"] if "level" in found else bed + depth
+    bed, level, depth = bed_level_depth(found)
     notes: list[str] = []
     if (negative := int((depth < 0.0).sum())) > 0:
         notes.append(f"{negative} negative depths taken as dry")
@@ -118,9 +119,10 @@ def _result(path: Path, file: BinaryIO, order: str) -> ModelResult:
         notes.append(f"places moved by the offsets {parameters[2]}, {parameters[3]} m of the header")
     if size - begin != frames * frame:
         notes.append("the last frame is cut off, the one before it is read")
-    more: dict[str, Any] = {"corners": np.column_stack([x, y]), "notes": tuple(notes)}
-    more |= {"time": f"{date + ' + ' if date else ''}{seconds:g} s", "roughness": found.get("friction")}
-    return model_result("TELEMAC", x, y, bed, level, depth, found["u"], found["v"], **more)
+    return model_result(
+        "TELEMAC", x, y, bed, level, depth, found["u"], found["v"], roughness=found.get("friction"),
+        corners=np.column_stack([x, y]), time=f"{date + ' + ' if date else ''}{seconds:g} s", notes=tuple(notes),
+    )  # fmt: skip
 
 
 def _record(file: BinaryIO, order: str, size: int) -> bytes:

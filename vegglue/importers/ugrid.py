@@ -18,6 +18,9 @@ from vegglue.importers.model_result import (
     ModelResult,
     NetcdfVariable,
     RoughnessKind,
+    bed_level_depth,
+    lacking_fields,
+    last_time,
     model_result,
     netcdf_variables,
     refuse_degrees,
@@ -66,15 +69,12 @@ def read_ugrid(path: Path) -> ModelResult:
         nodes = np.column_stack([node_x.values(), node_y.values()])
         corners = _corners_of_faces(variables[topology.text("face_node_connectivity")])
         faces, times = corners.shape[0], max(variables["time"].shape[0], 1) if "time" in variables else 0
-        found = {key: _field(variables, mesh, key, (faces, len(nodes)), times) for key in UGRID_NAMES}
-        missing = [key for key in ("u", "v") if found[key] is None]
-        if sum(found[key] is not None for key in ("bed", "level", "depth")) < 2:
-            missing += [key for key in ("bed", "level", "depth") if found[key] is None]
-        if missing:
+        fields = {key: _field(variables, mesh, key, (faces, len(nodes)), times) for key in UGRID_NAMES}
+        given = {key: one for key, one in fields.items() if one is not None}
+        if missing := lacking_fields(given):
             layers = any(len(one.shape) == 3 and faces in one.shape[:-1] for one in variables.values())
             hint = "write depth means (ucxa, ucya)" if layers else "add them to the output"
             raise InputError(f"{shown_path(path)}: expected {', '.join(missing)} on the mesh, got none; {hint}.")
-        given = {key: one for key, one in found.items() if one is not None}
         at_faces = given["u"].size == faces
         centre = _mean_of_corners(nodes, corners)
         if (named := topology.text("face_coordinates").split()) and at_faces and set(named[:2]) <= variables.keys():
@@ -83,9 +83,6 @@ def read_ugrid(path: Path) -> ModelResult:
         for key, one in given.items():
             if one.size != places.shape[0] and at_faces:  # a bed at nodes
                 given[key] = _mean_of_corners(one[:, None], corners)[:, 0]
-        bed = given["bed"] if "bed" in given else given["level"] - given["depth"]
-        level = given["level"] if "level" in given else bed + given["depth"]
-        depth = given["depth"] if "depth" in given else level - bed
         of_flow_fm = f"{mesh}_flowelem_bl" in variables or f"{mesh}_ucx" in variables
         notes, keep = [], np.ones(len(places), bool)
         domain = variables.get(f"{mesh}_flowelem_domain")
@@ -100,16 +97,12 @@ def read_ugrid(path: Path) -> ModelResult:
         kind: RoughnessKind = "not-stated"
         chezy = variables.get(f"{mesh}_czs")
         if chezy is not None and at_faces and chezy.shape[-1] == faces:
-            roughness, kind = chezy.values(times), "chezy"
-        time = variables.get("time")
-        more: dict[str, Any] = {"corners": nodes, "crs": _system(variables), "notes": tuple(notes)}
-        more["roughness_kind"] = kind
-        if roughness is not None:
-            more["roughness"] = roughness[keep]
-        if time is not None:
-            more["time"] = f"{float(np.ravel(time.numbers())[-1]):g} {time.text('units')}"
-        fields = (places[:, 0], places[:, 1], bed, level, depth, given["u"], given["v"])
-        return model_result("D-Flow FM" if of_flow_fm else "UGRID", *(one[keep] for one in fields), **more)
+            roughness, kind = chezy.values(times)[keep], "chezy"
+        of_cells = (*places.T, *bed_level_depth(given), given["u"], given["v"])
+        return model_result(
+            "D-Flow FM" if of_flow_fm else "UGRID", *(one[keep] for one in of_cells), roughness=roughness,
+            roughness_kind=kind, corners=nodes, crs=_system(variables), time=last_time(variables), notes=tuple(notes),
+        )  # fmt: skip
 
 
 def _field(
@@ -149,8 +142,7 @@ def _mean_of_corners(values: Array, corners: np.ndarray[Any, Any]) -> Array:
 def _system(variables: dict[str, NetcdfVariable]) -> str:
     """EPSG:... of the variable that states a projection; '' for none."""
     for one in variables.values():
-        number = int(np.ravel(one.attributes.get("epsg", 0))[0]) if "epsg" in one.attributes else 0
-        if number:
+        if number := int(np.ravel(one.attributes.get("epsg", 0))[0]):
             return f"EPSG:{number}"
         if found := re.search(r"EPSG:(\d+)", one.text("EPSG_code") + one.text("crs_wkt")):
             return f"EPSG:{found[1]}" if int(found[1]) else ""
