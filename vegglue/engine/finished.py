@@ -49,7 +49,7 @@ def their_predictions(station: pd.DataFrame, flows: dict[str, TheirFlow], grid: 
         readings["speed"] = np.hypot(here["u"], here["v"])
         through = kinds[rows] == "discharge"
         of_sections = np.full(rows.size, np.nan)
-        of_sections[through] = flow.discharge(grid, x[rows][through])
+        of_sections[through] = flow.discharge(grid, x[rows][through])[0]
         readings["discharge"] = of_sections
         found[rows] = np.array([readings[kind][at] for at, kind in enumerate(kinds[rows])])
     return found
@@ -133,8 +133,7 @@ def _agreement(model: Model, point: Point, flows: dict[str, TheirFlow], measured
         parts["depth"].append(theirs["depth"][both])
         wet, other = wet + int(theirs_wet.sum()), other + int((theirs_wet != ours_wet).sum())
         beyond += int((ours_wet & ~flow.inside(x, y)).sum())
-        inner = np.linspace(grid.x[0], grid.x[-1], 12)[1:-1]
-        carried = flow.discharge(grid, inner)
+        carried, _ = flow.discharge(grid, np.linspace(grid.x[0], grid.x[-1], 12)[1:-1])
         spread = max(spread, float(np.std(carried)) / max(abs(float(np.mean(carried))), 1e-12))
     fields = {name: np.concatenate(each) for name, each in parts.items()}
     if not fields["speed"].size:  # no cell is wet in both

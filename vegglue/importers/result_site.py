@@ -282,11 +282,7 @@ def _boundary(path: Path, flow: TheirFlow, grid: Grid, straight: bool) -> tuple[
     flow that is not along the grid, or whose discharge changes along it.
     """
     inner = np.linspace(grid.x[0], grid.x[-1], TRIES_ALONG + 2)[1:-1]
-    at_x, at_y = (part.ravel() for part in np.meshgrid(inner, grid.y, indexing="ij"))
-    here = flow.at(at_x, at_y)
-    along, across = (
-        np.nansum((here["depth"] * here[name]).reshape(inner.size, -1), axis=1) * grid.dy for name in ("u", "v")
-    )
+    along, across = flow.discharge(grid, inner)
     off = np.degrees(np.abs(np.arctan2(across, along)))
     if not (off <= MOST_OFF_AXIS).all():
         hint = "draw the channel by `grid.centreline`" if straight else "correct `grid.centreline`"

@@ -1,5 +1,6 @@
 """The flow of a finished run of another model, at the places of its own mesh, and read between them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -43,28 +44,36 @@ class TheirFlow:
         """Whether places (m,) lie on the mesh."""
         return np.asarray(self._tree.query(np.column_stack([x, y]))[0] <= BEYOND_MESH * self.spacing)
 
+    @cached_property
+    def _between(self) -> Callable[[Array], Array]:
+        """Level, depth, u and v (m, 4) at places (m, 2): linear between wet places, of the nearest one beyond them."""
+        from scipy.interpolate import LinearNDInterpolator  # late: a case of its own flow need not wait for it
+
+        wet = self.depth > 0.0
+        places = np.column_stack([self.x, self.y])[wet]
+        fields = np.column_stack([self.bed + self.depth, self.depth, self.u, self.v])[wet]
+        tree = cKDTree(places)
+        try:
+            linear = LinearNDInterpolator(places, fields)
+        except (QhullError, ValueError):  # fewer than three places, or all on a line
+            return lambda to: fields[tree.query(to)[1]]
+
+        def read(to: Array) -> Array:
+            found = linear(to)
+            return np.where(np.isfinite(found), found, fields[tree.query(to)[1]])
+
+        return read
+
     def at(self, x: Array, y: Array) -> dict[str, Array]:
         """level [m], depth [m], u and v [m/s] at places (m,): linear between wet places, NaN where it is dry.
 
         A place is dry if the nearest place of the mesh is, or if it lies beyond the mesh.
         """
         to = np.column_stack([x, y])
-        _, nearest = self._tree.query(to)
-        wet = self.depth > 0.0
-        there = wet[nearest] & self.inside(x, y)
-        fields = np.column_stack([self.bed + self.depth, self.depth, self.u, self.v])
-        places = np.column_stack([self.x, self.y])[wet]
+        there = (self.depth > 0.0)[self._tree.query(to)[1]] & self.inside(x, y)
         found = np.full((len(to), 4), np.nan)
-        if wet.any():
-            found = fields[wet][cKDTree(places).query(to)[1]]
-            try:
-                from scipy.interpolate import LinearNDInterpolator  # late: a case of its own flow need not wait for it
-
-                between = LinearNDInterpolator(places, fields[wet])(to)
-                found = np.where(np.isfinite(between), between, found)
-            except (QhullError, ValueError):  # fewer than three places, or all on a line
-                pass
-        found[~there] = np.nan
+        if there.any():
+            found[there] = self._between(to[there])
         return dict(zip(("level", "depth", "u", "v"), found.T, strict=True))
 
     def nearest(self, x: Array, y: Array, among: Mask) -> NDArray[np.int64]:
@@ -73,10 +82,11 @@ class TheirFlow:
         return np.asarray(tree.query(np.column_stack([x, y]))[1], dtype=np.int64)
 
     def discharge(self, grid: Grid, x: Array) -> Array:
-        """Q = dy sum_j h_j u_j through the row of cells at each x (m,) [m3/s]."""
+        """Q = dy sum_j h_j u_j through the row of cells at each x, and the same of v across (2, m) [m3/s]."""
         at_x, at_y = (part.ravel() for part in np.meshgrid(x, grid.y, indexing="ij"))
         here = self.at(at_x, at_y)
-        return np.asarray(np.nansum((here["depth"] * here["u"]).reshape(len(x), grid.y.size), axis=1) * grid.dy)
+        each = np.stack([here["depth"] * here[name] for name in ("u", "v")]).reshape(2, len(x), grid.y.size)
+        return np.asarray(np.nansum(each, axis=2) * grid.dy)
 
 
 def read_their_flow(path: Path) -> TheirFlow:
