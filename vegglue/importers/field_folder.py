@@ -128,8 +128,9 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     # Files that the site file names and that hold no measurements.
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
     used += [given.file] if isinstance(given, FileOfSite) else []
-    of_result = ground_of_result(target, found, place) if isinstance(found, SiteOfResult) else None
-    if of_result is not None and isinstance(found, SiteOfResult):
+    of_result = None
+    if isinstance(found, SiteOfResult):
+        of_result = ground_of_result(target, found)
         ground = of_result.ground
         used += [one.name for one in found.paths.values()]
     elif site.bed is not None or site.channel is None:
@@ -218,13 +219,10 @@ def usual_viscosity(site: FieldSite, ground: Ground) -> float:
     n = 0.011 between walls and 0.035 in streams needs, S = (n U)^2 / h^(4/3), U = Q / A.
     """
     (west, east), (south, north), (dx, dy) = (ground.tree["grid"][key] for key in ("x", "y", "cell"))
-    x, y = (
-        np.linspace(west + 0.5 * dx, east - 0.5 * dx, SAMPLED),
-        np.linspace(south + 0.5 * dy, north - 0.5 * dy, SAMPLED),
-    )
-    bed = np.asarray(ground.level(*(part.ravel() for part in np.meshgrid(x, y, indexing="ij")))).reshape(
-        SAMPLED, SAMPLED
-    )
+    x = np.linspace(west + 0.5 * dx, east - 0.5 * dx, SAMPLED)
+    y = np.linspace(south + 0.5 * dy, north - 0.5 * dy, SAMPLED)
+    at_x, at_y = (part.ravel() for part in np.meshgrid(x, y, indexing="ij"))
+    bed = np.asarray(ground.level(at_x, at_y)).reshape(SAMPLED, SAMPLED)
     share, n = (MIXING_OF_FLUME, 0.011) if site.walls is not None else (MIXING_OF_STREAM, 0.035)
     known = np.isfinite(bed).any(axis=1)
     floor, found = np.nanmin(bed[known], axis=1), []

@@ -128,7 +128,8 @@ def data_folder(target: Path) -> Path:
 
 def record(path: Path, taken: MeasuredRows | None, summary: str) -> Tree:
     """What a config keeps of a file that it was made from."""
-    tree: Tree = {"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "taken": summary}
+    with path.open("rb") as file:
+        tree: Tree = {"name": path.name, "sha256": hashlib.file_digest(file, "sha256").hexdigest(), "taken": summary}
     if taken is not None:
         tree |= {"columns": dict(taken.columns), "units": dict(taken.units)}
     return tree

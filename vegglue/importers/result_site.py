@@ -4,7 +4,6 @@ The grid covers its mesh along a straight channel, or along the centreline that 
 classes, discharge and outlet level are those of the result.
 """
 
-import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,11 +23,11 @@ from vegglue.case.text_files import case_name
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import MANNING_BED, bed_prior, lognormal_prior
 from vegglue.importers.finished_results import holds_result, read_result
-from vegglue.importers.measured_files import data_folder
+from vegglue.importers.measured_files import data_folder, record
 from vegglue.importers.measured_rows import Placement
 from vegglue.importers.model_result import ModelResult
 from vegglue.importers.site_file import FieldSite, ResultEntry, read_keys, read_site, site_file
-from vegglue.importers.terrain import Ground, Terrain, grid_of_terrain, ground_on_grid
+from vegglue.importers.terrain import Ground, Terrain, ascii_grid, grid_of_keys, grid_of_terrain, ground_on_grid
 from vegglue.importers.vector_files import drawn_centreline
 from vegglue.measurements.their_flow import TheirFlow, text_of_flow
 from vegglue.wording.numbers import in_digits, so_many
@@ -67,12 +66,15 @@ class PlacedResult:
 
 @dataclass(frozen=True, eq=False)
 class SiteOfResult:
-    """The site file with what a result adds to it, and the results by experiment."""
+    """The site file with what a result adds to it, the results by experiment, the bed of the first, and the grid."""
 
     site: FieldSite
+    place: Placement
     paths: Mapping[str, Path]
     placed: Mapping[str, PlacedResult]
     stated: ResultEntry
+    terrain: Terrain
+    grid: Tree
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,24 +101,20 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
     mappings = ("experiments", "holdout", "grid", "frame")
     if not isinstance(given, dict) or not all(isinstance(given.get(key) or {}, dict) for key in mappings):
         return read_site(path)
-    if not (paths := _result_files(folder, given)):
-        return read_site(path)
     try:
-        stated = ResultEntry.model_validate(_entry(given))
+        stated = ResultEntry.model_validate(given.get("result") or {})
     except ValidationError as error:
         problem = error.errors()[0]
         key = dotted(("result", *problem["loc"]))
         raise InputError(
             f"{shown_path(path)}: `{key}` expected {expected_in_words(problem)}, got {problem['input']!r}; correct it."
         ) from None
+    if not (paths := _result_files(folder, given, stated)):
+        return read_site(path)
     results = {name: _read(one, one.stat().st_mtime_ns) for name, one in paths.items()}
-    first = next(iter(results.values()))
-    grid = given.get("grid") or {}
     completed = dict(given)
-    if "frame" not in given and not grid.get("centreline"):
-        frame = _frame_of(first)
-        if frame is not None:
-            completed["frame"] = frame
+    if "frame" not in given and not (given.get("grid") or {}).get("centreline"):
+        completed |= _frame_of(next(iter(results.values())))
     completed.setdefault("bed", {"file": next(iter(paths.values())).name})
     experiments = {name: dict((given.get("experiments") or {}).get(name) or {}) for name in paths}
     experiments = {name: one for name, one in experiments.items() if name not in (given.get("holdout") or {})}
@@ -131,7 +129,7 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
     placed = {name: _placed(paths[name], one, place, stated) for name, one in results.items()}
     terrain = _terrain(next(iter(placed.values())))
     tree = grid_of_terrain(next(iter(paths.values())), terrain, site.grid, place)
-    of_grid = _cells(tree, place)
+    of_grid = grid_of_keys(tree, place)
     for flows in (experiments, held):
         for name, one in flows.items():
             discharge, level = _boundary(paths[name], placed[name].flow, of_grid, place.line is None)
@@ -140,7 +138,7 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
             if not {"level", "downstream_level_m"} & one.keys():
                 one["level"] = level
     site = read_site(path, completed | {"experiments": experiments, "holdout": held})
-    return SiteOfResult(site, paths, placed, stated)
+    return SiteOfResult(site, place, paths, placed, stated, terrain, tree)
 
 
 def placement_of(folder: Path, site: FieldSite) -> Placement:
@@ -151,51 +149,40 @@ def placement_of(folder: Path, site: FieldSite) -> Placement:
     return Placement(frame, drawn.line if drawn is not None else None)
 
 
-def ground_of_result(target: Path, found: SiteOfResult, place: Placement) -> GroundOfResult:
+def ground_of_result(target: Path, found: SiteOfResult) -> GroundOfResult:
     """Grid, bed and friction of the first result, and the flows of all, to be written beside the config."""
     name, placed = next(iter(found.placed.items()))
-    path = found.paths[name]
-    terrain = _terrain(placed)
-    tree = grid_of_terrain(path, terrain, found.site.grid, place)
-    friction, parameters, values, texts, words = _friction(path, target, placed, tree, place, found)
+    friction, parameters, values, texts, words = _friction(target, placed, found)
     imported: list[Tree] = []
     files: dict[str, str] = {}
     for experiment, one in found.placed.items():
         file = f"flow-{case_name(experiment)}.csv"
-        texts[data_folder(target) / file] = text_of_flow(_near(one.flow, tree))
+        texts[data_folder(target) / file] = text_of_flow(_near(one.flow, found.grid))
         files[experiment] = f"{data_folder(target).name}/{file}"
         taken = f"flow of {one.result.code}" + (f" at {one.result.time}" if one.result.time else "")
         taken += f": {so_many(len(one.flow.x), 'place')}, {int((one.flow.depth > 0).sum())} wet"
         flow = {**found.site.experiments, **found.site.holdout}[experiment]
         taken += f", {in_digits(flow.discharge_m3_s)} m3/s, outlet level {in_digits(flow.downstream_level_m, 4)} m"
         notes = [taken, *one.result.notes] + ([words] if experiment == name else [])
-        imported.append({"name": found.paths[experiment].name, "sha256": _digest(found.paths[experiment]),
-                         "taken": "; ".join(notes)})  # fmt: skip
-    ground = ground_on_grid(target, terrain, tree, friction, place)
-    ground = Ground(ground.tree, imported, {**ground.texts, **texts}, terrain.level)
+        imported.append(record(found.paths[experiment], None, "; ".join(notes)))
+    ground = ground_on_grid(target, found.terrain, found.grid, friction, found.place)
+    ground = Ground(ground.tree, imported, {**ground.texts, **texts}, ground.level)
     key = {"code": placed.result.code, "files": files, "parameters": values | dict(found.stated.parameters)}
     return GroundOfResult(ground, parameters, key)
 
 
-def _entry(given: Mapping[str, Any]) -> Any:
-    """`result` of a site file in its long form."""
-    entry = given.get("result")
-    return {"file": entry} if isinstance(entry, str) else entry or {}
-
-
-def _result_files(folder: Path, given: Mapping[str, Any]) -> dict[str, Path]:
+def _result_files(folder: Path, given: Mapping[str, Any], stated: ResultEntry) -> dict[str, Path]:
     """The result file of each experiment; none if the folder holds none."""
-    path, entry = site_file(folder), _entry(given)
+    path = site_file(folder)
     experiments = [*(given.get("experiments") or {}), *(given.get("holdout") or {})]
-    if isinstance(entry, dict) and isinstance(entry.get("files"), dict):
-        named = {str(name): folder / str(file) for name, file in entry["files"].items()}
+    if stated.files:
+        named = {name: folder / file for name, file in stated.files.items()}
         if missing := [name for name in experiments if name not in named]:
             raise InputError(
                 f"{shown_path(path)}: `result.files` expected the result of {missing[0]}, got none; add it."
             )
     else:
-        file = entry.get("file") if isinstance(entry, dict) else None
-        there = [folder / str(file)] if file else sorted(one for one in folder.iterdir() if holds_result(one))
+        there = [folder / stated.file] if stated.file else sorted(one for one in folder.iterdir() if holds_result(one))
         if not there:
             return {}
         if len(there) > 1:
@@ -220,8 +207,8 @@ def _read(path: Path, changed: int) -> ModelResult:
     return read_result(path)
 
 
-def _frame_of(result: ModelResult) -> Tree | None:
-    """The frame along the mesh: x downstream from its upper end, y = 0 in its middle; None if it lies so already."""
+def _frame_of(result: ModelResult) -> Tree:
+    """`frame` along the mesh: x downstream from its upper end, y = 0 in its middle; empty if it lies so already."""
     wet = result.wet
     flow = np.array([(result.depth * result.u)[wet].sum(), (result.depth * result.v)[wet].sum()])
     middle = result.corners - result.corners.mean(axis=0)
@@ -231,12 +218,12 @@ def _frame_of(result: ModelResult) -> Tree | None:
         axis = flow / np.hypot(*flow)
     angle = math.degrees(math.atan2(axis[1], axis[0]))
     if abs(angle) < ALONG_ALREADY and not result.crs:
-        return None
+        return {}
     across = np.array([-axis[1], axis[0]])
     along_all, across_all = result.corners @ axis, result.corners @ across
     origin = along_all.min() * axis + 0.5 * (across_all.min() + across_all.max()) * across
     frame: Tree = {"origin": [round(float(one), 3) for one in origin], "angle": round(angle, 4)}
-    return frame | ({"crs": result.crs} if result.crs.upper().startswith("EPSG:") else {})
+    return {"frame": frame | ({"crs": result.crs} if result.crs.upper().startswith("EPSG:") else {})}
 
 
 def _placed(path: Path, result: ModelResult, place: Placement, stated: ResultEntry) -> PlacedResult:
@@ -270,13 +257,6 @@ def _terrain(placed: PlacedResult) -> Terrain:
     return Terrain(lambda x, y: np.asarray(surface(x, y)), extent, f"bed of {placed.result.code}")
 
 
-def _cells(tree: Tree, place: Placement) -> Grid:
-    """The grid of its keys."""
-    (west, east), (south, north), (dx, dy) = tree["x"], tree["y"], tree["cell"]
-    x, y = centres(west, dx, round((east - west) / dx)), centres(south, dy, round((north - south) / dy))
-    return Grid(x, y, dx, dy, place.line)
-
-
 def _boundary(path: Path, flow: TheirFlow, grid: Grid, straight: bool) -> tuple[float, float]:
     """Discharge [m3/s], the median along the channel, and level [m], the mean at the outlet. Raises InputError for a
     flow that is not along the grid, or whose discharge changes along it.
@@ -305,7 +285,7 @@ def _boundary(path: Path, flow: TheirFlow, grid: Grid, straight: bool) -> tuple[
 
 
 def _friction(
-    path: Path, target: Path, placed: PlacedResult, grid: Tree, place: Placement, found: SiteOfResult
+    target: Path, placed: PlacedResult, found: SiteOfResult
 ) -> tuple[Tree, Tree, dict[str, float], dict[Path, str], str]:
     """Friction of the case, priors, values of the run, a raster of classes, and words: one class, or some by value."""
     flow, manning = placed.flow, placed.manning
@@ -316,7 +296,7 @@ def _friction(
     low, high = min(0.01, 0.5 * typical), max(0.2, 2.0 * typical)
     one_class = {"classes": {"bed": MANNING_BED}, "default": "bed"}
     words = f"n {in_digits(typical)} s m^(-1/3)"
-    if np.ptp(values) <= ONE_CLASS * typical or place.line is not None or found.stated.manning is not None:
+    if np.ptp(values) <= ONE_CLASS * typical or found.place.line is not None or found.stated.manning is not None:
         if np.ptp(values) > ONE_CLASS * typical:
             words += f", the median of {in_digits(values.min())} to {in_digits(values.max())}"
         return one_class, {"n_b": bed_prior(low, high)}, {"n_b": typical}, {}, words
@@ -331,17 +311,14 @@ def _friction(
         means = [round(float(np.exp(rest[of_bin == k].mean())), 5) for k in np.unique(of_bin)]
         groups = sorted({*own.tolist(), *means})
     number = {value: k for k, value in enumerate(groups, 1)}
-    size = float(min(grid["cell"]))
-    (west, east), (south, north) = grid["x"], grid["y"]
+    size = float(min(found.grid["cell"]))
+    (west, east), (south, north) = found.grid["x"], found.grid["y"]
     x = centres(west, size, math.ceil((east - west) / size))
     y = centres(south, size, math.ceil((north - south) / size))
     at_x, at_y = (part.ravel() for part in np.meshgrid(x, y, indexing="ij"))
     nearest = flow.nearest(at_x, at_y, np.isfinite(manning))
     there = np.abs(np.log(manning[np.isfinite(manning)][nearest][:, None] / np.array(groups))).argmin(axis=1) + 1
-    head = {"ncols": x.size, "nrows": y.size, "xllcorner": x[0] - 0.5 * size, "yllcorner": y[0] - 0.5 * size,
-            "cellsize": size, "nodata_value": -9999}  # fmt: skip
-    rows = [" ".join(map(str, row)) for row in there.reshape(x.size, y.size).T[::-1].tolist()]
-    text = "\n".join([f"{key} {float(one):.12g}" for key, one in head.items()] + rows) + "\n"
+    text = ascii_grid(x, y, size, there.reshape(x.size, y.size), 0)
     names = {value: f"n{k}" for value, k in number.items()}
     shares = np.bincount(np.abs(np.log(values[:, None] / np.array(groups))).argmin(axis=1), minlength=len(groups))
     main = groups[int(shares.argmax())]
@@ -363,13 +340,8 @@ def _friction(
     words = f"{len(groups)} classes of n, {in_digits(groups[0])} to {in_digits(groups[-1])} s m^(-1/3)"
     if len(distinct) > len(groups):
         words += f", of {len(distinct)} values"
-    return (
-        friction,
-        priors,
-        {parameter[value]: value for value in groups},
-        {data_folder(target) / "classes.asc": text},
-        words,
-    )
+    of_run = {parameter[value]: value for value in groups}
+    return friction, priors, of_run, {data_folder(target) / "classes.asc": text}, words
 
 
 def _near(flow: TheirFlow, grid: Tree) -> TheirFlow:
@@ -377,8 +349,3 @@ def _near(flow: TheirFlow, grid: Tree) -> TheirFlow:
     (west, east), (south, north), beside = grid["x"], grid["y"], 2.0 * flow.spacing
     near = (flow.x > west - beside) & (flow.x < east + beside) & (flow.y > south - beside) & (flow.y < north + beside)
     return TheirFlow(*(one[near] for one in (flow.x, flow.y, flow.bed, flow.depth, flow.u, flow.v)))
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

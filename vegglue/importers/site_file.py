@@ -212,6 +212,11 @@ class ResultEntry(_SitePart):
     manning: Annotated[Number, Field(ge=0.001, le=1.0)] | None = None
     parameters: dict[str, Number] = {}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _of_one_file(cls, given: Any) -> Any:
+        return {"file": given} if isinstance(given, str) else given
+
 
 class FieldSite(_SitePart):
     """All that a site file states; SI."""
@@ -221,9 +226,7 @@ class FieldSite(_SitePart):
     grid: SiteGrid | None = None
     frame: SiteFrame | None = None
     classes: FileOfSite | None = None
-    result: Annotated[
-        ResultEntry | None, BeforeValidator(lambda one: {"file": one} if isinstance(one, str) else one)
-    ] = None
+    result: ResultEntry | None = None
     walls: Annotated[FlumeWalls | None, BeforeValidator(_walled)] = None
     files: dict[PrintableName, dict[str, Any] | None] = {}
     experiments: Annotated[dict[PrintableName, MeasuredFlow], AfterValidator(_one_or_more)]

@@ -143,14 +143,12 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
     friction, imported = mapped_classes(folder, site, place)
     steeper = slope_of_banks(site)
     if steeper is not None and site.channel is not None and BANK not in friction["classes"]:
-        (west, east), (south, north), (dx, dy) = grid["x"], grid["y"], grid["cell"]
-        along, across = centres(west, dx, round((east - west) / dx)), centres(south, dy, round((north - south) / dy))
-        cells = Grid(along, across, dx, dy, place.line)
-        at = (part.ravel() for part in np.meshgrid(along, across, indexing="ij"))
-        level = filled(terrain, *at).reshape(along.size, across.size)
+        cells = grid_of_keys(grid, place)
+        at = (part.ravel() for part in np.meshgrid(cells.x, cells.y, indexing="ij"))
+        level = filled(terrain, *at).reshape(cells.x.size, cells.y.size)
         banks = beyond_slope_break(slope(level, cells) > steeper, level)
         if banks.any():
-            floor = float(np.mean((~banks).sum(axis=1)) * dy)
+            floor = float(np.mean((~banks).sum(axis=1)) * cells.dy)
             friction = with_banks(friction, steeper)
             taken += (
                 f"; banks lie beyond a slope of {steeper:g}, half the stated one, and leave a floor of "
@@ -246,6 +244,21 @@ def grid_of_terrain(path: Path, terrain: Terrain, asked: SiteGrid | None, place:
     return {"x": x, "y": y, "cell": cell}
 
 
+def grid_of_keys(tree: Mapping[str, Any], place: Placement) -> Grid:
+    """The cells of the keys x, y and cell of a grid."""
+    (west, east), (south, north), (dx, dy) = tree["x"], tree["y"], tree["cell"]
+    x, y = centres(west, dx, round((east - west) / dx)), centres(south, dy, round((north - south) / dy))
+    return Grid(x, y, dx, dy, place.line)
+
+
+def ascii_grid(x: Array, y: Array, size: float, values: Array, digits: int) -> str:
+    """An ESRI ASCII grid of squares of this size around x (nx,) and y (ny,) [m], with the values (nx, ny)."""
+    head = {"ncols": x.size, "nrows": y.size, "xllcorner": x[0] - 0.5 * size, "yllcorner": y[0] - 0.5 * size}
+    head |= {"cellsize": size, "nodata_value": MARK_OF_NO_LEVEL}
+    rows = [" ".join(f"{value:.{digits}f}" for value in row) for row in values.T[::-1].tolist()]
+    return "\n".join([f"{key} {float(value):.12g}" for key, value in head.items()] + rows) + "\n"
+
+
 def _bed_text(terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> tuple[str, float]:
     """Levels on squares as small as the cells of the grid, and the share of the grid without a known level."""
     size = float(min(grid["cell"]))
@@ -256,10 +269,7 @@ def _bed_text(terrain: Terrain, grid: Mapping[str, Any], place: Placement) -> tu
     level = filled(terrain, at_x, at_y)
     inside = (at_x > west) & (at_x < east) & (at_y > south) & (at_y < north)
     if place.line is None:
-        head = {"ncols": x.size, "nrows": y.size, "xllcorner": x[0] - 0.5 * size, "yllcorner": y[0] - 0.5 * size}
-        head |= {"cellsize": size, "nodata_value": MARK_OF_NO_LEVEL}
-        rows = [" ".join(f"{value:.4f}" for value in row) for row in level.reshape(x.size, y.size).T[::-1]]
-        text = "\n".join([f"{key} {float(value):.12g}" for key, value in head.items()] + rows) + "\n"
+        text = ascii_grid(x, y, size, level.reshape(x.size, y.size), 4)
     else:
         points = np.column_stack([*place.to_case(at_x, at_y), level])
         text = "x,y,z\n" + "".join(f"{at[0]:.4f},{at[1]:.4f},{at[2]:.4f}\n" for at in points.tolist())
