@@ -1,7 +1,6 @@
 """What files mark as no measurement is none: marks of every format, rows of summaries, flags, zeros, and copies."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -459,8 +458,8 @@ USGS\t01\t2020-01-01 00:30\tEST\t12.0\tP
 def test_a_table_of_a_gauging_office_has_a_row_of_types_and_words_for_no_value(tmp_path: Path, mark: str) -> None:
     path = tmp_path / "gauge.txt"
     path.write_text(RDB.format(mark=mark), encoding="utf-8")
-    options = FileOptions(columns={"discharge": "1_00060"}, units={"discharge": "cfs"}, x=3.0)
-    values = read_rows(path, replace(options, x=None)).numbers["discharge"] / 0.3048**3
+    options = FileOptions(columns={"discharge": "1_00060"}, units={"discharge": "cfs"})
+    values = read_rows(path, options).numbers["discharge"] / 0.3048**3
     assert values == pytest.approx([10.0, np.nan, 12.0], nan_ok=True)
 
 

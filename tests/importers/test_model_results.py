@@ -114,10 +114,6 @@ def test_another_file(tmp_path: Path) -> None:
         read_result(path)
 
 
-def own_library(name: str):
-    return pytest.importorskip(name)
-
-
 @pytest.mark.filterwarnings("ignore::UserWarning:xugrid")  # of xugrid, on axes without one
 @pytest.mark.parametrize("code", ["selafin", "ugrid"])
 def test_values_of_the_format_s_own_library(tmp_path: Path, code: str) -> None:
@@ -125,15 +121,15 @@ def test_values_of_the_format_s_own_library(tmp_path: Path, code: str) -> None:
     flow = a_flow()
     points = np.random.default_rng(1).choice(60, 10, replace=False)
     if code == "selafin":
-        own_library("xarray_selafin")
-        xarray = own_library("xarray")
+        pytest.importorskip("xarray_selafin")
+        xarray = pytest.importorskip("xarray")
         path = tmp_path / "reach.slf"
         write_selafin(path, flow)
         with xarray.open_dataset(path, engine="selafin") as data:
             theirs = {"depth": data["H"][-1], "u": data["U"][-1], "v": data["V"][-1]}
             theirs = {key: np.asarray(one)[points] for key, one in theirs.items()}
     else:
-        xugrid = own_library("xugrid")
+        xugrid = pytest.importorskip("xugrid")
         path = tmp_path / "reach_map.nc"
         write_flow_fm(path, flow)
         data = xugrid.open_dataset(path)

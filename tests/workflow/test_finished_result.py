@@ -149,6 +149,27 @@ def test_what_import_refuses(tmp_path: Path) -> None:
         imported(folder_with(tmp_path / "e", uniform(), site={"result": {"law": "darcy"}}))
 
 
+def test_each_experiment_has_its_result(tmp_path: Path) -> None:
+    """Also the one that is held out; discharges are those of the runs, bed and frame those of the first."""
+    speeds = {"high": 1.2, "late": 1.1, "low": 1.0}
+    site = {
+        "result": {"files": {name: f"{name}.p01.hdf" for name in speeds}},
+        "experiments": {"low": {}, "high": {}}, "holdout": {"late": {}},
+    }  # fmt: skip
+    folder = folder_with(tmp_path / "reach", uniform(), name="low.p01.hdf", site=site)
+    for name, factor in speeds.items():
+        write_hec_ras(folder / f"{name}.p01.hdf", uniform(speed=factor * SPEED))
+    table = pd.read_csv(folder / "velocities.csv")
+    pd.concat([table.assign(experiment=name) for name in ("low", "high")]).to_csv(folder / "velocities.csv")
+    table.assign(experiment="late").to_csv(folder / "holdout.csv")
+    case = imported(folder)
+    flows = case.experiments | case.validation.experiments
+    for name, factor in speeds.items():
+        assert flows[name].discharge["upstream"] == pytest.approx(factor * SPEED * DEPTH * WIDTH, rel=0.02)
+        u = read_their_flow(case.finished_result.files[name]).at(np.array([12.0]), np.array([0.3]))["u"]
+        assert u == pytest.approx(factor * SPEED, abs=1e-3)
+
+
 def test_a_damaged_result_is_refused_or_read(tmp_path: Path) -> None:
     path = tmp_path / "reach.p01.hdf"
     write_hec_ras(path, uniform())
