@@ -21,10 +21,10 @@ def compiled(loop: Callable[..., Any]) -> Any:
 
 
 def compiled_within(loop: Callable[..., Any]) -> Any:
-    """As `compiled`, of a loop that others call: it becomes part of each.
+    """As `compiled`, of a loop that others call: it is inlined in each.
 
-    Machine code of its own would be used by these in the process that compiles them, and code within them by those that
-    read them from the cache: products fuse otherwise in one than in the other, and the last digits differ.
+    Otherwise it is called in the process that compiles, and inlined in those that read the cache. Products then fuse
+    differently, and last digits differ.
     """
     return _cached(loop, fastmath={"contract", "nsz"}, forceinline=True)
 

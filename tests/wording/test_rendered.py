@@ -410,7 +410,7 @@ RENDERED: dict[str, Callable[[], str]] = {
     "notes": lambda: wrapped(NOTES),
     "posterior": posterior,
     "statements": lambda: wrapped(STATEMENTS),
-    "answer": lambda: wrapped([*TOP, *STEPS]),
+    "answer": lambda: "\n".join([wrapped([*TOP, *STEPS]), str(phrase("error_before", TOP[3]))]),
     "findings": lambda: wrapped(FINDINGS),
     "ladder": ladder,
     "questions": lambda: printed(lambda: (show_questions("brook", QUESTIONS), show_questions("brook", []))[0]),

@@ -80,8 +80,6 @@ SMALL_CHANGE: dict[Term, float] = {
     "friction": 1e-3, "drag": 1e-5, "bed": 1e-4, "inflow": 1e-6, "viscosity": 1e-4, "mixing": 1e-2,
     "advection": 1e-3,
 }  # fmt: skip
-
-
 # Sites on half as many cells each way, by the site on its own.
 _ON_COARSER_CELLS: WeakKeyDictionary[Site, Site | None] = WeakKeyDictionary()
 
@@ -168,7 +166,7 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
         else:
             hopeful = True
     if flow is None:
-        coarse = None if hopeful else _from_coarser_cells(model, experiment, z)
+        coarse = None if hopeful else _from_coarser_cells(model, experiment, z, problem)
         for beginning in [warm] if coarse is None else [coarse, warm]:
             solution, own, band = settled(problem, beginning, tolerance)
             if own is not None:
@@ -179,18 +177,19 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
     return flow, _read(model, experiment, problem, flow.state, flow.band)[0]
 
 
-def _from_coarser_cells(model: Model, experiment: str, z: Array) -> Array | None:
+def _from_coarser_cells(model: Model, experiment: str, z: Array, problem: Problem) -> Array | None:
     """A start (nx, 3, ny, 1) on a wide grid: the flow on cells of about twice the size, and so on to narrow ones; None
     if the grid is narrow, or no flow is found there.
     """
-    problem = problem_at(model, experiment, z)
+    if problem.shape[1] < WIDE_FROM:
+        return None
     south, north = wet_band(problem, backwater(problem))
     site = _site_on_coarser_cells(model) if north - south >= WIDE_FROM else None
     if site is None:
         return None
     coarse = replace(model, case=on_cells(model.case, (site.grid.dx, site.grid.dy)), site=site)
-    there, start = problem_at(coarse, experiment, z), _from_coarser_cells(coarse, experiment, z)
-    solution, own, band = settled(there, start, ROUGH)
+    there = problem_at(coarse, experiment, z)
+    solution, own, band = settled(there, _from_coarser_cells(coarse, experiment, z, there), ROUGH)
     return None if own is None else between_cells(widen(solution.state, there.shape[1], band), problem.shape)
 
 

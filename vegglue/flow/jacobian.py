@@ -272,13 +272,12 @@ def jacobian(problem: Problem, state: Array) -> BlockJacobian | SparseJacobian:
         collect(values, far, base, rates, group, COLOUR_STEP)
     sharings = [sharing_at(problem, state, inflow) for inflow in shared_inflows(problem)]
     if wide:
-        slopes = np.zeros((nx, 3, ny, len(sharings)), np.float32)
+        answers, slopes = np.zeros((2, nx, 3, ny, len(sharings)), np.float32)
         for n, one in enumerate(sharings):
+            answers[..., n] = one.answer
             slopes[one.column, LEVEL, one.row, n] = one.slope
-        answers = [one.answer.reshape(nx, 3 * ny) for one in sharings] or [np.zeros((nx, 3 * ny))]
         shape = (nx, 3 * ny, len(sharings))
-        stacked = np.stack(answers, axis=2)[:, :, : len(sharings)].astype(np.float32)
-        return SparseJacobian(values, far, stacked, slopes.reshape(shape))
+        return SparseJacobian(values, far, answers.reshape(shape), slopes.reshape(shape))
     # - dR/d ln Q (d ln W/dx)' of inflows shared by depth. All of it is there for an inflow from the west; through a
     # side, what blocks cannot hold is put down to levels that they can.
     for one in sharings:

@@ -422,10 +422,9 @@ def _factors_of(values: Single, far: Single, by_blocks: bool) -> tuple[Single, .
             to = np.arange(max(b - ROWS_REACH, 0), min(ny + b - ROWS_REACH, ny))
             row = to - b + ROWS_REACH
             columns[:, :, :, row, :, to] = values[:, row, :, b]
-        columns = columns.reshape(nx, 3, 3 * ny, 3 * ny)
-        of_blocks = far.swapaxes(1, 2).reshape(nx, 3 * ny)
-        block_elimination.factor(columns, of_blocks)
-        return columns, of_blocks
+        blocks = columns.reshape(nx, 3, 3 * ny, 3 * ny), far.swapaxes(1, 2).reshape(nx, 3 * ny)
+        block_elimination.factor(*blocks)
+        return blocks
     parts = dissection(nx, ny)
     inverse, lower, upper = (np.empty(start[-1], np.float32) for start in parts.memory_start)
     factor_parts(
