@@ -83,7 +83,7 @@ def answer(record: Record) -> tuple[Any, ...]:
 
 
 def table(records: Sequence[Record]) -> str:
-    """One row for each constant: value, unit, provenance, and the cases whose verdict is another at half and twice."""
+    """One row for each constant that was run, with the cases whose verdict is another at half and twice of it."""
     of = {(one["case"], one["constant"], one["factor"]): one for one in records}
     as_is = {case: one for (case, constant, _), one in of.items() if constant == AS_IS}
 
@@ -98,16 +98,17 @@ def table(records: Sequence[Record]) -> str:
         ]  # fmt: skip
         return f"{len(other)} of {len(found)}" + (f": {', '.join(other)}" if other else "")
 
-    rows = [
-        "| constant | value | provenance | what it is | other verdicts at half | at twice |",
-        "|---|---|---|---|---|---|",
-    ]
+    rows = ["| constant | value | provenance | other verdicts at half | at twice |", "|---|---|---|---|---|"]
+    run = {constant for _, constant, _ in of}
     for one in _in_order(described()):
+        if one.name not in run:
+            continue
         unit = "" if one.unit == "-" else f" {one.unit}"
         half, twice = (changes(one.name, factor) for factor in FACTORS)
         name = f"**`{one.name}`**" if one.name in FIRST else f"`{one.name}`"
-        rows.append(f"| {name} | {one.value:g}{unit} | {one.provenance.value} | {one.basis} | {half} | {twice} |")
-    return "\n".join(rows)
+        rows.append(f"| {name} | {one.value:g}{unit} | {one.provenance.value} | {half} | {twice} |")
+    left = ", ".join(f"`{one.name}`" for one in _in_order(described()) if one.name not in run)
+    return "\n".join([*rows, "", f"Not run: {left or 'none'}."])
 
 
 def _in_order(constants: Sequence[Described]) -> list[Described]:
