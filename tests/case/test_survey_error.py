@@ -230,12 +230,3 @@ def test_a_line_that_was_levelled_wrongly_is_that_line() -> None:
         np.mean(mean_level(one, [SMOOTH], there) - survey.points[rows, 2]) for one in (replace(loose, loose=()), loose)
     )
     assert abs(after) < 0.5 * abs(before)
-
-
-def test_a_bed_without_error_between_its_lines_is_left_out_with_none() -> None:
-    places, line = lines(6.0)
-    straight = np.where((places[:, 0] > 0.0) & (places[:, 0] < 72.0), 0.0, np.nan)
-    survey = BedSurvey(np.column_stack([places, 0.3 - 0.002 * places[:, 0]]), line)
-    found = lines_left_out(survey, fitted_covariances(survey), straight)
-    assert found.error < 1e-6
-    assert found.most < 1.0

@@ -253,6 +253,13 @@ def test_a_survey_of_sections_states_the_error_of_its_bed(tmp_path: Path) -> Non
     assert plain.survey is None
 
 
+def test_a_bed_by_design_has_no_error_between_its_lines(tmp_path: Path) -> None:
+    rows = [f"P{x},{x},{y},{0.3 - 0.002 * x + 0.02 * y**2:.5f}" for x in range(0, 49, 8) for y in range(-5, 6)]
+    bed, site = "\n".join(["section,x,y,z", *rows]), "bed: {file: s.csv, sections: true}\n" + JUNE
+    case = import_of(tmp_path, site, s__csv=bed, u__csv="x,y,u\n12,0,0.5\n").case
+    assert case.bed[0].survey is None
+
+
 @pytest.mark.parametrize(("names", "spread"), [(True, 0.2), (True, 0.0), (False, 0.0)])
 def test_sections_of_a_flume_stay_apart(tmp_path: Path, names: bool, spread: float) -> None:
     """Sections within a metre of one another were made one, and the slope between them was lost."""
