@@ -264,8 +264,8 @@ kept.
 
 ## What other people's files hold
 
-Each row is either read rightly, with a remark of `import` that counts what was left out, or refused with code 2 and
-nothing written. Tests are in `tests/importers/` if no folder is given.
+Such a file is read, and `import` counts what it leaves out; or it is refused with exit code 2, and nothing is written.
+Tests are in `tests/importers/` if no folder is given.
 
 | kind | what is done | test |
 |---|---|---|

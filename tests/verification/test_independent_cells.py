@@ -71,7 +71,7 @@ def test_data_with_a_mixing_length_are_those_of_their_cells() -> None:
     """Root mean square at the depth that suits each best: measured 0.0023 m/s on the data's cells, 0.0178 on cells of a
     fifteenth, 0.0024 on those without the strip.
     """
-    answer, place = (json.loads((FOLDER / name).read_text()) for name in ("answer.json", "site.json"))
+    answer, place = (json.loads((FOLDER / name).read_text("utf-8")) for name in ("answer.json", "site.json"))
     station = pd.read_csv(FOLDER / "holdout.csv")
     station = station[station["x"] == 36.0]
     data = station["u"].groupby(station["y"].abs()).mean()  # what is marched is the same on both sides

@@ -45,7 +45,7 @@ def patch_cells(x, y, patches):
 @cache
 def with_the_truth(folder, finer, smallest):
     """The fourth flow of a case with its true parameters, on the paper's cells or on those of half the size (2)."""
-    place, answer = (json.loads((folder / name).read_text()) for name in ("site.json", "answer.json"))
+    place, answer = (json.loads((folder / name).read_text("utf-8")) for name in ("site.json", "answer.json"))
     truth, run = answer["truth"], place["holdout"]["hold"]
     cells, size = (200 * finer, 24 * finer), (CELL[0] / finer, CELL[1] / finer)
     grid = Grid(centres(100.0, cells[0]), centres(9.0, cells[1]) - 4.5, *size)

@@ -21,7 +21,7 @@ CELL, FINE = (0.5, 0.1875), (0.125, 0.046875)
 
 def moved_case(folder: Path, moved: tuple[float, float], cell: tuple[float, float]) -> Case:
     """The twin's channel on other cells, its patches moved along and across [m]."""
-    tree = yaml.safe_load(CONFIG.read_text())
+    tree = yaml.safe_load(CONFIG.read_text("utf-8"))
     tree["grid"]["cell"] = list(cell)
     for one in tree["observations"]:
         one["file"] = str(CONFIG.parent / one["file"])
