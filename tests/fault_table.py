@@ -269,7 +269,7 @@ Tests are in `tests/importers/` if no folder is given.
 
 | kind | what is done | test |
 |---|---|---|
-| any field marked as missing, in every format | as without its row or cell, a remark, or a refusal | `test_any_field_missing.py` |
+| any field marked as missing, in every format | read as without its row or cell, or refused | `test_any_field_missing.py` |
 | lost bottom track, ranges or ensembles of a boat | the ensemble has no place and is left out; a leap of the boat is refused | `test_marks_of_no_value.py` |
 | raw ensembles with a wrong check sum or size, or cut short; cells of two sizes; a lost beam of four | the ensemble alone is left out; each cell keeps its place; three beams do if the file allows it | `test_any_field_missing.py` |
 | velocities against the boat (reference NONE) | refused | `test_marks_of_no_value.py` |
@@ -281,7 +281,7 @@ Tests are in `tests/importers/` if no folder is given.
 | rows of means and totals, flagged or hidden rows, a second copy | left out; a copy is refused | `test_marks_of_no_value.py` |
 | words of gauging offices (Ice, Eqp), a row of types, -999999, 3.7D-01 | no value; read | `test_marks_of_no_value.py` |
 | marks in flows of the site file, stems and corners | refused | `test_any_field_missing.py` |
-| damaged MATLAB files and files that unpack to much | read by a process of its own; refused | `test_files_of_strangers.py` |
+| damaged MATLAB files, and files that unpack to more than 100 MB | read by a process of its own; refused | `test_files_of_strangers.py` |
 | a mesh for map programs | vectors, system and numbers as GDAL, xugrid and QGIS read them | `tests/workflow/test_export.py` |
 | results beside ArviZ 0.x and 1.x | both open them | `tests/workflow/` |
 | no worker of a cluster lives for 30 s | code 3; finished chunks are kept | `tests/test_cluster.py` |

@@ -75,7 +75,7 @@ BED_FILES = (("raster", "bed.asc"), ("points", "bed.csv"))
 MOST_LEFT_OUT = 100
 # Standard deviation of a bed around its mean cross-section [m] below which it is a design and has no error of a survey.
 # Chosen: no staff is read to it.
-LEAST_ERROR = 1e-4
+LEAST_BED_ERROR = 1e-4
 BANK = "bank"
 TAKEN_NAMES = ("n_b", "n_w")  # parameters of the bed and of walls
 BANK_CLASS = {"law": "keulegan", "k_s": "k_s"}
@@ -388,7 +388,7 @@ def _between_points(terrain: Terrain, survey: BedSurvey, without: Callable[[NDAr
         return terrain
     try:
         covariances = tuple(fitted_covariances(survey))
-        if max(one.sd for one in covariances) < LEAST_ERROR:
+        if max(one.sd for one in covariances) < LEAST_BED_ERROR:
             return terrain
         left_out = lines_left_out(survey, covariances, straight)
         survey = with_wrong_line_loose(survey, covariances)

@@ -83,12 +83,12 @@ def simulate(
     if not is_simulated(run):
         share_one_beside(run)
     if not is_up_to_date(run):
-        solve_members(run, path)
+        compute_members(run, path)
     remove_left_over_fields(path)
     return read_ensemble(path)
 
 
-def solve_members(run: CaseRun, path: Path, given: PriorSample | None = None) -> None:
+def compute_members(run: CaseRun, path: Path, given: PriorSample | None = None) -> None:
     """Solve the members of a case, or the given ones, or run its command for each, into a file."""
     if run.case.engine is None:
         solve_ensemble(run.case, run.observations, path, run.jobs, run.watch, run.site, given)
@@ -104,7 +104,7 @@ def simulate_given(run: CaseRun, file: Path) -> Ensemble:
     run, given = run.sized(len(next(iter(theta.values())))), sample_of(run.case, theta)
     path = given_folder(run, file) / "ensemble.h5"
     if stored_hash(path) != ensemble_hash(run.case, given):
-        solve_members(run, path, given)
+        compute_members(run, path, given)
     remove_left_over_fields(path)
     found = read_ensemble(path)
     valued = found.station["value"].notna().to_numpy()
