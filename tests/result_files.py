@@ -215,8 +215,11 @@ def write_flow_fm(path: Path, flow: GridFlow, classic: bool = True, ghosts: int 
     _write_netcdf(path, entries, sizes, classic)
 
 
-def write_trim(path: Path, flow: GridFlow, clockwise: bool = False, kfu: bool = True) -> None:
-    """A trim file of Delft3D-4: the grid with a row of dummies on all sides, velocities along grid lines at faces."""
+def write_trim(path: Path, flow: GridFlow, clockwise: bool = False, layers: bool = False) -> None:
+    """A trim file of Delft3D-4: the grid with a row of dummies on all sides, velocities along grid lines at faces.
+
+    layers: two of unequal thickness, the upper one 1.3 times as fast as the mean.
+    """
     nx, ny = flow.bed.shape
     shape = (nx + 2, ny + 2)
 
@@ -232,6 +235,8 @@ def write_trim(path: Path, flow: GridFlow, clockwise: bool = False, kfu: bool = 
     u1[0, 1:-1] = 2.0 * flow.u[0] - u1[1, 1:-1]
     v1[1:-1, 1:-1] = 0.5 * (flow.v + np.hstack([flow.v[:, 1:], 0.0 * flow.v[:, -1:]]))
     east = framed(wet, False)
+    speeds = np.array([1.3, 0.8] if layers else [1.0])[:, None, None]  # the mean of 0.4 and 0.6 of the depth is 1
+    thick = {"SIG_INTF": (("interface",), np.array([0.0, -0.4, -1.0]), {})} if layers else {}
     dims = ("M", "N")
     corner_x, corner_y = np.zeros(shape), np.zeros(shape)
     corner_x[:-1, :-1], corner_y[:-1, :-1] = flow.nodes
@@ -241,13 +246,14 @@ def write_trim(path: Path, flow: GridFlow, clockwise: bool = False, kfu: bool = 
         "ALFAS": (dims, framed(-flow.angle if clockwise else flow.angle, 0.0), {}),
         "KCS": (dims, framed(1, 0).astype("i4"), {}), "DPS0": (dims, framed(-flow.bed, -999.0), {}),
         "S1": (("time", *dims), np.stack([framed(0.0, 0.0), framed(flow.bed + flow.depth, 0.0)]), {}),
-        "U1": (("time", "layer", *dims), np.stack([0.0 * u1, u1])[:, None], {}),
-        "V1": (("time", "layer", *dims), np.stack([0.0 * v1, v1])[:, None], {}),
+        "U1": (("time", "layer", *dims), np.stack([0.0 * u1 * speeds, u1 * speeds]), {}),
+        "V1": (("time", "layer", *dims), np.stack([0.0 * v1 * speeds, v1 * speeds]), {}),
         "KFU": (("time", *dims), np.stack([east, east | np.roll(east, -1, 0)]).astype("i4"), {}),
         "KFV": (("time", *dims), np.stack([east, east]).astype("i4"), {}),
         "time": (("time",), np.array([0.0, 60.0]), {"units": b"minutes since 2020-01-01"}),
-    }  # fmt: skip
-    _write_netcdf(path, entries, {"M": shape[0], "N": shape[1], "layer": 1, "time": 2}, True)
+    } | thick  # fmt: skip
+    sizes = {"M": shape[0], "N": shape[1], "layer": len(speeds), "interface": len(speeds) + 1, "time": 2}
+    _write_netcdf(path, entries, sizes, True)
 
 
 def _write_netcdf(path: Path, entries, sizes, classic: bool) -> None:

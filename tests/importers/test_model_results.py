@@ -96,11 +96,13 @@ def test_ghost_cells_of_a_partition(tmp_path: Path) -> None:
     assert read_result(path).x.size == flow.bed.size - 6
 
 
-@pytest.mark.parametrize("clockwise", [False, True])
-def test_trim(tmp_path: Path, clockwise: bool) -> None:
-    """U at a face is the mean of both centres, of a field linear in y: the mean of both faces is the field."""
+@pytest.mark.parametrize(("clockwise", "layers"), [(False, False), (True, False), (False, True)])
+def test_trim(tmp_path: Path, clockwise: bool, layers: bool) -> None:
+    """U at a face is the mean of both centres, of a field linear in y: the mean of both faces is the field. Layers
+    count by their thickness.
+    """
     flow, path = a_flow(), tmp_path / "trim-reach.nc"
-    write_trim(path, flow, clockwise)
+    write_trim(path, flow, clockwise, layers)
     result = read_result(path)
     assert (result.code, result.manning()) == ("Delft3D-4", None)
     compare(replace(result, roughness=np.full(result.x.size, 0.03), roughness_kind="manning"), flow, 6e-4)

@@ -101,11 +101,13 @@ def read_delft3d_trim(path: Path) -> ModelResult:
 
 
 def _of_layers(variables: dict[str, NetcdfVariable], name: str, times: int, shape: tuple[int, ...]) -> Array:
-    """Velocities (M, N), averaged over layers by their share THICK of the depth."""
+    """Velocities (M, N), averaged over layers by their share of the depth: between SIG_INTF, else THICK."""
     found = variables[name].values(times)
     layers = found.reshape(-1, *shape)
     share = np.full(len(layers), 1.0 / len(layers))
-    if "THICK" in variables and variables["THICK"].shape == (len(layers),):
+    if "SIG_INTF" in variables and variables["SIG_INTF"].shape == (len(layers) + 1,):
+        share = np.abs(np.diff(variables["SIG_INTF"].values()))
+    elif "THICK" in variables and variables["THICK"].shape == (len(layers),):
         share = variables["THICK"].values()
     return np.asarray(np.einsum("k,kmn->mn", share, layers))
 
