@@ -21,6 +21,9 @@ class InputError(ValueError):
     def __str__(self) -> str:
         return _in_one_line(super().__str__())
 
+    def _render_traceback_(self) -> list[str]:  # IPython shows these lines in place of a traceback
+        return [f"{type(self).__name__}: {self}"]
+
 
 class StorageError(OSError):
     """The machine refuses: a result could not be written or read, or a process was killed. Says what, why, and what is
@@ -29,6 +32,9 @@ class StorageError(OSError):
 
     def __str__(self) -> str:
         return _in_one_line(super().__str__())
+
+    def _render_traceback_(self) -> list[str]:  # IPython shows these lines in place of a traceback
+        return [f"{type(self).__name__}: {self}"]
 
 
 def shown_path(path: Path) -> str:
