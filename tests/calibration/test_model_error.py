@@ -292,6 +292,20 @@ def test_a_wrong_discharge_is_that_of_one_experiment(flowing: tuple[Model, Point
     assert 0.01 * found == pytest.approx(change(flowing, case), abs=2e-4)
 
 
+def test_what_an_effect_changes_has_no_error_beside_it(
+    flowing: tuple[Model, Point], cells: CellResponses, columns: dict[str, Array]
+) -> None:
+    model, point = flowing
+    known = {
+        "discharge_error": EffectEntry(values={"relative_error": 0.0}, experiments=("mid",)),
+        "patch_density": EffectEntry(values={"excess": 0.0, "patch": 1.0}),
+    }
+    with_them = replace(model, case=model.case.model_copy(update={"effects": known}))
+    for part, position in (("discharge", list(CASE.experiments).index("mid")), ("stems", 0)):
+        found = site_error_columns(with_them, point, ModelError(**{part: 1.0}), cells)
+        assert found == pytest.approx(np.delete(columns[part], position, axis=1), rel=1e-3, abs=1e-5)
+
+
 def test_stems_are_the_friction_of_each_patch(cells: CellResponses, columns: dict[str, Array]) -> None:
     planted = coarse_twin()[0].site.patch >= 0
     everywhere = cells.of["friction"][:, planted].sum(axis=1)

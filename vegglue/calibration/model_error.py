@@ -227,16 +227,26 @@ def _columns_of_shape(model: Model, point: Point, cells: CellResponses, key: str
 
 
 def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: CellResponses) -> Array:
-    """Columns (station, k) with S = columns columns'; cells: how predictions answer to friction and drag."""
+    """Columns (station, k) with S = columns columns'; cells: how predictions answer to friction and drag.
+
+    A discharge, or the stems of a patch, that an effect of the case changes has no error beside it.
+    """
     columns = [np.zeros((len(model.station), 0))]
+    of_discharge, of_stems = set[str](), set[int]()
+    for name, entry in model.case.effects.items():
+        if effect_of(model.case, name).name == "discharge_error":
+            of_discharge |= set(entry.experiments or model.case.experiments)
+        elif effect_of(model.case, name).name == "patch_density":
+            of_stems.add(int(float(entry.values.get("patch", 1.0))) - 1)
     if allowed.probes:
         slope = responses(model, point, [_cause(model.case, "station_shift")])[:, 0]
         columns.append(allowed.probes * np.diag(slope)[:, np.flatnonzero(velocity_rows(model.station))])
     if allowed.discharge:
-        causes = [_cause(model.case, "discharge_error", name) for name in model.case.experiments]
+        stated = [name for name in model.case.experiments if name not in of_discharge]
+        causes = [_cause(model.case, "discharge_error", name) for name in stated]
         columns.append(allowed.discharge * responses(model, point, causes))
     patch = model.site.main_patch
-    for index in np.unique(patch[patch >= 0]) if allowed.stems else ():
+    for index in sorted(set(patch[patch >= 0]) - of_stems) if allowed.stems else ():
         answers = cells.of["friction"][:, patch == index].sum(axis=1)
         for experiment, rows in model.rows.items():
             answers[rows] *= index in patches_present(model.case, experiment)

@@ -134,11 +134,13 @@ class SurveyLeftOut:
 @dataclass(frozen=True)
 class ErrorsAssumed:
     """Errors that an import assumes for a natural reach, as no file states them: of the sides of patches and of the
-    places of verticals across [m].
+    places of verticals across [m], of discharges and of stems [-].
     """
 
     edges: float
     probes: float
+    discharge: float
+    stems: float
 
 
 @dataclass(frozen=True)
@@ -343,8 +345,9 @@ def remarks_on_survey(case: Case) -> Iterator[SurveyLeftOut]:
 
 def remarks_on_assumed_errors(case: Case) -> Iterator[ErrorsAssumed]:
     """What an import of a natural reach assumes of the errors of its site."""
-    if case.model_error.edges or case.model_error.probes:
-        yield ErrorsAssumed(case.model_error.edges, case.model_error.probes)
+    error = case.model_error
+    if any(of_site := (error.edges, error.probes, error.discharge, error.stems)):
+        yield ErrorsAssumed(*of_site)
 
 
 def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[SteepCellsLikeFloor]:
