@@ -80,6 +80,10 @@ class DecisionConstants:
     reading_offset: float = _constant(10.0, "standard errors", CHOSEN, "plausible offset of a single reading")
     probe_offset: float = _constant(5.0, "standard errors", CHOSEN, "plausible offset of a probe, or of its position")
     gauge_offset: float = _constant(10.0, "standard errors", CHOSEN, "plausible offset of a gauge")
+    line_offset: float = _constant(
+        0.2, "m", CHOSEN, "plausible offset of a surveyed line: a staff misread by a decimetre or two; before river-h "
+        "ran with it",
+    )  # fmt: skip
     # Odds and chances.
     known_first_odds: float = _constant(
         5.0, "-", CHOSEN, "odds by which places have to lead what is known; after open-n (4.7) and eight objects of "
@@ -127,6 +131,10 @@ class DecisionConstants:
         3.0, "-", CHOSEN, "largest change halfway between the sections over that at the stations from which `extend` "
         "adds no place (`diagnose` does not use it); after one object of 6.0 among 68 of the blind study, 0.1 to 2.2 "
         "in others",
+    )  # fmt: skip
+    least_bed_error: float = _constant(
+        0.03, "-", CHOSEN, "error of the bed, as a mean over a spot and over the mean depth, below which it is not "
+        "reported: 3 cm in 1 m, as surveys of natural reaches are judged",
     )  # fmt: skip
     held_out_ratio: float = _constant(
         1.3, "-", CHOSEN, "held-out errors over expected ones above which the model disagrees with the data",

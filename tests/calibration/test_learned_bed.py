@@ -2,21 +2,22 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from coarse_twin import coarse_twin
 
 from vegglue.calibration.baseline import baseline, model_that_errs
-from vegglue.calibration.fingerprints import least_depth
-from vegglue.calibration.learned_bed import changed_by, learned_bed, wet_cells
+from vegglue.calibration.learned_bed import bed_of_spots, changed_by, learned_bed
 from vegglue.calibration.model_error import cell_responses, model_error_columns
-from vegglue.case.bed_error import bed_error_columns, without_surveys
+from vegglue.case.bed import read_bed_survey, read_raster
+from vegglue.case.bed_error import bed_error_columns, surveyed_lines, without_surveys
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import ModelError, Planned, PlannedErrors
 from vegglue.case.site_schema import BedLayer, CovarianceOfBed, SurveyOfBed
-from vegglue.case.survey_error import BedSurvey, bed_survey_text
+from vegglue.case.survey_error import BedSurvey, bed_survey_text, line_weights
 from vegglue.diagnosis.next_measurement import surveys
+from vegglue.diagnosis.refits import relevelled
 from vegglue.engine.interface import Model, Point
 
 OF_BED = CovarianceOfBed(chance=1.0, along=4.0, across=1.5, sd=0.05, point_error=0.005)
@@ -92,16 +93,66 @@ def test_bed_and_parameters_are_known_as_in_their_joint_gaussian(surveyed: tuple
     assert found.error.ravel() == pytest.approx(error, rel=1e-3, abs=1e-6)
 
 
-def test_shallow_water_of_a_shallow_site_is_water(
-    surveyed: tuple[Model, Point], monkeypatch: pytest.MonkeyPatch
+def test_a_spot_is_off_by_the_mean_over_it_with_its_error_and_evidence(surveyed: tuple[Model, Point]) -> None:
+    """Of a bed that lies lower over a spot midway between two lines."""
+    model, _ = surveyed
+    before = baseline(model)
+    grid, columns = model.site.grid, bed_error_columns(model.case, model.site.grid)
+    # The bed of largest chance that is 0.1 m lower on average over the spot.
+    x, y, half = 0.5 * (grid.x[0] + 3.0 * grid.x[-1]) / 2.0, 0.0, 1.3
+    places = np.array([[x, y, half, half], [grid.x[0] + 2.0 * grid.dx, y, half, half]]).T
+    weight = np.exp(-(((grid.x[:, None] - x) / half) ** 2) - ((grid.y[None] - y) / half) ** 2).ravel()
+    weight /= weight.sum()
+    at_spot = weight @ columns
+    true = -0.1 * columns @ at_spot / (at_spot @ at_spot)
+    answers = cell_responses(model, before.fitted.point, ("bed",)).of["bed"].reshape(len(model.station), -1) @ true
+    value = before.fitted.point.prediction + answers
+    changed = replace(before, model=replace(model, station=model.station.assign(value=value)), coarse=None)
+    changed = replace(changed, on_coarse=None, noise=replace(before.noise, value=value[before.noise.rows]))
+    found = learned_bed(changed)
+    assert found is not None
+    there, elsewhere = (bed_of_spots(found, *places[:, j : j + 1]) for j in range(2))
+    assert there.before[0] == pytest.approx(np.linalg.norm(at_spot), rel=1e-6)
+    assert there.mean[0] == pytest.approx(float(weight @ found.correction.ravel()), rel=1e-6)
+    own = np.linalg.norm(weight @ found.columns)
+    assert there.error[0] == pytest.approx(np.hypot(own, 0.15 * there.mean[0]), rel=1e-6)
+    ratio = there.mean[0] / there.error[0]
+    assert there.log_factor[0] == pytest.approx(0.5 * ratio**2 - np.log(there.before[0] / there.error[0]))
+    assert there.log_factor[0] > elsewhere.log_factor[0]
+    assert there.mean[0] < 0.0
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.12])
+def test_a_line_levelled_wrongly_is_that_by_flow_and_survey(
+    surveyed: tuple[Model, Point], tmp_path: Path, offset: float
 ) -> None:
-    """The limit was 5 cm, whatever the depth: in a flume of 5 cm of water no cell was wet, and no correction stated."""
-    base, flow = baseline(surveyed[0]), SimpleNamespace(depth=np.array([[0.9, 1.1]]) * least_depth(surveyed[0]))
-    monkeypatch.setattr("vegglue.calibration.learned_bed.flow_at_centres", lambda *_: flow)
-    monkeypatch.setattr("vegglue.calibration.fingerprints.LEAST_DEPTH", 0.01)
-    assert wet_cells(base).tolist() == [[True, True]]
-    monkeypatch.setattr("vegglue.calibration.fingerprints.LEAST_DEPTH", 0.05)
-    assert wet_cells(base).tolist() == [[False, True]]
+    model, _ = surveyed
+    layer = model.case.bed[0]
+    assert layer.survey is not None
+    assert layer.raster is not None
+    read, raster = read_bed_survey(layer.survey.file), read_raster(layer.raster)
+    points, middle = read.points.copy(), read.lines[2]
+    points[middle, 2] += offset
+    (tmp_path / "survey.csv").write_text(bed_survey_text(BedSurvey(points, read.line)), encoding="utf-8")
+    places = np.column_stack([part.ravel() for part in np.meshgrid(raster.x, raster.y, indexing="ij")])
+    raised = offset * line_weights(read, layer.survey.covariances, places)[:, 2].reshape(raster.values.shape)
+    head = layer.raster.read_text(encoding="utf-8").splitlines()[:5]
+    rows = [" ".join(f"{one:.5f}" for one in row) for row in (raster.values + raised).T[::-1]]
+    (tmp_path / "bed.asc").write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    survey = layer.survey.model_copy(update={"file": tmp_path / "survey.csv"})
+    case = model.case.model_copy(update={"bed": (BedLayer(raster=tmp_path / "bed.asc", survey=survey),)})
+    base = baseline(replace(model, case=case, site=build_site(case)))
+    lines = surveyed_lines(case, base.model.site.grid)
+    assert [one.number for one in lines.lines] == [1, 2, 3]  # not the outermost
+    found = relevelled(base, lines.lines[1])
+    assert found is not None
+    assert found.offset == pytest.approx(offset, abs=2.5 * found.error)
+    assert (found.log_factor > 3.0) == (offset > 0.0)
+    # Its level is not used: the bed is that of a survey without the error.
+    loose = found.base.model.case.bed[0].survey
+    assert loose is not None
+    assert loose.loose == (2,)
+    assert np.abs(found.base.model.site.bed - model.site.bed).max() < 0.5 * max(offset, 0.1)
 
 
 def test_a_line_midway_takes_its_share_of_the_error(surveyed: tuple[Model, Point]) -> None:

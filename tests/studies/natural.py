@@ -322,7 +322,7 @@ def judged(hidden: HiddenThing, found: Mapping[str, Any]) -> dict[str, Any]:
     hit = hidden.name in names or (hidden.name == "gauge" and gauge)
     if hidden.name in ("pool", "object", "line", "reeds"):
         on_line = bool(where) and abs(where["x"] - hidden.x) <= NEAR + hidden.half_length
-        levelled = (one for one in found["verdict_value"]["notes"] if one["kind"] == "line_levelled_wrongly")
+        levelled = (one for one in found["instruments"] if one["kind"] == "line")
         reported = any(abs(one["x"] - hidden.x) <= NEAR + hidden.half_length for one in levelled)
         hit = (on_line or reported) if hidden.name == "line" else near
     listed = hidden.name in found["not_excluded"] or any(hidden.name in group for group in found["not_excluded"])

@@ -89,7 +89,7 @@ from vegglue.pages.findings import (
 )
 from vegglue.pages.headline import WorstZone
 from vegglue.pages.parameters import PosteriorVerdict, ResidualCompared
-from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival
+from vegglue.results.causes import CandidateEffect, FaultyInstrument, ModelErrorUsed, Rival
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.fields import FieldsTooLarge
 from vegglue.results.open_questions import HiddenEffect, OneOfRivals, ProposedMeasurement, Question, RivalEffects
@@ -126,7 +126,6 @@ from vegglue.results.verdict import (
     ImplausibleAmplitude,
     InstrumentExcluded,
     LawStandsOut,
-    LineLevelledWrongly,
     MeasuredStretch,
     MisfitBeyondErrors,
     MisfitRemains,
@@ -176,6 +175,8 @@ def doubt(*reasons: object, **verdict: object) -> Diagnosis:
     return brook(kind="cannot-tell", **({"effects": ()} | verdict), reasons=reasons)
 
 
+A_POOL = BedCorrected(49.0, -1.2, 1.4, 0.9, 1.3, 1.3, -0.3, (-0.45, -0.15), 9.2, 3.1, (45.0, 54.0))
+A_LINE = FaultyInstrument("line", 36.0, 0.0, (), 0.149, (0.11, 0.188), "m", 11.4)
 VERDICTS: dict[str, Diagnosis] = {
     "identified": brook(kind="identified"),
     "one of several": brook(kind="one-of", effects=(
@@ -199,6 +200,10 @@ VERDICTS: dict[str, Diagnosis] = {
     ),
     "nothing": replace(NOTHING, name="brook"),
     "an instrument": brook(kind="instrument", effects=(), instruments=(an_instrument(),), clears_the_model=True),
+    "a surveyed line, and the bed": brook(
+        kind="instrument", effects=(), instruments=(A_LINE,), clears_the_model=True, bed=A_POOL
+    ),
+    "nothing but the bed": brook(kind="nothing-missing", effects=(), clears_the_model=True, bed=A_POOL),
     "an instrument and a doubt": brook(
         kind="instrument", effects=(), instruments=(an_instrument(kind="probe", x=np.nan, factor=1.3),),
         reasons=(UncertainBetweenSections(1.5),),
@@ -233,9 +238,8 @@ NOTES = (
     BeyondHandbook("n_b", 0.062, "s m^(-1/3)", 0.01, 0.06, "Chow (1959) for streams wider than 30 m"),
     EstimateOffPrior("eddy_viscosity", 0.002, "m2/s", 2.9),
     MisfitTooSmall(61.5, 150), ImplausibleAmplitude("wind", 3.4), EffectsNotExcluded(("wind", "waves"), beside=True),
-    BedCorrected(49.0, -1.2, -0.3, (-0.45, -0.15), (45.0, 54.0)),
-    LineLevelledWrongly(36.0, 0.16, (0.05, 0.26)),
-    BedCorrected(2.0, 0.4, 0.11, (0.02, 0.2), (float("nan"), float("nan"))),
+    A_POOL, replace(A_POOL, x=2.0, change=0.11, interval95=(0.02, 0.2), between=(float("nan"), float("nan"))),
+    InstrumentExcluded(A_LINE, True, 4.5),
     EffectsExcluded((("wind", "a laboratory"), ("unlisted_inflow", "glass walls"))),
     ModelErrorUsed(0.05, 0.01, 0.6, 0.0), LawStandsOut(candidate_laws_of("law_bank_speed_step"), ("steep_bank",)),
     NeighboursCorrelated(0.3), StatedErrorsTooSmall(1.2), InstrumentExcluded(an_instrument(), True, 4.5),

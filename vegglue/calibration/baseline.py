@@ -64,7 +64,7 @@ class SearchModel:
     point: Point
 
 
-def baseline(model: Model, known: Array | None = None) -> Baseline:
+def baseline(model: Model, known: Array | None = None, noise: Noise | None = None) -> Baseline:
     """The calibrated model; on cells of twice the size, where a fit costs a quarter, as far as possible.
 
     Parameters
@@ -73,6 +73,8 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
         Of a case with at least one parameter.
     known : array (p,), optional
         z to start from, else the best points of the prior on coarse grids.
+    noise : Noise, optional
+        Of the same stations as far as it is known, else as their errors are stated.
 
     Returns
     -------
@@ -85,7 +87,7 @@ def baseline(model: Model, known: Array | None = None) -> Baseline:
         If no steady flow is found, or there is nothing to calibrate.
     """
     refuse_without_parameters(model.case)
-    noise, coarse = noise_of(model.station), coarser(model)
+    noise, coarse = noise or noise_of(model.station), coarser(model)
     if coarse is None:
         start = _best_from_prior(model, noise) if known is None else linearise(model, known)
         return with_own_error(Baseline(model, noise, fit(model, noise, _found(model, start)), None, None))

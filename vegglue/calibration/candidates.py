@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
+from vegglue.case.bed_error import SurveyedLine
 from vegglue.case.case_effects import effect_named, effect_of
 from vegglue.case.channel_geometry import site_scales
 from vegglue.case.parameter_space import middle_value
@@ -257,24 +258,29 @@ def start_amplitude(amplitude: Amplitude, gain: float) -> float:
     return float(np.clip(amplitude.at(gain), amplitude.low + margin, amplitude.high - margin))
 
 
-InstrumentKind = Literal["reading", "position", "probe", "gauge"]
+InstrumentKind = Literal["reading", "position", "probe", "gauge", "line"]
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """One that could be off: its readings, indices of used stations; x or y: where it stood [m], NaN if everywhere."""
+    """One that could be off: its readings, indices of used stations; x or y: where it stood [m], NaN if everywhere;
+    line: a surveyed line of the bed, which has no readings.
+    """
 
     kind: InstrumentKind
     readings: tuple[int, ...]
     x: float
     y: float
+    line: SurveyedLine | None = None
 
 
 def plausible_offset(kind: InstrumentKind) -> float:
-    """Over the median standard error of its readings [-]: a reading that went wrong, or an instrument that is off."""
+    """Over the median standard error of its readings [-]: a reading that went wrong, or an instrument that is off; of a
+    surveyed line in m.
+    """
     of = constants()
     of_probe = {"position": of.probe_offset, "probe": of.probe_offset}
-    return {"reading": of.reading_offset, "gauge": of.gauge_offset, **of_probe}[kind]
+    return {"reading": of.reading_offset, "gauge": of.gauge_offset, "line": of.line_offset, **of_probe}[kind]
 
 
 def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument, ...]]:
@@ -290,7 +296,7 @@ def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument,
         for row, its in name.items():
             together.setdefault(its, []).append(row)
         several = [rows for rows in together.values() if len(rows) > 1]
-        return tuple(Instrument(kind, tuple(rows), *map(float, places[rows[0]])) for rows in several)
+        return tuple(Instrument(kind, tuple(rows), *places[rows[0]].tolist()) for rows in several)
 
     # To a millimetre: a place on the axis that was turned from a map lies at 0 or at -0.
     of = [(kind.name, round(float(x), 3), round(float(y), 3)) for kind, (x, y) in zip(kinds, places, strict=True)]
@@ -299,7 +305,7 @@ def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument,
     at_one_place = {one.readings for one in positions}
     across = shared("probe", {row: (of[row][0], of[row][2]) for row in probes})
     return {
-        "reading": tuple(Instrument("reading", (row,), *map(float, place)) for row, place in enumerate(places)),
+        "reading": tuple(Instrument("reading", (row,), *place) for row, place in enumerate(places.tolist())),
         "position": positions,
         "probe": tuple(replace(one, x=float("nan")) for one in across if one.readings not in at_one_place),
         "gauge": shared("gauge", {row: of[row] for row, kind in enumerate(kinds) if kind.instrument == "gauge"}),

@@ -3,7 +3,8 @@ the water, of drag, of bed level, of inflow or of viscosity.
 
     S(x_0, y_0) = sum_cells  d prediction / d term  exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2)
 
-A place has one fingerprint for all experiments: what lies there stays where it is.
+A place has one fingerprint for all experiments: what lies there stays where it is. A surveyed line that is too high
+leaves -R w, w how the bed of each cell rises with its level, and R how predictions answer to the bed of each.
 """
 
 import math
@@ -19,6 +20,7 @@ from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Candidate, candidates_of, cause_of
 from vegglue.calibration.model_error import (
     TERM_OF,
+    CellResponses,
     GaussianBasis,
     cell_responses,
     excluded_terms,
@@ -26,6 +28,7 @@ from vegglue.calibration.model_error import (
     gaussian_basis_at,
     responses_to_basis,
 )
+from vegglue.case.bed_error import SurveyedLines, surveyed_lines
 from vegglue.case.channel_geometry import site_scales
 from vegglue.case.grid import cell_stretch
 from vegglue.case.gridded_site import in_experiment
@@ -100,7 +103,9 @@ class Places:
 class Fingerprints:
     """values (station, c): d prediction / d gain of candidates, [m/s or m] per unit of gain, one column per setting.
 
-    columns: for each candidate, its columns; settings, amplitudes, causes: of each column (c,).
+    columns: for each candidate, its columns; settings, amplitudes, causes: of each column (c,); of_lines (station,
+    lines): what a measurement exceeds its prediction by for each m that a surveyed line is too high [unit of the
+    station per m].
     """
 
     point: Point
@@ -111,6 +116,8 @@ class Fingerprints:
     causes: list[Cause]
     values: Array
     places: tuple[Places, ...]
+    lines: SurveyedLines | None = None
+    of_lines: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def only_sign(self) -> np.ndarray:
@@ -138,6 +145,13 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
     values = responses(model, point, causes)
     for column in np.flatnonzero(~np.isfinite(values[model.station["used"].to_numpy()]).all(axis=0)):
         raise InputError(f"The effect `{every[column][0].name}` gives values that are not finite; correct it.")
+    lines = surveyed_lines(model.case, model.site.grid)
+    of_bed: tuple[Term, ...] = ("bed",) if lines.lines else ()
+    cells = cell_responses(model, point, tuple(dict.fromkeys([*terms_at_places(model.case), *of_bed])))
+    of_lines = np.zeros((len(model.station), 0))
+    if lines.lines:
+        of_lines = -(cells.of["bed"].reshape(len(model.station), -1) @ lines.weights)
+        of_lines[model.station["experiment"].isin(model.site.own)] = 0.0
     return Fingerprints(
         point=point,
         candidates=candidates,
@@ -146,20 +160,29 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
         amplitudes=[one.amplitude for one, _ in every],
         causes=causes,
         values=values,
-        places=places_of(model, point, half_width),
+        places=places_of(model, point, half_width, cells),
+        lines=lines,
+        of_lines=of_lines,
     )
 
 
-def places_of(model: Model, point: Point, half_width: float) -> tuple[Places, ...]:
-    """Spots of every term that is not excluded, all over the water; half_width: of the floor of the channel [m]."""
+def terms_at_places(case: Case) -> list[Term]:
+    """Terms that something at a place may change."""
+    excluded = excluded_terms(case)
+    return [term for term in SPOT_LENGTHS if term not in excluded]
+
+
+def places_of(model: Model, point: Point, half_width: float, cells: CellResponses | None = None) -> tuple[Places, ...]:
+    """Spots of every term that is not excluded, all over the water; half_width: of the floor of the channel [m]; cells:
+    how predictions answer to these terms, if it is at hand.
+    """
     width, grid = SPOT_WIDTH * half_width, model.site.grid
-    excluded = excluded_terms(model.case)
     rasters = {
-        term: [gaussian_basis(grid, length * width, width, SPOT_CELLS) for length in lengths]
-        for term, lengths in SPOT_LENGTHS.items()
-        if term not in excluded
+        term: [gaussian_basis(grid, length * width, width, SPOT_CELLS) for length in SPOT_LENGTHS[term]]
+        for term in terms_at_places(model.case)
     }
-    return _places_over(model, point, rasters, beside_ends=False)
+    cells = cells or cell_responses(model, point, tuple(rasters))
+    return _places_over(model, point, rasters, cells, beside_ends=False)
 
 
 def places_around(model: Model, point: Point, term: Term, place: Mapping[str, float], share: float) -> Places:
@@ -169,14 +192,19 @@ def places_around(model: Model, point: Point, term: Term, place: Mapping[str, fl
     length, width = place["length"], place["width"]
     steps = share * np.arange(-STEPS_AROUND, STEPS_AROUND + 1, dtype=float)
     x, y = place["x"] + steps * length, place["y"] + steps * width
-    return _places_over(model, point, {term: [gaussian_basis_at(model.site.grid, x, y, length, width)]})[0]
+    around = {term: [gaussian_basis_at(model.site.grid, x, y, length, width)]}
+    return _places_over(model, point, around, cell_responses(model, point, (term,)))[0]
 
 
 def _places_over(
-    model: Model, point: Point, rasters: Mapping[Term, Sequence[GaussianBasis]], beside_ends: bool = True
+    model: Model,
+    point: Point,
+    rasters: Mapping[Term, Sequence[GaussianBasis]],
+    cells: CellResponses,
+    beside_ends: bool = True,
 ) -> tuple[Places, ...]:
     """beside_ends: whether spots may reach inflow and outlet, where each only changes how the water passes."""
-    cells, grid = cell_responses(model, point, tuple(rasters)), model.site.grid
+    grid = model.site.grid
     water = {}
     if "inflow" in rasters:
         for experiment, rows in model.rows.items():

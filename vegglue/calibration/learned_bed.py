@@ -5,36 +5,80 @@
 B B' is the covariance of the error of the bed that its survey leaves (case/survey_error.py), R how predictions answer
 to the bed of each cell, C the covariance of all errors of the measurements, M included, J the slopes at the calibrated
 parameters z, whose prior is N(0, I): one linear step of the best bed and parameters together, of which neither is known
-better than both. Source: Tarantola (2005), Inverse Problem Theory, section 3.2; not checked against it, the tests
-compare with the joint Gaussian.
+better than both. A spot of the bed of mean g' dz is off or as stated,
+
+    ln B = 1/2 m^2 / s^2 - ln(p / s)
+
+m, s and p being its mean and standard errors with and without the flow: the Savage-Dickey ratio of a mean error N(0,
+p^2) against none, all else of the bed as uncertain as it is. s holds fingerprint_error m, since R is not nature's.
+Sources: Verdinelli and Wasserman (1995), doi:10.1080/01621459.1995.10476554, for the ratio; Tarantola (2005), Inverse
+Problem Theory, section 3.2; not checked against them, the tests compare with the joint Gaussian.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vegglue.arrays import Array, Mask
+from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, model_that_errs
-from vegglue.calibration.fingerprints import least_depth
 from vegglue.calibration.model_error import cell_responses
 from vegglue.calibration.score_test import project
-from vegglue.case.bed_error import bed_error_columns
+from vegglue.case.bed_error import SurveyedLine, bed_error_columns, surveyed_lines
 from vegglue.case.grid import Grid
-from vegglue.engine.interface import Model, Point, flow_at_centres
+from vegglue.decision_constants import constants
+from vegglue.engine.interface import Model, Point
+
+# Below it a standard error counts as this [m]: far less than any bed is known to.
+LEAST_KNOWN = 1e-9
 
 
 @dataclass(frozen=True)
 class LearnedBed:
-    """Most likely correction dz (nx, ny) [m] of the bed on a grid, and columns (nx ny, k) [m] of its covariance."""
+    """Most likely correction dz (nx, ny) [m] of the bed on a grid, and columns (nx ny, k) [m] of its covariance, and of
+    that before the flow was measured.
+    """
 
     grid: Grid
     correction: Array
     columns: Array
+    before: Array
 
     @property
     def error(self) -> Array:
         """Standard error of the corrected bed (nx, ny) [m]."""
         return np.asarray(np.linalg.norm(self.columns, axis=1).reshape(self.correction.shape))
+
+
+@dataclass(frozen=True)
+class BedOfSpots:
+    """Mean correction of the bed over spots (spot,) [m], its standard error, that before the flow was measured, and
+    columns (spot, k) [m] of the covariance of the means.
+    """
+
+    mean: Array
+    error: Array
+    before: Array
+    columns: Array
+
+    @property
+    def log_factor(self) -> Array:
+        """ln B (spot,), see above; 0 where the survey leaves nothing open."""
+        error, before = np.maximum(self.error, LEAST_KNOWN), np.maximum(self.before, LEAST_KNOWN)
+        return np.asarray(0.5 * (self.mean / error) ** 2 - np.log(before / error))
+
+
+def bed_of_spots(learned: LearnedBed, x: Array, y: Array, length: Array, width: Array) -> BedOfSpots:
+    """Means with weights exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) around all x, y with l and w (spot,) [m]."""
+    grid = learned.grid
+    along, across = (
+        np.exp(-(((cells[None] - middles[:, None]) / radius[:, None]) ** 2))
+        for cells, middles, radius in ((grid.x, x, length), (grid.y, y, width))
+    )
+    weight = (along[:, :, None] * across[:, None, :]).reshape(x.size, -1)
+    weight /= weight.sum(axis=1, keepdims=True)
+    mean, columns, before = (weight @ part for part in (learned.correction.ravel(), learned.columns, learned.before))
+    error = np.hypot(np.linalg.norm(columns, axis=1), constants().fingerprint_error * mean)
+    return BedOfSpots(mean, error, np.linalg.norm(before, axis=1), columns)
 
 
 def learned_bed(base: Baseline) -> LearnedBed | None:
@@ -55,14 +99,33 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
     seen = project(slope, residual, where.point.z, white).fingerprints  # seen' seen = F' (C + J J')^-1 F
     values, vectors = np.linalg.eigh(np.eye(columns.shape[1]) - seen.T @ seen)
     left = columns @ (vectors * np.sqrt(np.maximum(values, 0.0)))
-    return LearnedBed(grid, (columns @ amounts).reshape(grid.x.size, grid.y.size), left)
+    return LearnedBed(grid, (columns @ amounts).reshape(grid.x.size, grid.y.size), left, columns)
 
 
-def wet_cells(base: Baseline) -> Mask:
-    """Cells of the grid of `learned_bed` that are under water in any experiment (nx, ny), see `least_depth`."""
-    where = model_that_errs(base)
-    flows = [flow_at_centres(where.model, where.point, experiment) for experiment in where.point.flows]
-    return np.asarray(np.any([flow.depth > least_depth(where.model) for flow in flows], axis=0))
+def line_offset(loose: Baseline, line: SurveyedLine, tight: Baseline) -> tuple[float, float]:
+    """By how much a surveyed line is too high, and its standard error [m], by survey and flow.
+
+        d = d_0 + s^2 F' r,   s = (1 / s_0^2 + F' F)^(-1/2),   F = -W R w
+
+    d_0 and s_0 are those of its survey alone (`line_offsets`), r the whitened residual of the model calibrated without
+    its level, and w how the bed rises with it. W whitens by the errors of the model with its level, which have no part
+    of it, and takes off what parameters can mimic.
+    """
+    where = model_that_errs(loose)
+    model, known = where.model, surveyed_lines(tight.model.case, where.model.site.grid)
+    column = known.lines.index(line)
+    noise = replace(where.noise, lower=tight.noise.lower)
+    answers = cell_responses(model, where.point, ("bed",)).of["bed"].reshape(len(model.station), -1)
+    trace = -(answers @ known.weights[:, column : column + 1])
+    trace[model.station["experiment"].isin(model.site.own)] = 0.0
+    residual = noise.whiten(noise.residual(where.point.prediction))
+    slope, white = (noise.whiten(noise.used(part)) for part in (where.point.slope, trace))
+    seen = project(slope, residual, where.point.z, white)
+    h, columns = known.evidence
+    of_survey = columns[:, column]
+    squared = float(of_survey @ of_survey) + float(seen.length[0]) ** 2
+    offset = float(of_survey @ h) / float(of_survey @ of_survey)
+    return offset + float(seen.fingerprints[:, 0] @ seen.residual) / squared, float(squared**-0.5)
 
 
 def changed_by(learned: LearnedBed, model: Model, point: Point) -> tuple[Array, Array]:

@@ -37,6 +37,7 @@ from vegglue.calibration.score_test import (
     family_of,
     kind_of_hypotheses,
     log_factors,
+    with_evidence,
 )
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.channel_geometry import half_width
@@ -150,6 +151,9 @@ def screen(
     with_noise = replace(base, noise=noise, fitted=replace(here, covariance=wider.covariance))
     in_places = {one.term: against(base.noise.used(one.fingerprints)) for one in fingerprints.places}
     of_instruments = {name: against(offset_columns(some, residual.size)) for name, some in instruments.items() if some}
+    if (lines := fingerprints.lines) is not None and lines.lines:
+        instruments["line"] = tuple(Instrument("line", (), one.x, one.y, one) for one in lines.lines)
+        of_instruments["line"] = with_evidence(against(base.noise.used(fingerprints.of_lines)), *lines.evidence)
     return Screening(
         base=with_noise,
         search=search_model(with_noise),
@@ -205,12 +209,12 @@ def kinds_of_instruments(
     projected: Mapping[InstrumentKind, score_test.Projected],
     flagged: tuple[int, ...],
 ) -> list[HypothesisKind]:
-    """A kind each for single readings, probes and gauges, without those that are known to be off."""
+    """A kind each for single readings, probes, gauges and lines, without those that are known to be off."""
     kinds = []
     for name, of_kind in projected.items():
-        medians = [np.median(noise.error[list(i.readings)]) for i in instruments[name]]
-        plausible = plausible_offset(name) * np.array(medians)
-        known = np.array([set(i.readings) <= set(flagged) for i in instruments[name]])
+        of = [1.0 if i.line else np.median(noise.error[list(i.readings)]) for i in instruments[name]]
+        plausible = plausible_offset(name) * np.array(of)
+        known = np.array([i.line is None and set(i.readings) <= set(flagged) for i in instruments[name]])
         prior = np.full(plausible.size, 1.0 / (GROUPS * len(projected) * plausible.size))
         kinds.append(kind_of_hypotheses(name, of_kind, np.where(known, 0.0, plausible), prior))
     return kinds
@@ -229,6 +233,8 @@ def _plausible(
     for name in ("position", "probe", "gauge"):
         columns = offset_columns(instruments[name], noise.rows.size)
         parts.append(columns * (plausible_offset(name) * float(np.median(noise.error))))
+    if fingerprints.lines is not None:
+        parts.append(plausible_offset("line") * noise.used(fingerprints.of_lines))
     return np.hstack(parts)
 
 

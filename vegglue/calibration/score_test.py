@@ -85,6 +85,16 @@ def project(slopes: Array, residual: Array, z: Array, fingerprints: Array) -> Pr
     return Projected(remaining - basis @ (basis.T @ remaining), seen, length, length / np.maximum(whole, 1e-300))
 
 
+def with_evidence(projected: Projected, residual: Array, columns: Array) -> Projected:
+    """With rows more of other measurements of the same amplitudes, that depend on no calibrated parameter: residual
+    (rows,) and columns (rows, c), whitened.
+    """
+    seen = np.vstack([projected.fingerprints, columns])
+    length = np.linalg.norm(seen, axis=0)
+    whole = np.hypot(projected.length / np.maximum(projected.visible, 1e-300), np.linalg.norm(columns, axis=0))
+    return Projected(np.concatenate([projected.residual, residual]), seen, length, length / np.maximum(whole, 1e-300))
+
+
 def scores(projected: Projected, only_sign: np.ndarray) -> Array:
     """T = S_perp' r / |S_perp| (c,); 0 if an effect that only has one sign would need the other."""
     return _signed(projected.score, only_sign)
@@ -118,15 +128,17 @@ class Family:
 
 def family_of(projected: Projected, only_sign: np.ndarray, errors: Array, seed: int) -> Family:
     """Scores of fingerprints against their residual, and against whitened errors (draws, n) alone."""
-    drawn = with_rows_of_prior(errors, projected, seed) @ projected.units.astype(np.float32)
+    drawn = with_more_rows(errors, projected.residual.size, seed) @ projected.units.astype(np.float32)
     squares = _signed(np.asarray(drawn, dtype=np.float64), only_sign) ** 2
     return Family(scores(projected, only_sign), np.asarray(squares.max(axis=1, initial=0.0)))
 
 
-def with_rows_of_prior(errors: Array, projected: Projected, seed: int) -> Single:
-    """Draws of errors alone (draws, n) with the rows of the prior drawn too (draws, rows), in single precision."""
-    of_prior = np.random.default_rng(seed).standard_normal((len(errors), projected.residual.size - errors.shape[1]))
-    return np.hstack([errors, of_prior]).astype(np.float32)
+def with_more_rows(errors: Array, rows: int, seed: int) -> Single:
+    """Draws of errors alone (draws, n) with the rows of the prior, and of other measurements, drawn too (draws, rows),
+    in single precision.
+    """
+    more = np.random.default_rng(seed).standard_normal((len(errors), rows - errors.shape[1]))
+    return np.hstack([errors, more]).astype(np.float32)
 
 
 def chances(projected: Projected, family: Sequence[np.ndarray], allowed: Mapping[float, np.ndarray]) -> Array:
@@ -302,7 +314,8 @@ def alarm_level(kinds: Sequence[HypothesisKind], errors: Array, seed: int, rate:
 
 def _sums_under_errors(kinds: Sequence[HypothesisKind], errors: Array, seed: int) -> Array:
     """ln of the sum over all kinds of each draw of errors alone (draws,)."""
-    drawn = with_rows_of_prior(errors, kinds[0].projected, seed)
+    rows = [kind.projected.residual.size for kind in kinds]
+    drawn = with_more_rows(errors, max(rows), seed)
     terms = [
         _DrawnTerms(
             kind.projected.units.astype(np.float32),
@@ -314,7 +327,8 @@ def _sums_under_errors(kinds: Sequence[HypothesisKind], errors: Array, seed: int
     ]
 
     def sums_of(part: Single) -> Array:
-        return np.asarray(logsumexp([one.sums(part) for one in terms], axis=0))
+        sums = [one.sums(part[:, :count]) for one, count in zip(terms, rows, strict=True)]
+        return np.asarray(logsumexp(sums, axis=0))
 
     parts = [(drawn[k : k + NULL_DRAWS_TOGETHER],) for k in range(0, len(drawn), NULL_DRAWS_TOGETHER)]
     return np.concatenate(in_threads(sums_of, parts))

@@ -15,6 +15,7 @@ from vegglue.case.grid import Grid, centres, places_on_map
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import BedLayer
 from vegglue.case.size_limits import LARGEST_DATA
+from vegglue.case.survey_error import FEWEST_SURVEYED, MOST_SURVEYED, BedSurvey, mean_level
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
 
@@ -173,6 +174,20 @@ def read_points(path: Path, columns: Sequence[str] = ("x", "y", "z")) -> Array:
     return np.array(points).reshape(-1, len(columns))
 
 
+def read_bed_survey(path: Path, loose: Sequence[int] = ()) -> BedSurvey:
+    """The columns x, y, z and line of a CSV file; loose: see `BedSurvey`.
+
+    Errors: InputError for what is no number, or too few points.
+    """
+    points = read_points(path, (*"xyz", "line"))
+    if not FEWEST_SURVEYED <= len(points) <= MOST_SURVEYED:
+        raise InputError(
+            f"{shown_path(path)}: expected {FEWEST_SURVEYED} to {MOST_SURVEYED} points, got {len(points)}; take "
+            "`survey` out of the config."
+        )
+    return BedSurvey(points[:, :3], points[:, 3].astype(np.int64), tuple(loose))
+
+
 def _number(path: Path, row: int, text: str | None, name: str) -> float:
     try:
         number = float(FORTRAN_EXPONENT.sub("e", text or ""))
@@ -202,6 +217,7 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
     """Level z_b (nx, ny) [m] of one layer, NaN for no data; upstream: x of the upstream edge of the case [m].
 
     A trapezoid has z_b = level - S (x - x_0) + s min(max(|y - axis| - b/2, 0), (B - b)/2), with floor b and top B [m].
+    Loose lines of a survey change it by what the kriged mean changes by without their levels.
     """
     if layer.trapezoid is not None:
         channel = layer.trapezoid
@@ -210,10 +226,22 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
         bank = channel.bank_slope * np.clip(out, 0.0, reach)
         return np.asarray((channel.level - channel.bed_slope * (grid.x - upstream))[:, None] + bank[None, :])
     if layer.raster is not None:
-        return levels_at(read_raster(layer.raster), *places_on_map(grid))
-    if layer.points is not None:
-        return survey_levels(layer.points, *places_on_map(grid))
-    return np.full((grid.x.size, grid.y.size), np.nan)
+        level = levels_at(read_raster(layer.raster), *places_on_map(grid))
+    elif layer.points is not None:
+        level = survey_levels(layer.points, *places_on_map(grid))
+    else:
+        return np.full((grid.x.size, grid.y.size), np.nan)
+    if layer.survey is not None and layer.survey.loose:
+        places = cell_places(grid)
+        loose, tight = (read_bed_survey(layer.survey.file, lines) for lines in (layer.survey.loose, ()))
+        without, with_all = (mean_level(one, layer.survey.covariances, places) for one in (loose, tight))
+        level = level + (without - with_all).reshape(level.shape)
+    return level
+
+
+def cell_places(grid: Grid) -> Array:
+    """x along and y across of cell centres (nx ny, 2) [m]."""
+    return np.column_stack([part.ravel() for part in np.meshgrid(grid.x, grid.y, indexing="ij")])
 
 
 def bed_levels(case: Case, grid: Grid, experiment: str = "") -> Array:

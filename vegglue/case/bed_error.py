@@ -1,19 +1,24 @@
 """How wrong the bed of each cell may be between the points of its surveys, on any grid."""
 
 import hashlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, TypeVar, cast
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from vegglue.arrays import Array, Mask
-from vegglue.case.bed import layer_levels
+from vegglue.case.bed import cell_places, layer_levels, read_bed_survey
 from vegglue.case.grid import Grid
 from vegglue.case.schema import Case
-from vegglue.case.site_schema import BedLayer, SurveyOfBed
-from vegglue.case.survey_error import conditional, read_bed_survey
+from vegglue.case.site_schema import BedLayer, CovarianceOfBed
+from vegglue.case.survey_error import BedSurvey, conditional, evidence_of_lines, line_weights
 
-# Beds whose errors are kept in memory.
-MOST_BED_ERRORS = 8
-_kept: dict[bytes, Array] = {}
+Found = TypeVar("Found")
+# Beds whose errors and lines are kept in memory.
+MOST_BEDS_KEPT = 16
+_kept: dict[bytes, Any] = {}
 
 
 def beds_of(case: Case) -> list[BedLayer]:
@@ -34,36 +39,118 @@ def _plain(layers: tuple[BedLayer, ...]) -> tuple[BedLayer, ...]:
     return tuple(layer.model_copy(update={"survey": None}) for layer in layers)
 
 
+@dataclass(frozen=True)
+class SurveyedLayer:
+    """A layer of the bed with a survey: its index among the layers, the survey as read, levels (nx ny,) [m] and cells
+    (nx ny,) that have them.
+    """
+
+    index: int
+    covariances: tuple[CovarianceOfBed, ...]
+    read: BedSurvey
+    level: Array
+    there: Mask
+
+    def in_cells(self, values: Array) -> Array:
+        """Values of the cells that have its levels (cells, k) among all (nx ny, k), zero in others."""
+        found = np.zeros((self.level.size, values.shape[1]))
+        found[self.there] = values
+        return found
+
+
 def bed_error_columns(case: Case, grid: Grid, experiment: str = "") -> Array:
     """Columns B (nx ny, k) [m] with B B' the covariance of the error of `bed_levels` by the surveys of its layers; none
     if no layer has a survey. Computed once for a bed. Errors: InputError if a survey cannot be read.
     """
+
+    def of_layer(one: SurveyedLayer) -> Array:
+        places, used = cell_places(grid)[one.there], one.level[one.there]
+        return one.in_cells(conditional(one.read, one.covariances, places, used).columns)
+
+    layers = [one for one in _surveyed_layers(case, grid, experiment) if one.there.any()]
+    return np.hstack([np.zeros((grid.x.size * grid.y.size, 0)), *(_once(of_layer, one, grid) for one in layers)])
+
+
+@dataclass(frozen=True)
+class SurveyedLine:
+    """A line of the survey of a layer of the bed, by its index, its number there, and its middle x, y [m]."""
+
+    layer: int
+    number: int
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class SurveyedLines:
+    """Lines between two others of the bed that all experiments share, without loose ones.
+
+    weights (nx ny, lines) [-]: by how much the bed of each cell rises with the level of each; evidence: h and H, see
+    `evidence_of_lines`.
+    """
+
+    lines: tuple[SurveyedLine, ...]
+    weights: Array
+    evidence: tuple[Array, Array]
+
+
+def surveyed_lines(case: Case, grid: Grid) -> SurveyedLines:
+    """Those of a case on a grid. Computed once for a bed.
+
+    The outermost lines are no candidates: beyond them the bed may go on otherwise. Of 220 drawn surveys without a wrong
+    line 5 % had one that was off by more than 4.5 standard errors, always an outermost one.
+    """
+
+    def of_layer(one: SurveyedLayer) -> SurveyedLines:
+        rows = one.read.lines
+        numbers = [int(one.read.line[own[0]]) for own in rows]
+        kept = [j for j in range(1, len(rows) - 1) if numbers[j] not in one.read.loose]
+        middles = [one.read.points[rows[j], :2].mean(axis=0) for j in kept]
+        weights = one.in_cells(line_weights(one.read, one.covariances, cell_places(grid)[one.there]))
+        h, columns = evidence_of_lines(one.read, one.covariances)
+        lines = [SurveyedLine(one.index, numbers[j], *map(float, at)) for j, at in zip(kept, middles, strict=True)]
+        return SurveyedLines(tuple(lines), weights[:, kept], (h, columns[:, kept]))
+
+    layers = [one for one in _surveyed_layers(case, grid) if one.there.any() and one.read.lines]
+    found = [_once(of_layer, one, grid) for one in layers]
+    weights = np.hstack([np.zeros((grid.x.size * grid.y.size, 0)), *(one.weights for one in found)])
+    h = np.concatenate([np.zeros(0), *(one.evidence[0] for one in found)])
+    columns = block_diag(np.zeros((0, 0)), *(one.evidence[1] for one in found))
+    return SurveyedLines(tuple(line for one in found for line in one.lines), weights, (h, columns))
+
+
+def with_loose_line(case: Case, line: SurveyedLine) -> Case:
+    """The case with the level of a surveyed line unknown."""
+    layer = case.bed[line.layer]
+    assert layer.survey is not None
+    survey = layer.survey.model_copy(update={"loose": (*layer.survey.loose, line.number)})
+    bed = [one if one is not layer else layer.model_copy(update={"survey": survey}) for one in case.bed]
+    return case.model_copy(update={"bed": tuple(bed)})
+
+
+def _surveyed_layers(case: Case, grid: Grid, experiment: str = "") -> Iterator[SurveyedLayer]:
+    """Those of a case, or of one of its experiments; of each cell the last layer with data counts."""
     own = case.experiments[experiment].bed if experiment in case.experiments else None
-    layers, parts = (*case.bed, *(own or ())), [np.zeros((grid.x.size * grid.y.size, 0))]
+    layers = (*case.bed, *(own or ()))
     free = np.ones(grid.x.size * grid.y.size, dtype=bool)
-    for layer in reversed(layers) if any(one.survey is not None for one in layers) else ():
+    for index, layer in reversed(list(enumerate(layers))) if any(one.survey is not None for one in layers) else ():
         level = layer_levels(layer, grid, case.grid.x[0]).ravel()
-        if layer.survey is not None:
-            parts.append(_columns_of_survey(layer.survey, grid, level, free & ~np.isnan(level)))
+        if (survey := layer.survey) is not None:
+            read = read_bed_survey(survey.file, survey.loose)
+            yield SurveyedLayer(index, survey.covariances, read, level, free & ~np.isnan(level))
         free &= np.isnan(level)
-    return np.hstack(parts)
 
 
-def _columns_of_survey(survey: SurveyOfBed, grid: Grid, level: Array, there: Mask) -> Array:
-    """Those of the layer that gives the levels (nx ny,) [m] of some cells, zero in others."""
-    read = read_bed_survey(survey.file, survey.loose)
-    digest = hashlib.sha256(survey.model_dump_json(exclude={"file"}).encode())
-    for values in (read.points, read.line, grid.x, grid.y, level, there):
+def _once(compute: Callable[[SurveyedLayer], Found], layer: SurveyedLayer, grid: Grid) -> Found:
+    """What is computed of a layer on a grid, kept in memory."""
+    parts = [compute.__qualname__, layer.index, layer.read.loose, *(one.model_dump_json() for one in layer.covariances)]
+    digest = hashlib.sha256(repr(parts).encode())
+    for values in (layer.read.points, layer.read.line, grid.x, grid.y, layer.level, layer.there):
         digest.update(values.tobytes())
-    found = _kept.get(digest.digest())
-    if found is None:
-        places = np.column_stack([part.ravel() for part in np.meshgrid(grid.x, grid.y, indexing="ij")])
-        found = np.zeros((level.size, 0))
-        if there.any():
-            some = conditional(read, survey.covariances, places[there], level[there]).columns
-            found = np.zeros((level.size, some.shape[1]))
-            found[there] = some
-        while len(_kept) >= MOST_BED_ERRORS:
+    if (key := digest.digest()) not in _kept:
+        found = compute(layer)
+        while len(_kept) >= MOST_BEDS_KEPT:
             _kept.pop(next(iter(_kept)), None)
-        _kept[digest.digest()] = found
-    return found
+        _kept[key] = found
+        return found
+    return cast(Found, _kept[key])

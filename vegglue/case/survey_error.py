@@ -15,8 +15,7 @@ for the square root. Not checked against them; the tests compare with brute forc
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +23,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.special import logsumexp, ndtri
 
 from vegglue.arrays import Array
-from vegglue.case.bed import read_points
 from vegglue.case.site_schema import CovarianceOfBed, LinesLeftOut
-from vegglue.errors import InputError, shown_path
 
 # Length along over that across if the survey does not determine it: bars and pools are longer than wide. Chosen.
 # The rough alternative and the spread were chosen after river-a, b and d, whose lines of every 12 m meet bars of 23 m.
@@ -46,9 +43,11 @@ LENGTHS_OVER_EXTENT, NUGGET = (0.02, 2.0), (1e-6, 10.0)
 GUESS, NUGGET_GUESS = 0.15, 0.01
 # Standard deviation of the level of a line that was levelled wrongly [m]: a staff read wrongly, a benchmark mistaken.
 LOOSE_ERROR = 1.0
-# Share of surveys in which errors alone make a line look levelled wrongly. Taken for all lines together after river-h,
-# whose wrong line is off by 2.97 standard errors.
+# Share of surveys in which errors alone make `check` name a line as levelled wrongly. Taken for all lines together
+# after river-h, whose wrong line is off by 2.97 standard errors.
 WRONG_LINE = 0.05
+# Eigenvalue over the largest of the precision of offsets below which the survey says nothing of them [-].
+LEAST_EIGENVALUE = 1e-9
 # Share of the variance that the square root leaves out, and its largest number of columns.
 LEFT_OUT, MOST_OF_SQUARE_ROOT = 0.01, 400
 # Places whose mean is computed at a time.
@@ -194,8 +193,9 @@ def lines_left_out(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], st
     own = [rows for rows in own if rows.size]
     error_of, stated_of = (np.array([_rms(values[rows]) for rows in own]) for values in (error, stated))
     most = int((error_of / stated_of).argmax())
-    off, of_off = line_offsets(survey, covariances)
-    furthest = int(np.abs(off / of_off).argmax()) if off.size else -1
+    off, of_off, _ = line_offsets(survey, covariances)
+    between = np.arange(off.size)[1:-1]  # beyond the outermost the bed may go on otherwise
+    furthest = int(between[np.abs(off / of_off)[between].argmax()]) if off.size else -1
     rounded = [float(f"{_rms(values[judged]):.4g}") for values in (error, stated, straight)]
     return LinesLeftOut(
         count=len(own), error=rounded[0], stated=rounded[1], straight=rounded[2],
@@ -207,59 +207,72 @@ def lines_left_out(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], st
     )  # fmt: skip
 
 
-def line_offsets(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array]:
+def line_offsets(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array, Array]:
     """d = 1'(Q z)_i / 1' Q_ii 1 and its standard error (1' Q_ii 1)^(-1/2) of each line i (lines,) [m]: by how much the
-    whole line is too high.
+    whole line is too high; and the correlations of 1'(Q z)_i (lines, lines) [-].
     """
     z, lines = survey.points[:, 2], survey.lines
+    whole = np.zeros((len(z), len(lines)))
+    for number, rows in enumerate(lines):
+        whole[rows, number] = 1.0
     off, squares = (np.zeros((len(covariances), len(lines))) for _ in range(2))
+    together = np.zeros((len(lines), len(lines)))
     for index, one in enumerate(covariances):
         q = _precision_beside_mean(survey, one)
-        for number, rows in enumerate(lines):
-            weight = float(q[np.ix_(rows, rows)].sum())
-            off[index, number], squares[index, number] = float((q[rows] @ z).sum()) / weight, 1.0 / weight
+        weight = whole.T @ q @ whole
+        off[index], squares[index] = whole.T @ q @ z / np.diag(weight), 1.0 / np.diag(weight)
+        together += one.chance * weight
     chance = np.array([one.chance for one in covariances])
-    mean = chance @ off
-    return mean, np.sqrt(chance @ (squares + (off - mean) ** 2))
+    mean, alone = chance @ off, np.sqrt(np.diag(together))
+    return mean, np.sqrt(chance @ (squares + (off - mean) ** 2)), together / np.outer(alone, alone)
 
 
-def with_wrong_line_loose(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> BedSurvey:
-    """The survey with the level of the line unknown that is furthest off all others, if errors alone would hardly make
-    it so.
+def evidence_of_lines(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array]:
+    """h (lines,) and H (lines, lines) [-] with h = H d + e, e ~ N(0, 1): what the survey says about offsets d [m].
+
+        H' H = G,   H' h = g,   g_i = d_i / s_i^2,   G_ij = c_ij / (s_i s_j)
+
+    d_i, s_i and c_ij are those of `line_offsets`. A level and a slope of all lines leave no trace.
     """
-    off, error = line_offsets(survey, covariances)
-    if not off.size or np.abs(off / error).max() <= float(ndtri(1.0 - 0.5 * WRONG_LINE / off.size)):
-        return survey
-    rows = survey.lines[int(np.abs(off / error).argmax())]
-    return replace(survey, loose=(int(survey.line[rows[0]]),))
+    off, error, correlation = line_offsets(survey, covariances)
+    values, vectors = np.linalg.eigh(correlation / np.outer(error, error))
+    root = np.sqrt(np.where(values > LEAST_EIGENVALUE * values.max(), values, 0.0))
+    back = np.divide(1.0, root, out=np.zeros_like(root), where=root > 0.0)
+    return back * (vectors.T @ (off / error**2)), root[:, None] * vectors.T
 
 
-def mean_level(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array) -> Array:
-    """The mean (m,) [m] of `conditional` alone, at any number of places (m, 2) [m]."""
-    basis, z, found = survey.basis(survey.points), survey.points[:, 2], np.zeros(len(places))
+def stands_out(found: LinesLeftOut) -> bool:
+    """Whether the line that is furthest off all others is so by errors alone in less than WRONG_LINE of surveys."""
+    return abs(found.offset) > found.offset_error * float(ndtri(1.0 - 0.5 * WRONG_LINE / found.count))
+
+
+def mean_level(
+    survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array, levels: Array | None = None
+) -> Array:
+    """The mean (m,) [m] of `conditional` alone, at any number of places (m, 2) [m]; levels (n, k): its columns (m, k)
+    had the points these levels [m].
+    """
+    basis = survey.basis(survey.points)
+    z = survey.points[:, 2:] if levels is None else levels
+    found = np.zeros((len(places), z.shape[1]))
     for one in covariances:
         lower = cholesky(_of_readings(survey, one), lower=True)
         white = solve_triangular(lower, np.column_stack([basis, z]), lower=True)
-        beta = np.linalg.lstsq(white[:, :-1], white[:, -1])[0]
-        weights = one.sd**2 * solve_triangular(lower, white[:, -1] - white[:, :-1] @ beta, lower=True, trans="T")
+        shape, white = white[:, : basis.shape[1]], white[:, basis.shape[1] :]
+        beta = np.linalg.lstsq(shape, white)[0]
+        weights = one.sd**2 * solve_triangular(lower, white - shape @ beta, lower=True, trans="T")
         for part in np.array_split(np.arange(len(places)), len(places) // PLACES_AT_A_TIME + 1) if len(places) else ():
             near = _between(places[part], survey.points, one)
             found[part] += one.chance * (survey.basis(places[part]) @ beta + near @ weights)
-    return found
+    return found[:, 0] if levels is None else found
 
 
-def read_bed_survey(path: Path, loose: Sequence[int] = ()) -> BedSurvey:
-    """The columns x, y, z and line of a CSV file; loose: see `BedSurvey`.
-
-    Errors: InputError for what is no number, or too few points.
-    """
-    points = read_points(path, (*"xyz", "line"))
-    if not FEWEST_SURVEYED <= len(points) <= MOST_SURVEYED:
-        raise InputError(
-            f"{shown_path(path)}: expected {FEWEST_SURVEYED} to {MOST_SURVEYED} points, got {len(points)}; take "
-            "`survey` out of the config."
-        )
-    return BedSurvey(points[:, :3], points[:, 3].astype(np.int64), tuple(loose))
+def line_weights(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array) -> Array:
+    """By how much `mean_level` at places (m, 2) [m] rises with the level of each line (m, lines) [-]."""
+    whole = np.zeros((len(survey.points), len(survey.lines)))
+    for number, rows in enumerate(survey.lines):
+        whole[rows, number] = 1.0
+    return mean_level(survey, covariances, places, whole)
 
 
 def bed_survey_text(survey: BedSurvey) -> str:

@@ -16,6 +16,7 @@ from vegglue.case.config import values
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds, prior_range, value_at
 from vegglue.case.schema import Case
+from vegglue.case.survey_error import stands_out
 from vegglue.case.zones import BANK_SLOPE, area_of, corners_of, share_in_patch, slope
 from vegglue.diagnosis.flow_check import dry_outlets
 from vegglue.measurements.kinds import UnstatedErrors, unstated_errors
@@ -338,9 +339,8 @@ def remarks_on_survey(case: Case) -> Iterator[SurveyLeftOut]:
     """How well each survey of the bed predicts its own lines."""
     for layer in beds_of(case):
         if layer.survey is not None and (found := layer.survey.left_out) is not None:
-            suspect = bool(layer.survey.loose)
             off = found.offset_at, found.offset, found.offset_error
-            yield SurveyLeftOut(found.count, found.error, found.stated, found.straight, *off, suspect)
+            yield SurveyLeftOut(found.count, found.error, found.stated, found.straight, *off, stands_out(found))
 
 
 def remarks_on_assumed_errors(case: Case) -> Iterator[ErrorsAssumed]:

@@ -5,9 +5,10 @@
 
 Of each kind the most promising hypotheses are calibrated in earnest, and their evidence E is Laplace's (`refits`); of
 those of its kind that were not, it is the one to first order, corrected as that of the best of them. Instruments change
-no flow: to first order is exact for them but for the parameters. Prior weights are in `score_test`. Chances
-are tempered: e is the relative error of a fingerprint. That of an effect in nature differs from the model's, whose
-cells and laws are not nature's: if much is explained, errors count as w^(1/2) times as large.
+no flow: to first order is exact for them but for the parameters; a surveyed line does, and the likeliest is calibrated
+without its level. Prior weights are in `score_test`. Chances are tempered: e is the relative error of a fingerprint.
+That of an effect in nature differs from the model's, whose cells and laws are not nature's: if much is explained,
+errors count as w^(1/2) times as large.
 
 Where something at a place lies is searched between the spots of the screening, in the flow that it leaves:
 
@@ -42,7 +43,7 @@ from vegglue.calibration.residual_screening import Screening, conditional_screen
 from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors
 from vegglue.case.case_effects import effect_named
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
+from vegglue.diagnosis.refits import Refit, RefitTrial, Relevelled, refits_of, relevelled, start_with
 from vegglue.progress import Progress, Watch
 
 # Odds beyond e^this are reported as this: larger numbers mean no more.
@@ -172,7 +173,7 @@ START_SHARES = (1.0, 0.3)
 class Hypothesis:
     """A hypothesis with its evidence E [-]. kind: effect, a term at a place, or an instrument's kind; column: of its
     fingerprint among those of its kind; what: its refit, or the instrument; errors, spread: of x and y of a
-    place [m], see `FoundPlace`.
+    place [m], see `FoundPlace`; without: of a surveyed line the model without its level.
     """
 
     kind: str
@@ -182,6 +183,7 @@ class Hypothesis:
     what: Refit | Instrument
     errors: tuple[float, float] = (0.0, 0.0)
     spread: tuple[float, float] = (0.0, 0.0)
+    without: Relevelled | None = None
 
 
 def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf) -> list[Hypothesis]:
@@ -202,6 +204,16 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
         for one in screening.kinds
         if one.name in screening.instruments
     ]
+    for j, of_kind in enumerate(found):
+        line = of_kind.what.line if isinstance(of_kind.what, Instrument) else None
+        if line is None or not _within_reach(of_kind.log_evidence, best):
+            continue
+        watch(Progress(f"comparing the surveyed line at x = {line.x:g} m"))
+        if (without := relevelled(screening.base, line)) is not None:
+            lines = kind_named(screening.kinds, of_kind.kind)
+            by_score = float(lines.log_evidence[of_kind.column] - lines.log_prior[of_kind.column])
+            refitted = of_kind.log_evidence + without.log_factor - by_score
+            found[j] = replace(of_kind, log_evidence=refitted, without=without)
     tried: set[str] = set()
     while True:
         effects = [j for j in worth_refitting(of_each, best) if prints.candidates[j].name not in tried]
@@ -242,12 +254,12 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
             of_term = zip(spots, refits[len(effects) :], strict=True)
             ended = [(spot, refit) for (of, spot), refit in of_term if of is one and refit is not None]
             if ended:
-                of_kind = kind_named(screening.kinds, one.term)
+                its_kind = kind_named(screening.kinds, one.term)
                 spot, refit = max(ended, key=lambda end: end[1].log_factor)
-                there = found_place(search, one, of_kind, spot, refit)
+                there = found_place(search, one, its_kind, spot, refit)
                 name = there.refit.candidate.name
                 found.append(
-                    Hypothesis(of_kind.name, name, there.log_evidence, spot, there.refit, there.errors, there.spread)
+                    Hypothesis(its_kind.name, name, there.log_evidence, spot, there.refit, there.errors, there.spread)
                 )
         tried |= set(names)
         promising = [float(of_each[j]) for j in _promising(of_each) if prints.candidates[j].name not in tried]

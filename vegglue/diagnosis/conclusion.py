@@ -12,16 +12,16 @@ from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fingerprints import least_depth
 from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
 from vegglue.calibration.law_screening import LawScreening
-from vegglue.calibration.learned_bed import learned_bed, wet_cells
+from vegglue.calibration.learned_bed import bed_of_spots, learned_bed
 from vegglue.calibration.noise import Noise, covariance_of_data, with_correlation
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named
+from vegglue.case.bed import read_bed_survey
 from vegglue.case.case_effects import effect_of, parameters_of_effects
-from vegglue.case.channel_geometry import channel_geometry, half_width
+from vegglue.case.channel_geometry import channel_geometry, half_width, site_scales
 from vegglue.case.grid import centreline_in, on_map
 from vegglue.case.gridded_site import cells_at
 from vegglue.case.schema import Case
-from vegglue.case.survey_error import read_bed_survey
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, clearly_a_law, not_excluded
 from vegglue.diagnosis.child_config import candidate_at
@@ -51,7 +51,6 @@ from vegglue.results.diagnosis import Diagnosis, FirstScreening, Misfit, Paramet
 from vegglue.results.verdict import (
     BedCorrected,
     EstimatedErrors,
-    LineLevelledWrongly,
     MeasuredStretch,
     NameHangsOnSection,
     Note,
@@ -120,8 +119,8 @@ SIGNIFICANT = 0.01
 COMPARED = 12
 # Spacings of a section [-] within which two readings stand side by side: neighbours are about one apart, others two.
 NEIGHBOURS_WITHIN = 1.5
-# Corrections of a surveyed bed that are reported.
-BED_CORRECTIONS = 3
+# Corrections of a surveyed bed that are reported, and beds that are drawn for the error of their places.
+BED_CORRECTIONS, BEDS_DRAWN = 3, 1000
 # Hypotheses that a verdict names if none leads.
 UNDECIDED_NAMED = 3
 # Sections up to which a name is tried without each: of more, one hardly decides. Chosen, not measured.
@@ -156,7 +155,7 @@ def assemble_diagnosis(
     base, before = last.base, first.base
     model_error = _model_error(last)
     hangs_on = name_without_a_section(first, found)
-    bed_map, of_bed = (None, []) if found.implausible else bed_of_measurements(base)
+    bed_map, of_bed = (None, ()) if found.implausible else bed_of_measurements(last)
     verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, held_out, hangs_on, of_bed)
     strongest = first.ranking[:COMPARED]
     columns = [first.best_column(j) for j in strongest]
@@ -198,34 +197,55 @@ def assemble_diagnosis(
     )
 
 
-def bed_of_measurements(base: Baseline) -> tuple[FieldMapKept | None, list[Note]]:
-    """The correction of a surveyed bed as a map, and notes: lines levelled wrongly, and the largest clear values under
-    water, one between two lines at most and BED_CORRECTIONS in all.
+def bed_of_measurements(last: Screening) -> tuple[FieldMapKept | None, tuple[BedCorrected, ...]]:
+    """The correction of a surveyed bed as a map, and where it is clear and large: one spot between two lines at most
+    and BED_CORRECTIONS in all.
+
+    Clear: evidence of field_odds for a mean error over the spot; large: 95 % of its chance lies beyond least_bed_error.
+    Of these spots goes first which has the most evidence for a local error beside all that the survey leaves open: the
+    smooth correction alone lies where the flow was measured.
     """
-    learned = learned_bed(base)
+    base = last.base
+    learned, of_bed = learned_bed(base), [one for one in last.fingerprints.places if one.term == "bed"]
     if learned is None:
-        return None, []
-    found: list[BedCorrected] = []
-    grid, change, error = learned.grid, learned.correction, learned.error
-    kept = FieldMapKept(grid.x, grid.y, change, error)
-    clear = np.where(wet_cells(base) & (np.abs(change) > NORMAL95 * error), np.abs(change), 0.0)
+        return None, ()
+    kept = FieldMapKept(learned.grid.x, learned.grid.y, learned.correction, learned.error)
     surveys = [one.survey for one in base.model.case.bed if one.survey is not None]
     points = [read_bed_survey(one.file) for one in surveys]
-    lines = [float(one.points[rows, 0].mean()) for one in points for rows in one.lines]
-    for low, high in itertools.pairwise([-np.inf, *sorted(lines), np.inf]):
-        own = np.where(((grid.x >= low) & (grid.x < high))[:, None], clear, 0.0)
-        if own.any():
-            i, j = np.unravel_index(int(own.argmax()), own.shape)
-            value, half = float(change[i, j]), NORMAL95 * float(error[i, j])
-            between = (low, high) if np.isfinite([low, high]).all() else (float("nan"), float("nan"))
-            place = float(grid.x[i]), float(grid.y[j])
-            found.append(BedCorrected(*place, value, (value - half, value + half), between))
-    levelled: list[Note] = []
-    for survey in surveys:
-        if survey.loose and (off := survey.left_out) is not None:
-            half = NORMAL95 * off.offset_error
-            levelled.append(LineLevelledWrongly(off.offset_at, off.offset, (off.offset - half, off.offset + half)))
-    return kept, [*levelled, *sorted(found, key=lambda one: -abs(one.change))[:BED_CORRECTIONS]]
+    lines = sorted(float(one.points[rows, 0].mean()) for one in points for rows in one.lines)
+    least = constants().least_bed_error * site_scales(base.model.case, base.model.site).mean_depth
+    random, found = np.random.default_rng(1), list[BedCorrected]()
+    for places in of_bed:
+        kind = kind_named(last.kinds, places.term)
+        local = score_test.log_factors(kind.scores, kind.size)
+        of_spots = bed_of_spots(learned, places.x, places.y, places.length, places.width)
+        half = NORMAL95 * of_spots.error
+        told = (of_spots.log_factor > np.log(constants().field_odds)) & (np.abs(of_spots.mean) - half > least)
+        for low, high in itertools.pairwise([-np.inf, *lines, np.inf]):
+            within = (places.x >= low) & (places.x < high)
+            if not (within & told).any():
+                continue
+            best = int(np.argmax(np.where(within & told, local, -np.inf)))
+            # Where an error of this sign and size is largest, in draws of the bed.
+            alike = np.flatnonzero(within & (places.length == places.length[best]))
+            drawn = of_spots.columns[alike] @ random.standard_normal((of_spots.columns.shape[1], BEDS_DRAWN))
+            signed = np.sign(of_spots.mean[best]) * (of_spots.mean[alike, None] + drawn)
+            most = alike[signed.argmax(axis=0)]
+            change = float(of_spots.mean[best])
+            errors = [float(np.sqrt(np.mean((one[most] - one[best]) ** 2))) for one in (places.x, places.y)]
+            found.append(
+                BedCorrected(
+                    **places.shapes(best),
+                    x_error=errors[0],
+                    y_error=errors[1],
+                    change=change,
+                    interval95=(change - float(half[best]), change + float(half[best])),
+                    log_factor=float(of_spots.log_factor[best]),
+                    local_log_factor=float(local[best]),
+                    between=(low, high) if np.isfinite([low, high]).all() else (float("nan"), float("nan")),
+                )
+            )
+    return kept, tuple(sorted(found, key=lambda one: -one.local_log_factor)[:BED_CORRECTIONS])
 
 
 def _verdict(
@@ -239,7 +259,7 @@ def _verdict(
     model_error: ModelErrorUsed | None,
     held_out: Model | None,
     hangs_on: NameHangsOnSection | None,
-    of_bed: Sequence[Note],
+    of_bed: tuple[BedCorrected, ...],
 ) -> Verdict:
     """The verdict on what was found, once all that it rests on is computed."""
     base, model, z = last.base, last.base.model, last.base.fitted.point.z
@@ -257,7 +277,7 @@ def _verdict(
     rows = [int(np.flatnonzero(base.noise.rows == station)[0]) for station in single]
     neighbours = any(0.0 < base.noise.separation[a, b] < NEIGHBOURS_WITHIN for a in rows for b in rows)
     beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
-    surroundings: list[Note] = [*of_bed, *mapped_places(model.case, named_places(found.places, undecided))]
+    surroundings: list[Note] = [*mapped_places(model.case, named_places(found.places, undecided))]
     surroundings += measured_stretch(model.case, model.station)
     surroundings += parameter_doubts(base)
     if not any(one.x.size for one in last.fingerprints.places):
@@ -287,6 +307,7 @@ def _verdict(
             surroundings=tuple(surroundings),
             excluded=model.case.exclude or {},
             hangs_on=hangs_on,
+            bed=of_bed,
         )
     )
 

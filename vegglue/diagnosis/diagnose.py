@@ -189,9 +189,9 @@ def branch_with(
 ) -> SearchBranch | None:
     """What is found with one hypothesis, and the model that follows.
 
-    An instrument is excluded, and the model calibrated without what its readings share; an effect or a place is taken
-    into the model. None when there are enough, when it explains less than nothing does, has so many rivals that a set
-    says nothing, or no flow is found with it.
+    An instrument is excluded, and the model calibrated without what its readings share, or without the level of the
+    surveyed line; an effect or a place is taken into the model. None when there are enough, when it explains less than
+    nothing does, has so many rivals that a set says nothing, or no flow is found with it.
     """
     one, base = hypotheses[j], screening.base
     instrument = one.what if isinstance(one.what, Instrument) else None
@@ -202,8 +202,13 @@ def branch_with(
         if beside_excluded(base, one.what, found):  # neighbours that fall together are a misfit of the model
             return None
         watch(Progress(f"excluding a {one.kind} that is off"))
-        noise = with_unknown_errors(base.noise, error_columns(one.what, base.noise.value))
-        without = replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
+        if one.what.line is not None:
+            if one.without is None:
+                return None
+            without = one.without.base
+        else:
+            noise = with_unknown_errors(base.noise, error_columns(one.what, base.noise.value))
+            without = replace(base, noise=noise, fitted=fit(base.model, noise, base.fitted.point))
         # Its errors are all but free in the covariance: their prior is charged here, as it was in the competition.
         weight = PriorWeight(one.name, 0.0, one.log_evidence - (log_evidence(without) - log_evidence(base)))
         excluded = replace(

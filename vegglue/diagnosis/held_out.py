@@ -34,6 +34,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, model_that_errs
 from vegglue.calibration.model_error import any_error, model_error_columns
 from vegglue.case.bed_error import without_surveys
+from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import ModelError
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.field_scan import free_of_prior
@@ -61,7 +62,8 @@ def held_out_errors(base: Baseline, held_out: Model) -> HeldOutErrors:
     case = base.model.case.model_copy(
         update={"experiments": held_out.case.experiments, "observations": held_out.case.observations}
     )
-    there = Model(case, held_out.site, held_out.station, held_out.engine)
+    site = held_out.site if held_out.case.bed == case.bed else build_site(case)  # a surveyed line may have become loose
+    there = Model(case, site, held_out.station, held_out.engine)
     point = linearise(there, base.fitted.point.z)
     rows = np.flatnonzero(leading_velocities(there.station))
     if not rows.size or point is None:

@@ -26,11 +26,11 @@ from vegglue.arrays import Array
 from vegglue.calibration.candidates import Candidate, cause_of
 from vegglue.calibration.model_error import cell_responses, model_error_columns, site_error_columns
 from vegglue.calibration.noise import Noise
+from vegglue.case.bed import read_bed_survey
 from vegglue.case.bed_error import bed_error_columns
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import in_experiment
 from vegglue.case.schema import Case, ModelError, Planned
-from vegglue.case.survey_error import read_bed_survey
 from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.observations import section_places, station_table

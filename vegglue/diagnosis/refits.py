@@ -17,7 +17,9 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import (
     Baseline,
     SearchModel,
+    baseline,
     coarse_search,
+    log_evidence,
     search_model,
     under_error_of_grid,
     with_coarse_point,
@@ -27,10 +29,15 @@ from vegglue.calibration.baseline import (
 )
 from vegglue.calibration.candidates import Candidate, candidate_in_case, start_amplitude, with_effect
 from vegglue.calibration.fit import MapEstimate, at_point, fit, interval95, log_evidence_under
+from vegglue.calibration.learned_bed import line_offset
+from vegglue.calibration.score_test import log_factors
+from vegglue.case.bed_error import SurveyedLine, surveyed_lines, with_loose_line
+from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse, linearise_from
+from vegglue.errors import InputError
 from vegglue.normal_range import NORMAL95
 from vegglue.parallel import parallel_map
 from vegglue.progress import Progress, Watch, counted, silent
@@ -132,6 +139,39 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
     noise = with_own_error_at(base.noise, coarse, place)
     trial = Baseline(model, noise, at_point(noise, start), coarse, place)
     return with_own_error_again(under_error_of_grid(trial), place.z)
+
+
+@dataclass(frozen=True)
+class Relevelled:
+    """The model calibrated without the level of a surveyed line; log_factor: ln B of an offset of that line against
+    none, by survey and flow [-]; the offset and its standard error [m].
+    """
+
+    base: Baseline
+    log_factor: float
+    offset: float
+    error: float
+
+
+def relevelled(base: Baseline, line: SurveyedLine) -> Relevelled | None:
+    """The model without the level of a line; None where no flow is found on that bed.
+
+        ln B = ln p(y | its level unknown) - ln p(y | its level as surveyed) + ln B of the survey alone
+
+    What the survey says of the offset is the prior of the flow in the first term, and counts once.
+    """
+    case = with_loose_line(base.model.case, line)
+    try:
+        loose = baseline(replace(base.model, case=case, site=build_site(case)), base.fitted.point.z, base.noise)
+    except InputError:
+        return None
+    known = surveyed_lines(base.model.case, base.model.site.grid)
+    of_survey, columns = known.evidence
+    trace = columns[:, known.lines.index(line)]
+    length = float(np.linalg.norm(trace))
+    alone = log_factors(np.array([trace @ of_survey / length]), np.array([length * constants().line_offset]))
+    gained = log_evidence(loose) - log_evidence(base)
+    return Relevelled(loose, gained + float(alone[0]), *line_offset(loose, line, base))
 
 
 def _on_own_cells(base: Baseline, model: Model, place: Point) -> Point | None:

@@ -254,15 +254,19 @@ def anomaly_found(screening: Screening, hypotheses: Sequence[Hypothesis], which:
 
 
 def instrument_found(screening: Screening, best: Hypothesis, one: Instrument) -> FaultyInstrument:
-    """The best hypothesis, an instrument, with its offset: s^2 o' C^-1 r / (1 + s^2 o' C^-1 o), o 1 in its readings."""
+    """The best hypothesis, an instrument, with its offset: s^2 o' C^-1 r / (1 + s^2 o' C^-1 o), o 1 in its readings; of
+    a surveyed line that of the model without its level.
+    """
     noise = screening.base.noise
     kind = kind_named(screening.kinds, best.kind)
     length, score = float(kind.projected.length[best.column]), float(kind.scores[best.column])
     shrunk = float(prior_shrinkage(kind.size[best.column]))
     offset, spread = shrunk * score / length, np.sqrt(shrunk) / length
-    station, columns = screening.base.model.station.iloc[noise.rows[one.readings[0]]], error_columns(one, noise.value)
+    if best.without is not None:
+        offset, spread = best.without.offset, best.without.error
+    stations = noise.rows[list(one.readings)]
     factor = float("nan")  # what a probe reads over what is there, unless an offset explains it as well
-    if columns.shape[1] > 1:
+    if one.line is None and (columns := error_columns(one, noise.value)).shape[1] > 1:
         point = screening.base.fitted.point
         residual, both = noise.whiten(noise.residual(point.prediction)), noise.whiten(columns)
         projected = score_test.project(screening.whitened_slopes, residual, point.z, both)
@@ -273,10 +277,10 @@ def instrument_found(screening: Screening, best: Hypothesis, one: Instrument) ->
         kind=one.kind,
         x=one.x,
         y=one.y,
-        stations=tuple(int(noise.rows[row]) for row in one.readings),
+        stations=tuple(map(int, stations)),
         offset=offset,
         interval95=(offset - NORMAL95 * spread, offset + NORMAL95 * spread),
-        unit=kind_of(str(station["kind"])).unit,
+        unit="m" if one.line else kind_of(str(screening.base.model.station["kind"].iloc[stations[0]])).unit,
         log_factor=best.log_evidence,
         factor=factor,
     )

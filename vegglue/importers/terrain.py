@@ -23,7 +23,6 @@ from vegglue.case.survey_error import (
     fitted_covariances,
     lines_left_out,
     mean_level,
-    with_wrong_line_loose,
 )
 from vegglue.case.text_files import case_name
 from vegglue.case.zones import beyond_slope_break, slope
@@ -138,7 +137,6 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
             "file": f"{data_folder(target).name}/survey.csv",
             "covariances": [one.model_dump() for one in terrain.survey.covariances],
             "left_out": terrain.survey.left_out.model_dump(),
-            **({"loose": list(terrain.survey.survey.loose)} if terrain.survey.survey.loose else {}),
         }
     taken = f"bed: {terrain.taken}"
     if beyond > 0.0:
@@ -391,11 +389,10 @@ def _between_points(terrain: Terrain, survey: BedSurvey, without: Callable[[NDAr
         if max(one.sd for one in covariances) < LEAST_BED_ERROR:
             return terrain
         left_out = lines_left_out(survey, covariances, straight)
-        survey = with_wrong_line_loose(survey, covariances)
     except np.linalg.LinAlgError:  # points too much alike for a covariance
         return terrain
     fitted = FittedSurvey(survey, covariances, left_out)
-    if left_out.error > left_out.straight and not survey.loose:
+    if left_out.error > left_out.straight:
         return replace(terrain, survey=fitted)
 
     def level(x: Array, y: Array) -> Array:

@@ -105,7 +105,7 @@ class FaultyInstrument:
     Attributes
     ----------
     kind
-        A reading, a position, a probe or a gauge.
+        A reading, a position, a probe, a gauge, or a surveyed line of the bed.
     x, y
         Where it stood [m], NaN if at several places.
     stations

@@ -252,7 +252,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "set": diagnosis.set,
         "groups": diagnosis.groups,
         "not_excluded": verdict.not_excluded,
-        "where": None if verdict.anomaly is None else asdict(verdict.anomaly),
+        "where": verdict.where,
         "effects": [*map(candidate_effect_json, diagnosis.candidate_effects)],
         "steps": [asdict(step) for step in diagnosis.steps],
         "remarks": verdict.remarks,

@@ -6,9 +6,9 @@ for each class of this file. A new reason is a class here, its rule, and its mac
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from dataclasses import field as by_default
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from scipy.special import chdtr
 
@@ -421,24 +421,23 @@ class PlacesOnMap:
 
 @dataclass(frozen=True)
 class BedCorrected:
-    """The largest clear correction of a surveyed bed between two lines: change with its 95 % interval [m] at x, y [m];
-    between: x of the surveyed lines on both sides [m], NaN beyond the last.
+    """A spot in which flow and survey put the bed higher by `change` than the survey alone, on average, with its 95 %
+    interval [m]: middle x, y with standard errors, half length and half width [m]; log_factor: ln of the Bayes factor
+    against no mean error there, local_log_factor: of a local error beside all that the survey leaves open [-]; between:
+    x of the surveyed lines on both sides [m], NaN beyond the last.
     """
 
     x: float
     y: float
+    x_error: float
+    y_error: float
+    length: float
+    width: float
     change: float
     interval95: tuple[float, float]
+    log_factor: float
+    local_log_factor: float
     between: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class LineLevelledWrongly:
-    """A surveyed line at x [m] that lies too high by `offset` with its 95 % interval [m]; its level was not used."""
-
-    x: float
-    offset: float
-    interval95: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -527,7 +526,6 @@ Note = (
     | InstrumentExcluded
     | EffectsUntestable
     | BedCorrected
-    | LineLevelledWrongly
     | PlacesOnMap
     | MeasuredStretch
     | TooShallow
@@ -575,6 +573,8 @@ class Verdict:
         Faulty instruments that the verdict names; others stand in `notes`.
     field, laws
         A smooth field, or laws, that the verdict names.
+    bed
+        Where the bed differs from the surveyed one, of a verdict without doubt that names no other place.
     reasons
         Why no more is known; empty for a verdict without doubt.
     tested
@@ -603,6 +603,7 @@ class Verdict:
     instruments: tuple[FaultyInstrument, ...] = ()
     field: FieldFound | None = None
     laws: CandidateLaws | None = None
+    bed: BedCorrected | None = None
     reasons: tuple[Reason, ...] = ()
     tested: EffectsTested = EffectsTested(0, 0, 0)
     clears_the_model: bool = False
@@ -664,6 +665,18 @@ class Verdict:
         return self.places[0] if self.places else None
 
     @property
+    def where(self) -> dict[str, Any] | None:
+        """The place that the verdict names: something unlisted, a surveyed line, or where the bed differs."""
+        if self.anomaly is not None:
+            return asdict(self.anomaly)
+        for line in (one for one in self.instruments if one.kind == "line"):
+            of_line = {"x": line.x, "y": line.y, "amplitude": line.offset}
+            return {"term": "line", **of_line, "interval95": line.interval95, "unit": line.unit}
+        if self.bed is None:
+            return None
+        return {"term": "bed", "amplitude": self.bed.change, "unit": "m", **asdict(self.bed)}
+
+    @property
     def sentence(self) -> str:
         """The verdict in words."""
         return sentence(self)
@@ -690,7 +703,7 @@ class VerdictInputs:
     of the data [-]; carried: sections that clearly carry another discharge than stated; remainder: whether all
     significant effects may be a remainder of what was accepted; surroundings: notes on the map, the measured stretch,
     the depth and the parameters; excluded: effects that cannot act at the site, with the reason of each; hangs_on: the
-    section without which another name leads.
+    section without which another name leads; bed: where it differs from the surveyed one, the clearest first.
     """
 
     candidates: tuple[CandidateEffect, ...]
@@ -716,6 +729,7 @@ class VerdictInputs:
     surroundings: tuple[Note, ...] = ()
     excluded: Mapping[str, str] = by_default(default_factory=dict)
     hangs_on: NameHangsOnSection | None = None
+    bed: tuple[BedCorrected, ...] = ()
 
 
 def make_verdict(inputs: VerdictInputs) -> Verdict:
@@ -738,7 +752,9 @@ def make_verdict(inputs: VerdictInputs) -> Verdict:
         if ranked := sorted(inputs.significant_effects.items(), key=lambda one: one[1]):
             remaining.append(EffectsStillSignificant(tuple(ranked), inputs.remainder))
     explained = () if found.doubts_the_data else tuple(discharge_mismatches(inputs.carried))
-    found = replace(found, remaining=tuple(remaining), may_explain=explained)
+    sure = not (found.kind == "cannot-tell" or found.reasons or remaining or found.field or found.laws)
+    bed = inputs.bed[0] if inputs.bed and sure and found.anomaly is None else None
+    found = replace(found, remaining=tuple(remaining), may_explain=explained, bed=bed)
     return replace(found, notes=tuple(_notes(inputs, found)))
 
 
@@ -941,6 +957,7 @@ def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
             any(one.name in elsewhere for one in blind),
         )
     yield from inputs.surroundings
+    yield from (one for one in inputs.bed if one is not found.bed)
     named = found.kind in ("identified", "one-of", "none-of-these", "instrument")
     if named and misfit.p < constants().poor_fit_chance and found.laws is None:
         yield MisfitRemains(misfit)
