@@ -84,6 +84,10 @@ class DecisionConstants:
         0.2, "m", CHOSEN, "plausible offset of a surveyed line: a staff misread by a decimetre or two; before river-h "
         "ran with it",
     )  # fmt: skip
+    effect_sizes: float = _constant(
+        1.0, "-", CHOSEN, "plausible sizes of listed effects over those of the library, of which some are relations of "
+        "the literature and most are chosen: `vegglue effects NAME`",
+    )  # fmt: skip
     # Odds and chances.
     known_first_odds: float = _constant(
         5.0, "-", CHOSEN, "odds by which places have to lead what is known; after open-n (4.7) and eight objects of "

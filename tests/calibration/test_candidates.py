@@ -16,6 +16,7 @@ from vegglue.calibration.candidates import (
     candidate_in_case,
     candidates_in_case,
     candidates_of,
+    cause_of,
     error_columns,
     instruments_of,
     offset_columns,
@@ -59,6 +60,18 @@ def test_shapes_that_are_left_alone_or_calibrated_stop_no_search(
 
 
 STATION = stations_of(CASE, ("A",), 3)
+
+
+def test_shapes_that_are_calibrated_with_the_amplitude_are_parameters_of_a_case_and_numbers_of_a_cause() -> None:
+    one = Candidate(library()["inflow_distribution"])
+    assert one.settings() == [{"mode": float(mode)} for mode in range(1, 5)]
+    added = set(with_effect(CASE, one, {"mode": 2.0}).parameters) - set(CASE.parameters)
+    assert added == {f"inflow_distribution_{name}" for name in ("excess", "second", "third", "fourth")}
+    cause = cause_of(CASE, one, {"mode": 2.0})
+    assert set(cause.case.parameters) - set(CASE.parameters) == {cause.parameter}
+    assert cause.case.effects[one.key].values == {
+        "excess": cause.parameter, "mode": 2.0, "second": 0.0, "third": 0.0, "fourth": 0.0,
+    }  # fmt: skip
 
 
 def test_an_excluded_effect_is_no_candidate() -> None:

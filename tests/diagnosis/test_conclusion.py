@@ -34,6 +34,7 @@ from vegglue.diagnosis.conclusion import (
 )
 from vegglue.diagnosis.search_state import SearchState, Undecided
 from vegglue.effects.definition import Amplitude
+from vegglue.progress import silent
 from vegglue.results.causes import Rival
 from vegglue.results.verdict import MeasuredStretch, NameHangsOnSection, PlacesOnMap
 
@@ -178,6 +179,6 @@ def test_with_a_law_instead_of_a_place_effects_are_those_of_the_model_without_it
     monkeypatch.setattr(conclusion, "candidate_laws", lambda *_: laws)
     held = SearchState(places=(an_anomaly(),), undecided=Undecided((), ()))
     with_place = {one: a_candidate_effect(one) for one in candidate_effects_of(first)}
-    found = conclusion.assemble_diagnosis(first, first, held, with_place, None, lambda: None)
+    found = conclusion.assemble_diagnosis(first, first, held, with_place, None, lambda: None, silent)
     assert (found.places, found.verdict.places, found.verdict.undecided) == ((), (), ())
     assert {one.name: one for one in found.candidate_effects} == candidate_effects_of(first)

@@ -47,7 +47,7 @@ def test_something_between_the_spots_is_found_where_it_lies(drag: float) -> None
     spot = int(short[np.argmax(kind.log_evidence[short])])
     shapes = places.shapes(spot)
     candidate = place_candidate(OBJECT, shapes, places.plausible)
-    start = start_with(search.model.case, candidate, shapes, search.point.z, 0.5 * drag)
+    start = start_with(candidate, search.point.z, 0.5 * drag)
     (refit,) = refits_of(search, [RefitTrial(candidate, shapes, (start,))])
     assert refit is not None
 

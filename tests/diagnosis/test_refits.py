@@ -6,18 +6,20 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy.stats
+from coarse_twin import coarse_twin
 from linear_baseline import CASE_OF_TWINS, at_best, linear_engine, measured_linearly, stations_of
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import log_evidence, search_model
-from vegglue.calibration.candidates import Candidate, with_effect
-from vegglue.calibration.fit import covariance
+from vegglue.calibration.baseline import Baseline, log_evidence, search_model
+from vegglue.calibration.candidates import Candidate, start_with, with_effect
+from vegglue.calibration.fit import covariance, fit
+from vegglue.calibration.noise import noise_of
 from vegglue.case.parameter_space import theta_at, z_of
 from vegglue.diagnosis.competition import Hypothesis, chances_of, tempering
 from vegglue.diagnosis.refits import RefitTrial, pruned, refits_of
 from vegglue.diagnosis.search_state import rivals_among
 from vegglue.effects.library import library
-from vegglue.engine.interface import Model, Point, Wanted, always
+from vegglue.engine.interface import Model, Point, Wanted, always, linearise
 from vegglue.progress import silent
 
 Kept = tuple[dict[str, float], tuple[tuple[str, ...], ...]]
@@ -160,3 +162,29 @@ def test_of_all_starts_the_best_end_counts(order: tuple[int, ...]) -> None:
     assert refit.fitted.point.z[-1] > 1.0
     (none,) = refits_of(search, [RefitTrial(one, {}, starts[:0])])
     assert none is None
+
+
+@pytest.mark.slow
+def test_an_inflow_that_is_not_developed_is_calibrated_in_all_its_modes() -> None:
+    """Four modes, of which the first is the amplitude of the hypothesis."""
+    model, point = coarse_twin()
+    one, skew = (Candidate(library(None)[name]) for name in ("inflow_distribution", "inflow_skew"))
+    modes = {"excess": 0.5, "second": -0.3, "third": 0.0, "fourth": 0.6}
+    case = with_effect(model.case, one, {"mode": 1.0})
+    z = np.append(point.z, [z_of(case.parameters[f"{one.key}_{name}"], value) for name, value in modes.items()])
+    there = linearise(replace(model, case=case), z, point)
+    assert there is not None
+    model = replace(model, station=model.station.assign(value=there.prediction))
+    noise = noise_of(model.station)
+    search = search_model(Baseline(model, noise, fit(model, noise, point), None, None))
+    tried = ((one, {"mode": 1.0}), (skew, dict[str, float]()))
+    refit, of_skew = refits_of(
+        search, [RefitTrial(of, shapes, (start_with(of, search.point.z, 0.1),)) for of, shapes in tried]
+    )
+    assert refit is not None
+    assert of_skew is not None
+    assert refit.amplitude == pytest.approx(0.5, abs=0.1)
+    assert refit.log_factor > of_skew.log_factor + 10.0
+    case = with_effect(search.model.case, one, {"mode": 1.0})
+    found = theta_at(case, refit.fitted.point.z)
+    assert float(found["inflow_distribution_fourth"][0]) == pytest.approx(0.6, abs=0.15)

@@ -433,13 +433,22 @@ def test_with_significant_laws_the_verdict_is_never_nothing_missing() -> None:
 
 @pytest.mark.parametrize(
     ("steps", "parts"),
-    [((), {"places": (an_anomaly(),)}), ((), {"undecided": UNSURE, "strained": ("k_s", 4.5)}), ((step("a"),), {})],
+    [((), {"places": (an_anomaly(),)}), ((), {"undecided": UNSURE, "strained": ("k_s", 4.5)})],
 )
 def test_a_law_beside_what_was_found_is_a_note(steps: tuple[Step, ...], parts: dict[str, Any]) -> None:
     found = verdict_on(*steps, laws=LIKELY, **parts)
     assert found.laws is None
     (note,) = [one for one in found.notes if wording.tag_of(one) == "law_stands_out"]
     assert (note.laws, note.instead_of) == (LIKELY, tuple(one.accepted for one in steps))
+
+
+@pytest.mark.parametrize(("chance", "kind"), [(0.95, "none-of-these"), (0.6, "one-of"), (0.2, "one-of")])
+def test_a_law_and_a_listed_effect_are_one_competition(chance: float, kind: str) -> None:
+    laws = replace(LIKELY, chance=chance)
+    found = verdict_on(step("a"), laws=laws)
+    assert (found.kind, found.laws, [one.name for one in found.effects]) == (kind, laws, ["a"])
+    doubted = verdict_on(step("a"), laws=laws, strained=("k_s", 4.5))
+    assert (doubted.kind, doubted.laws) == ("cannot-tell", None)
 
 
 def test_a_law_is_worth_a_search_unless_another_cause_comes_first() -> None:

@@ -1,7 +1,7 @@
 """Every effect against a number worked out by hand from its equation; one row each, none left out."""
 
 from dataclasses import fields, replace
-from math import exp, log, pi, sin, sqrt
+from math import cos, exp, log, pi, sin, sqrt
 
 import numpy as np
 import pytest
@@ -100,6 +100,16 @@ ROWS = {
         {"excess": 0.4, "middle": 0.5, "width": 0.5},
         {"spread": [[[1.0 + 0.4 * exp(-4.0)], [1.4]]] * 2},
     ),
+    "inflow_distribution": (
+        boundary(),
+        {"excess": 0.4, "mode": 2.0, "second": 0.2, "third": 0.6, "fourth": -0.4},
+        {
+            "spread": [[
+                [exp(0.2 * cos(0.25 * k1) + 0.2 * cos(0.5 * k1) + 0.2 * cos(0.75 * k1) - 0.1 * cos(k1))]
+                for k1 in (pi, 3.0 * pi)
+            ]] * 2
+        },
+    ),
     "lateral_inflow": (boundary(), {"share": 0.1}, {"lateral": 0.3}),
     "outlet_level_error": (boundary(), {"rise": 0.05}, {"level": 0.95}),
     "streamlining": (plant_cells(), {"vogel_exponent": -1.0, "reference_speed": 0.35}, {"phi": 1.0}),
@@ -167,6 +177,11 @@ ROWS = {
         cells(u=shear),
         {"coefficient": 0.1, "width": 2.0, "mean_depth": 0.4},
         {"viscosity": 0.01 * 4.0 * 0.5 * 0.2},
+    ),
+    "growing_shear_layer": (  # 2.25 m from the inflow, where 2 k = 0.1 1/m
+        cells(u=shear, on=geometry(x=np.arange(1.0, 6.0)[:, None, None])),
+        {"spreading": 0.2},
+        {"viscosity": (0.07 * 0.2 * (1.0 - exp(-0.225)) / 0.1) ** 2 * 0.2},
     ),
     "wake_mixing": (
         cells(u=0.6, on=geometry(wake=5.0)),

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from vegglue.case.config import load_case
 from vegglue.diagnosis.comparison import excluded_by, held_out_rmse, model_score
@@ -216,6 +217,54 @@ def read_raster_of(path: Path) -> Callable[[float, float], float]:
     return level
 
 
+# D. A jam of wood over the whole width of a flat flume of Penn State, 15.24 m by 1.5 m: means of two to five heights at
+# five places across in four sections, and levels before and behind, at four discharges (cases 9 to 12).
+JAM = "SRH_2D/plotting/depth_averaged_velocity/measurement_data"
+JAM_AT, JAM_LENGTH, JAM_CASES = 10.16, 0.2, range(9, 13)
+JAM_PLACES = (-0.6, -0.3, 0.0, 0.3, 0.6)
+# x of the sections from the middle of the jam [m], and of the gauge before it, as in the authors' model.
+JAM_SECTIONS = {
+    "72inch_upstream": -1.83, "36inch_upstream": -0.91, "36inch_downstream": 0.91, "72inch_downstream": 1.83,
+}  # fmt: skip
+JAM_GAUGE = -4.673
+
+
+def jam(stated: bool) -> Callable[[Path, Path], Path]:
+    """The folder of the flume with a jam; stated: with it as a patch, else as a user who knows of none."""
+
+    def folder(data: Path, to: Path) -> Path:
+        shutil.rmtree(to, ignore_errors=True)
+        to.mkdir(parents=True)
+        table = pd.read_excel(data / "results_for_all_cases.xlsx", sheet_name="Sheet1", header=None)
+        known = {str(row[3]): row[4:20].to_numpy() for _, row in table.iterrows()}
+        velocity, level, flows = ["experiment,section,x,y,u,u_se"], ["experiment,section,x,y,level,level_se"], []
+        for case in JAM_CASES:
+            name = f"c{case}"
+            for section, x in JAM_SECTIONS.items():
+                read = pd.read_excel(data / JAM / f"Case{case}" / f"{section}.xlsx", header=None)
+                means = read[read[0] == "average"].iloc[0, 1:].to_numpy(float)
+                rows = zip(JAM_PLACES, means, strict=True)
+                velocity += [f"{name},{section},{JAM_AT + x:.2f},{y:g},{u:.5f},0.01" for y, u in rows]
+            before, behind, carried = (
+                float(known[what][case - 1]) for what in ("Upstream WSE (m)", "Downstream WSE (m)", "Discharge (m3/s)")
+            )
+            level.append(f"{name},before,{JAM_AT + JAM_GAUGE:.2f},0,{before},0.005")
+            flows.append(f"  {name}: {{discharge: {carried}, level: {behind}}}")
+        (to / "velocities.csv").write_text("\n".join(velocity) + "\n", encoding="utf-8")
+        (to / "levels.csv").write_text("\n".join(level) + "\n", encoding="utf-8")
+        ends = [JAM_AT - 0.5 * JAM_LENGTH, JAM_AT + 0.5 * JAM_LENGTH]
+        patch = f"patches: [{{name: jam, x: {ends}, y: [-0.75, 0.75], stems_per_m2: 441}}]\n" if stated else ""
+        (to / "site.yaml").write_text(
+            "channel: {length_m: 15.24, bottom_width_m: 1.5, bed_slope: 0.0}\nwalls: 0.010\n"
+            "grid: {x: [0, 15.24], y: [-0.75, 0.75], cell: [0.127, 0.1]}\n" + patch +
+            "experiments:\n" + "\n".join(flows) + "\n",
+            encoding="utf-8",
+        )  # fmt: skip
+        return to
+
+    return folder
+
+
 HYDROBAYES = "Felipemendezrios/Hydrobayes @ ecd7947e, d83c12f9, 316ddab5"
 SETS = (
     MeasuredSet(
@@ -247,8 +296,22 @@ SETS = (
         f"rustychris/hor_flow_and_salmon @ 30f00859: {TRACKS}, {DEM}",
         tidal_reach,
         "more horizontal shear than in their model, n = 0.023; one track without RTK (notes of the authors)",
-        ("inflow_peak", "inflow_skew", "inflow_core", "station_shift"),
-        ("viscosity", "elder", "mixing_length", "smagorinsky", "coherent_structures"),
+        ("inflow_distribution", "inflow_peak", "inflow_skew", "inflow_core", "station_shift"),
+        ("viscosity", "elder", "mixing_length", "smagorinsky", "coherent_structures", "growing_shear_layer"),
+    ),
+    MeasuredSet(
+        "D1 jam over a flume, not stated",
+        f"psu-efd/LWD_flow_resistance @ 95ed9506: {JAM}, results_for_all_cases.xlsx",
+        jam(stated=False),
+        "drag of a jam at x = 10.16 m over the whole width, C_d 50 to 60 over 0.2 m (authors' calibration)",
+        ("drag at a place", "bed_stretch"),
+    ),
+    MeasuredSet(
+        "D2 jam over a flume, stated as a patch",
+        f"psu-efd/LWD_flow_resistance @ 95ed9506: {JAM}, results_for_all_cases.xlsx",
+        jam(stated=True),
+        "the jam is not the same over the width: behind it 0.04 to 0.47 m/s side by side (authors' velocities)",
+        ("drag at a place", "patch_density", "edge_thinning"),
     ),
 )
 
@@ -278,6 +341,7 @@ def outcome_of(one: MeasuredSet, data: Path, runs: Path, jobs: int) -> Outcome:
         for model in (grown.cases[0], grown.cases[-1])
     )
     names = {effect.name.split("[")[0] for effect in found.verdict.effects}
+    names |= {f"{place.term} at a place" for place in found.verdict.places}
     alike = {name.split("[")[0] for effect in found.verdict.effects for name in effect.alike}
     judged = "right" if names & set(one.right) else "wrong"
     if judged == "wrong" and (names | alike) & {*one.right, *one.nearly}:

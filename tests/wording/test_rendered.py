@@ -193,6 +193,8 @@ VERDICTS: dict[str, Diagnosis] = {
     "a place and an effect": brook(kind="none-of-these", places=(an_anomaly(),)),
     "a field": brook(kind="none-of-these", effects=(), field=EVERY_KIND.field),
     "a law": brook(kind="none-of-these", effects=(), laws=candidate_laws_of("law_bank_speed_step")),
+    "a law or an effect": brook(kind="one-of", laws=candidate_laws_of("law_bank_speed_step", calibrated=True)),
+    "a law rather than an effect": brook(kind="none-of-these", laws=candidate_laws_of("law_bank_speed_step")),
     "perhaps a law": doubt(laws=candidate_laws_of("law_bank_speed_step")),
     "a law and a doubt": doubt(UncertainBetweenSections(1.5), laws=candidate_laws_of("law_bank_speed_step")),
     "an instrument and perhaps a law": brook(

@@ -19,11 +19,11 @@ from vegglue.arrays import Array
 from vegglue.case.bed_error import SurveyedLine
 from vegglue.case.case_effects import effect_named, effect_of
 from vegglue.case.channel_geometry import site_scales
-from vegglue.case.parameter_space import middle_value
+from vegglue.case.parameter_space import middle_value, z_of
 from vegglue.case.schema import Case, EffectEntry, Parameter
 from vegglue.case.site_schema import Value
 from vegglue.decision_constants import constants
-from vegglue.effects.definition import Amplitude, Effect, Need
+from vegglue.effects.definition import Amplitude, Effect, Need, Shape
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.engine.interface import Cause
@@ -72,19 +72,43 @@ class Candidate:
     def amplitude(self) -> Amplitude:
         """That of the effect, with a plausible size in this case."""
         own = self.effect.amplitude
-        own = own if self.scale is None else replace(own, scale=self.scale)
+        own = replace(own, scale=own.scale * constants().effect_sizes if self.scale is None else self.scale)
         return replace(own, low=own.off) if self.above_off else own
 
     @property
     def parameter(self) -> str:
         return f"{self.key}_{self.effect.amplitude.name}"
 
+    @property
+    def free(self) -> dict[str, str]:
+        """Parameters of the shapes that are calibrated together with the amplitude, by the shape."""
+        return {one.name: f"{self.key}_{one.name}" for one in self.effect.shapes if one.sd}
+
+    @property
+    def priors(self) -> dict[str, Parameter]:
+        """Of the amplitude and of the shapes that are calibrated with it, by the parameter: normal around off, or the
+        default, its standard deviation the plausible size, within the support.
+        """
+        amplitude, free = self.amplitude, self.free
+        all_of: list[tuple[str, Amplitude | Shape, float, float]] = [
+            (self.parameter, amplitude, amplitude.off, amplitude.scale),
+            *((free[one.name], one, one.default, one.sd) for one in self.effect.shapes if one.sd),
+        ]
+        return {
+            name: Parameter(
+                distribution="normal", mean=mean, sd=sd, low=one.low, high=one.high, unit=one.unit, symbol="",
+                meaning=one.meaning,
+            )
+            for name, one, mean, sd in all_of
+        }  # fmt: skip
+
     def settings(self) -> list[dict[str, float]]:
-        """Values of the shapes to try: those that are fixed, else their grids, or their defaults."""
+        """Values of the shapes to try: those that are fixed, else their grids, or their defaults; none of `free`."""
         if self.fixed:
             return [dict(self.fixed)]
-        grids = [shape.grid or (shape.default,) for shape in self.effect.shapes]
-        names = [shape.name for shape in self.effect.shapes]
+        tried = [shape for shape in self.effect.shapes if not shape.sd]
+        grids = [shape.grid or (shape.default,) for shape in tried]
+        names = [shape.name for shape in tried]
         combinations = [dict(zip(names, values, strict=True)) for values in itertools.product(*grids)]
         every = -(-len(combinations) // MOST_SETTINGS)
         return combinations[::every]
@@ -211,12 +235,13 @@ def place_candidate(
 
 
 def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, float]) -> EffectEntry:
-    """The entry of a candidate in a case; amplitude: a number or the name of a parameter."""
+    """The entry of a candidate in a case; amplitude: a number or the name of a parameter, then so are `free` shapes."""
     effect, shapes = candidate.effect, {**dict(candidate.fixed), **shapes}
+    free = candidate.free if isinstance(amplitude, str) else {}
+    given: dict[str, Value] = {one.name: float(shapes.get(one.name, one.default)) for one in effect.shapes}
     return EffectEntry(
         effect=effect.name if candidate.key != effect.name else None,
-        values={effect.amplitude.name: amplitude}
-        | {shape.name: float(shapes.get(shape.name, shape.default)) for shape in effect.shapes},
+        values={effect.amplitude.name: amplitude, **given, **free},
         experiments=candidate.experiments or None,
         sections=candidate.sections,
         devices=candidate.devices,
@@ -224,38 +249,30 @@ def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, fl
 
 
 def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Case:
-    """The case with one effect more; its amplitude is a parameter, its shapes are numbers."""
-    parameter = candidate.parameter
-    effects = {**case.effects, candidate.key: effect_entry(candidate, parameter, shapes)}
-    parameters = {**case.parameters, parameter: prior_of(candidate)}
+    """The case with one effect more; its amplitude is a parameter, its shapes are numbers, but for those of `free`."""
+    effects = {**case.effects, candidate.key: effect_entry(candidate, candidate.parameter, shapes)}
+    parameters = {**case.parameters, **candidate.priors}
     return case.model_copy(update={"effects": effects, "parameters": parameters})
 
 
 def cause_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Cause:
-    """The case with one effect more, as a cause; the response to it is the fingerprint of the effect."""
+    """The case with one effect more, all shapes numbers; the response to it is the fingerprint of the effect."""
+    shapes_as_numbers = tuple(replace(one, sd=0.0) for one in candidate.effect.shapes)
+    candidate = replace(candidate, effect=replace(candidate.effect, shapes=shapes_as_numbers))
     changed = with_effect(case, candidate, shapes)
     return Cause(changed, candidate.parameter, candidate.amplitude, candidate.experiments)
-
-
-def prior_of(candidate: Candidate) -> Parameter:
-    """The prior of an amplitude: normal around off, its standard deviation the plausible size, within the support."""
-    amplitude = candidate.amplitude
-    return Parameter(
-        distribution="normal",
-        mean=amplitude.off,
-        sd=amplitude.scale,
-        low=amplitude.low,
-        high=amplitude.high,
-        unit=amplitude.unit,
-        symbol="",
-        meaning=amplitude.meaning,
-    )
 
 
 def start_amplitude(amplitude: Amplitude, gain: float) -> float:
     """The amplitude of that gain, kept off the ends of its support."""
     margin = START_OFF_ENDS * min(amplitude.scale, amplitude.high - amplitude.low)
     return float(np.clip(amplitude.at(gain), amplitude.low + margin, amplitude.high - margin))
+
+
+def start_with(candidate: Candidate, z: Array, gain: float) -> Array:
+    """z (p + q,) with a candidate: z (p,), the amplitude of that gain, and its q - 1 free shapes in the middle."""
+    amplitude = start_amplitude(candidate.amplitude, gain)
+    return np.concatenate([z, [z_of(candidate.priors[candidate.parameter], amplitude)], np.zeros(len(candidate.free))])
 
 
 InstrumentKind = Literal["reading", "position", "probe", "gauge", "line"]

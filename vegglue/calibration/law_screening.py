@@ -16,6 +16,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
+from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.calibration.candidates import cause_of
 from vegglue.calibration.fingerprints import Fingerprints, fingerprints_of
@@ -52,10 +53,8 @@ class LawScreening:
     p: float
     cosine: np.ndarray
 
-    @property
-    def of_each(self) -> np.ndarray:
-        """ln evidence of each law, all its references together (law,) [-]."""
-        evidence = self.kind.log_evidence
+    def of_each(self, evidence: Array) -> np.ndarray:
+        """ln evidence of each law, all its references together (law,) [-]; evidence: of each column (l,)."""
         return np.array([np.logaddexp.reduce(evidence[columns]) for columns in self.columns])
 
     @property

@@ -24,8 +24,7 @@ from vegglue.calibration.candidates import (
     instruments_of,
     offset_columns,
     plausible_offset,
-    start_amplitude,
-    with_effect,
+    start_with,
 )
 from vegglue.calibration.fingerprints import Fingerprints, fingerprints_of
 from vegglue.calibration.fit import at_point, objective
@@ -41,7 +40,6 @@ from vegglue.calibration.score_test import (
 )
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.channel_geometry import half_width
-from vegglue.case.parameter_space import z_of
 from vegglue.decision_constants import constants
 from vegglue.engine.interface import Point, linearise, responses
 from vegglue.flow.local_changes import Term
@@ -257,16 +255,15 @@ def _estimated_noise(noise: Noise, used: tuple[Array, Array], residual: Array, z
 
 
 def refit_start(screening: Screening, candidate: int, column: int) -> Array:
-    """z (p + 1,) to start the refit with a candidate from: the joint linear step of all parameters."""
-    one, shapes = screening.fingerprints.candidates[candidate], screening.fingerprints.settings[column]
+    """z (p + q,) to start the refit with a candidate from: the joint linear step of all parameters."""
+    one = screening.fingerprints.candidates[candidate]
     gain = float(screening.effects.scores[column] / max(screening.projected.length[column], 1e-300))
     point, slope, noise = screening.base.fitted.point, screening.whitened_slopes, screening.base.noise
     remaining = noise.whiten(noise.residual(point.prediction)) - screening.whitened_fingerprints[:, column] * gain
     matrix = slope.T @ slope + np.eye(point.z.size)
     step = np.linalg.solve(matrix, slope.T @ remaining - point.z)
     step *= min(1.0, 1.0 / float(np.abs(step).max() + 1e-300))
-    changed = with_effect(screening.base.model.case, one, shapes)
-    return np.append(point.z + step, z_of(changed.parameters[one.parameter], start_amplitude(one.amplitude, gain)))
+    return start_with(one, point.z + step, gain)
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,20 @@
 """What a screening finds of effects and of laws, as values: how large to first order, how surely, what confounds them.
 
-Laws would explain what no listed effect does, to first order; `discover` calibrates them and writes one down.
+Laws would explain what no listed effect does; `discover` writes one down.
 
     p_j ~ exp((E_j - max E) / w_j)   over laws and all else that was compared, see `competition`
 
-They have an alarm of their own, which follows that of everything listed: the listed library goes first. Beside a
-listed effect that was accepted they are named if they clearly explain more.
+They have an alarm of their own, which follows that of everything listed: the listed library goes first. Those that are
+not clearly less likely than what was accepted are calibrated, as in `discover`, and named beside it; a law that leaves
+the same trace as an accepted effect is that effect.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import log_evidence
 from vegglue.calibration.detection import detected_length
@@ -20,7 +23,8 @@ from vegglue.calibration.law_screening import LawScreening, law_fingerprints, sc
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import prior_shrinkage
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import tempered_probabilities
+from vegglue.diagnosis.competition import Hypothesis, chances_in_set
+from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.search_state import SearchState
 from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import (
@@ -128,14 +132,18 @@ def laws_beside(screening: Screening) -> LawScreening | None:
 
 
 def candidate_laws(
-    first: Screening, last: Screening, found: SearchState, beside_first: Callable[[], LawScreening | None]
+    first: Screening,
+    last: Screening,
+    found: SearchState,
+    beside_first: Callable[[], LawScreening | None],
+    refitted: Callable[[LawScreening, Sequence[str], float, float], tuple[Sequence[Hypothesis], Array, float]],
 ) -> CandidateLaws | None:
     """Laws that are significant in the last model, or in the first one if something was accepted; else None.
 
-    Beside accepted effects they are reported only if they are `clearly_a_law`, or likelier than effects and a place
-    together, which a law looks like. Chosen after the twin of docs/discover.md, whose law has 84 %.
+    Beside accepted effects they are reported if these are not strong_odds times as likely as they are.
 
-    beside_first: `laws_beside` the first screening, begun before it is known whether it is needed.
+    beside_first: `laws_beside` the first screening, begun before it is known whether it is needed; refitted:
+    `laws_beside_accepted`.
     """
     if found.implausible:
         return None
@@ -149,8 +157,17 @@ def candidate_laws(
         against = [one.log_evidence for one in found.undecided.hypotheses]
     else:
         against = [kind.total for kind in last.kinds]
-    of_laws = screening.of_each
-    chances = tempered_probabilities(np.append(of_laws, against))[: of_laws.size]
+    evidence = np.where(same_as_accepted(screening, found.effects), -np.inf, screening.kind.log_evidence)
+    of_laws, strengths = screening.of_each(evidence), {}
+    if np.isfinite(of_laws).any() and _within_strong_odds(of_laws, against):
+        alone = [] if found.places else found.effects
+        calibrated, kept, own = refitted(screening, alone, found.log_prior, max(against))
+        against = [own] if found.accepted else against
+        of_laws = screening.of_each(np.where(np.isinf(evidence), -np.inf, kept))
+        strengths = {one.name: one.what.amplitude for one in calibrated if isinstance(one.what, Refit)}
+    if not np.isfinite(of_laws).any():
+        return None
+    chances = chances_in_set(np.append(of_laws, against))[: of_laws.size]
     order = np.argsort(-chances)
     count = int(np.searchsorted(np.cumsum(chances[order]), LAWS_HELD * chances.sum())) + 1
     laws = []
@@ -165,15 +182,31 @@ def candidate_laws(
                 equation=one.law.equation(reference),
                 reference=reference,
                 scale=one.candidate.amplitude.scale,
-                strength=screening.gain(j),
+                strength=strengths.get(one.law.name, screening.gain(j)),
                 chance=float(chances[j]),
             )
         )
-    suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), tuple(laws))
-    reported = not found.steps or clearly_a_law(suspected) or (bool(found.places) and suspected.likelier)
-    return suspected if reported else None
+    suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), tuple(laws), bool(strengths))
+    return suspected if not found.steps or not clearly_listed(suspected) else None
 
 
-def clearly_a_law(laws: CandidateLaws | None) -> bool:
-    """Whether laws are strong_odds times as likely as all else together: a place then stands in for one."""
-    return laws is not None and laws.chance > constants().strong_odds * (1.0 - laws.chance)
+def _within_strong_odds(of_laws: Array, against: Sequence[float]) -> bool:
+    """Whether all laws together are within strong_odds of all else, either way."""
+    chance = float(chances_in_set(np.append(of_laws, against))[: of_laws.size].sum())
+    least = 1.0 / (1.0 + constants().strong_odds)
+    return least <= chance
+
+
+def same_as_accepted(screening: LawScreening, accepted: Sequence[str]) -> NDArray[np.bool_]:
+    """Whether the law of each column leaves the same trace as an accepted effect (l,)."""
+    prints = screening.listed.fingerprints
+    own = [some for one, some in zip(prints.candidates, prints.columns, strict=True) if one.name in accepted]
+    if not own:
+        return np.zeros(len(screening.settings), dtype=bool)
+    cosine = np.abs(screening.cosine[np.concatenate(own), screening.of_listed :])
+    return np.asarray(cosine.max(axis=0) > constants().alike_cosine)
+
+
+def clearly_listed(laws: CandidateLaws) -> bool:
+    """Whether all else together is strong_odds times as likely as laws."""
+    return constants().strong_odds * laws.chance < 1.0 - laws.chance

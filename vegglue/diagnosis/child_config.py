@@ -16,7 +16,6 @@ from vegglue.calibration.candidates import (
     effect_entry,
     patch_candidate,
     place_candidate,
-    prior_of,
     where_it_may_act,
     with_effect,
 )
@@ -125,8 +124,8 @@ def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapp
             raise InputError(f"--shape: `{min(unknown)}` is not a shape of {candidate.name}: it has {names or 'none'}.")
         working = effect_entry(candidate, candidate.parameter, shapes)
         tree["effects"][candidate.key] = working.model_dump(mode="json", exclude_defaults=True)
-        prior = prior_of(candidate).model_dump(exclude_none=True, exclude={"symbol"})
-        tree["parameters"][candidate.parameter] = prior
+        for name, prior in candidate.priors.items():
+            tree["parameters"][name] = prior.model_dump(exclude_none=True, exclude={"symbol"})
     return tree
 
 

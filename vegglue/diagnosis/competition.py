@@ -37,13 +37,13 @@ from scipy.special import logsumexp
 from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
-from vegglue.calibration.candidates import Instrument, InstrumentKind, place_candidate, with_effect
+from vegglue.calibration.candidates import Instrument, InstrumentKind, place_candidate, start_with, with_effect
 from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Places, digits_of_place, places_around
 from vegglue.calibration.residual_screening import Screening, conditional_screenings, refit_start
 from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors
 from vegglue.case.case_effects import effect_named
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.refits import Refit, RefitTrial, Relevelled, refits_of, relevelled, start_with
+from vegglue.diagnosis.refits import Refit, RefitTrial, Relevelled, refits_of, relevelled
 from vegglue.progress import Progress, Watch
 
 # Odds beyond e^this are reported as this: larger numbers mean no more.
@@ -116,7 +116,7 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
         candidate = place_candidate(moved.candidate.effect, shapes, places.plausible, moved.candidate.above_off)
         if candidate.key in search.model.case.effects:  # it would take the place of what acts there
             break
-        start = start_with(search.model.case, candidate, shapes, moved.fitted.point.z[:-1], float(window.gain[best]))
+        start = start_with(candidate, moved.fitted.point.z[:-1], float(window.gain[best]))
         (there,) = refits_of(search, [RefitTrial(candidate, shapes, (start,))])
         if there is None or there.log_factor < moved.log_factor + LEAST_RISE:
             break
@@ -231,7 +231,7 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
             column, candidate = columns[j], prints.candidates[j]
             shapes, by_score = prints.settings[column], kind.log_evidence[column] - kind.log_prior[column]
             others = (
-                start_with(case, candidate, shapes, look.point.z, float(look.gain[column]))
+                start_with(candidate, look.point.z, float(look.gain[column]))
                 for look in looks
                 if look.log_factor[column] > by_score
             )
@@ -241,13 +241,15 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
             shapes, gain = one.shapes(spot), float(kind_named(screening.kinds, one.term).gain[spot])
             bare = bool(one.only_sign[spot])
             candidate = place_candidate(effect_named(case, EFFECT_AT_PLACE[one.term]), shapes, one.plausible, bare)
-            starts = (start_with(case, candidate, shapes, search.point.z, share * gain) for share in START_SHARES)
+            starts = (start_with(candidate, search.point.z, share * gain) for share in START_SHARES)
             trials.append(RefitTrial(candidate, shapes, tuple(starts)))
         refits = refits_of(search, trials, watch)
         for j, refit in zip(effects, refits, strict=False):
             if refit is not None:  # ln prior of the setting, and what the other settings add to first order
                 some, evidence = prints.columns[j], kind.log_evidence
                 others_add = float(np.logaddexp.reduce(evidence[some]) - evidence[some].max())
+                if prints.candidates[j].free:  # whichever part of it the amplitude is, the model is the same
+                    others_add = float(np.log(some.size))
                 total = refit.log_factor + (float(kind.log_prior[columns[j]]) + others_add)
                 found.append(Hypothesis("effect", refit.candidate.name, total, columns[j], refit))
         for one, _ in places:

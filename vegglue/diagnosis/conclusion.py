@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -23,12 +24,13 @@ from vegglue.case.grid import centreline_in, on_map
 from vegglue.case.gridded_site import cells_at
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, clearly_a_law, not_excluded
+from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, not_excluded
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.competition import tempering
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.handbook import parameter_doubts
 from vegglue.diagnosis.held_out import HeldOutErrors, held_out_errors, largest_error_between
+from vegglue.diagnosis.law_search import laws_beside_accepted
 from vegglue.diagnosis.search_state import SearchState, rivals_in
 from vegglue.effects.definition import Stage
 from vegglue.engine.interface import Model, Point
@@ -36,6 +38,7 @@ from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import STREAMWISE, kind_of, velocity_rows
 from vegglue.measurements.section_discharge import mismatched_discharges
 from vegglue.normal_range import NORMAL95
+from vegglue.progress import Watch
 from vegglue.results.causes import (
     TERMS_AT_PLACES,
     CandidateEffect,
@@ -140,10 +143,11 @@ def assemble_diagnosis(
     effects: Mapping[str, CandidateEffect],
     held_out: Model | None,
     laws_beside_first: Callable[[], LawScreening | None],
+    watch: Watch,
 ) -> Diagnosis:
     """The diagnosis; effects: every candidate by its name; held_out: the model at measurements no calibration uses."""
-    laws = candidate_laws(first, last, found, laws_beside_first)
-    if found.places and not found.steps and not found.instruments and clearly_a_law(laws):
+    laws = candidate_laws(first, last, found, laws_beside_first, partial(laws_beside_accepted, watch=watch))
+    if found.places and not found.steps and not found.instruments and laws is not None and laws.clear:
         # What competed after the place did so in the flow with it.
         found = replace(found, places=(), prior_weights=(), of_shape=0.0, undecided=None)
         last, effects = first, candidate_effects_of(first)

@@ -120,7 +120,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
             one = effects[step.accepted]
             value, low, high = interval95(model, fitted, candidate_in_case(model.case, one.name).parameter)
             effects[one.name] = replace(one, amplitude=replace(one.amplitude, value=value, interval95=(low, high)))
-    return assemble_diagnosis(first, screening, found, effects, unseen, laws)
+    return assemble_diagnosis(first, screening, found, effects, unseen, laws, watch)
 
 
 def _with_alarm(screening: Screening, found: SearchState) -> SearchState:

@@ -16,8 +16,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, baseline
-from vegglue.calibration.candidates import with_effect
+from vegglue.calibration.candidates import start_with, with_effect
 from vegglue.calibration.fingerprints import Fingerprints
 from vegglue.calibration.law_screening import (
     LARGEST_GAIN,
@@ -27,11 +28,12 @@ from vegglue.calibration.law_screening import (
     screen_products,
 )
 from vegglue.calibration.laws_in_case import LawInCase
+from vegglue.calibration.residual_screening import refit_start
 from vegglue.case.parameter_space import theta_at
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import REACH, Hypothesis, chances_in_set, hypotheses_of, tempering
 from vegglue.diagnosis.discovered import Discovery, LawFound, ProductFound
-from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
+from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of
 from vegglue.effects.grammar import SAME_AS
 from vegglue.engine.interface import Model
 from vegglue.engine.model import with_compilation
@@ -66,7 +68,7 @@ def product_beside(
         one, shapes = screening.products[screening.law_of[column]].candidate, screening.settings[column]
         most = LARGEST_GAIN * one.amplitude.scale
         gain = float(np.clip(float(screening.kind.gain[column]), -most, most))
-        trials.append(RefitTrial(one, shapes, (start_with(full.model.case, one, shapes, full.point.z, gain),)))
+        trials.append(RefitTrial(one, shapes, (start_with(one, full.point.z, gain),)))
     refits = refits_of(full, trials, watch)
     ends = [(column, one) for column, one in zip(columns, refits, strict=True) if one is not None]
     if not ends:
@@ -127,7 +129,7 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
         replace(one, log_evidence=one.log_evidence - less) if one.kind in places else one
         for one in hypotheses_of(screening.listed, watch, screening.kind.total)
     ]
-    laws = _refitted_laws(screening, max((one.log_evidence for one in known), default=-np.inf), watch)
+    laws, _ = refitted_laws(screening, max((one.log_evidence for one in known), default=-np.inf), watch)
     ranked = sorted([*known, *laws], key=lambda one: -one.log_evidence)
     evidence = np.array([one.log_evidence for one in ranked])
     if np.logaddexp.reduce(evidence) < 0.0:
@@ -151,10 +153,10 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
     return replace(found, product=product_beside(listed.search, listed.fingerprints, of_law, refit, watch))
 
 
-def _refitted_laws(screening: LawScreening, known: float, watch: Watch) -> list[Hypothesis]:
+def refitted_laws(screening: LawScreening, known: float, watch: Watch) -> tuple[list[Hypothesis], Array]:
     """The most promising quantities, each with the best of its laws that were calibrated and the evidence of all its
-    columns: as kept if calibrated, else to first order, corrected as that of the best one; known: ln evidence of the
-    best of all else.
+    columns: as kept if calibrated, else to first order, corrected as that of the best one; and this evidence of each
+    column of the laws (l,), -inf of other quantities. known: ln evidence of the best of all else.
     """
     evidence, prior, search = screening.kind.log_evidence, screening.kind.log_prior, screening.listed.search
     columns = {
@@ -172,10 +174,10 @@ def _refitted_laws(screening: LawScreening, known: float, watch: Watch) -> list[
     trials = []
     for _, law in tried:
         one, shapes = screening.laws[law].candidate, screening.settings_of(law)
-        start = start_with(search.model.case, one, shapes, search.point.z, screening.gain(law))
+        start = start_with(one, search.point.z, screening.gain(law))
         trials.append(RefitTrial(one, shapes, (start,)))
     refits = refits_of(search, trials, watch)
-    found = []
+    found, of_columns = [], np.full(evidence.size, -np.inf)
     for subject in ranked:
         ends = {
             screening.best_column(law): refit
@@ -188,9 +190,26 @@ def _refitted_laws(screening: LawScreening, known: float, watch: Watch) -> list[
         corrected = evidence + (ends[best].log_factor + prior[best] - evidence[best])
         for column, refit in ends.items():
             corrected[column] = refit.log_factor + prior[column]
+        of_columns[columns[subject]] = corrected[columns[subject]]
         total = float(np.logaddexp.reduce(corrected[columns[subject]]))
         found.append(Hypothesis("law", ends[best].candidate.name, total, best, ends[best]))
-    return found
+    return found, of_columns
+
+
+def laws_beside_accepted(
+    screening: LawScreening, accepted: Sequence[str], log_prior: float, known: float, watch: Watch
+) -> tuple[list[Hypothesis], Array, float]:
+    """`refitted_laws`, and ln evidence of what was accepted in the same model under the same errors: refitted if it is
+    one listed effect of this ln prior, else as `known`.
+    """
+    listed, names = screening.listed, [one.name for one in screening.listed.fingerprints.candidates]
+    if len(accepted) == 1 and accepted[0] in names:
+        j = names.index(accepted[0])
+        column = listed.best_column(j)
+        one, shapes = listed.fingerprints.candidates[j], listed.fingerprints.settings[column]
+        (refit,) = refits_of(listed.search, [RefitTrial(one, shapes, (refit_start(listed, j, column),))], watch)
+        known = known if refit is None else refit.log_factor + log_prior
+    return *refitted_laws(screening, known, watch), known
 
 
 def _law_found(screening: LawScreening, one: Hypothesis, chance: float) -> LawFound:

@@ -27,14 +27,12 @@ from vegglue.calibration.baseline import (
     with_own_error_again,
     with_own_error_at,
 )
-from vegglue.calibration.candidates import Candidate, candidate_in_case, start_amplitude, with_effect
+from vegglue.calibration.candidates import Candidate, candidate_in_case, start_with, with_effect
 from vegglue.calibration.fit import MapEstimate, at_point, fit, interval95, log_evidence_under
 from vegglue.calibration.learned_bed import line_offset
 from vegglue.calibration.score_test import log_factors
 from vegglue.case.bed_error import SurveyedLine, surveyed_lines, with_loose_line
 from vegglue.case.gridded_site import build_site
-from vegglue.case.parameter_space import z_of
-from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse, linearise_from
 from vegglue.errors import InputError
@@ -54,7 +52,7 @@ WORTH_FOLLOWING = 0.5
 
 @dataclass(frozen=True)
 class RefitTrial:
-    """What is to be refitted: a candidate with values of its shapes, and z (k, p + 1) of the places to start from."""
+    """What is to be refitted: a candidate with values of its shapes, and z (k, p + q) of the places to start from."""
 
     candidate: Candidate
     shapes: Mapping[str, float]
@@ -97,20 +95,12 @@ def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = 
     return refits
 
 
-def start_with(case: Case, candidate: Candidate, shapes: Mapping[str, float], z: Array, gain: float) -> Array:
-    """z (p + 1,) of the changed case: z (p,) and the amplitude of that gain."""
-    changed = with_effect(case, candidate, shapes)
-    amplitude = start_amplitude(candidate.amplitude, gain)
-    return np.append(z, z_of(changed.parameters[candidate.parameter], amplitude))
-
-
 def _best_of_starts(search: SearchModel, trial: RefitTrial) -> MapEstimate | None:
     """The best end of all starts, or of a share of the way to them from the amplitude off, each later one followed
     while it promises more than those before it.
     """
     model, candidate, best = _with(search.model, trial), trial.candidate, None
-    off = z_of(model.case.parameters[candidate.parameter], start_amplitude(candidate.amplitude, 0.0))
-    here = np.append(search.point.z, off)
+    here = start_with(candidate, search.point.z, 0.0)
     for start in trial.starts:
         enough = np.inf if best is None else best.objective - WORTH_FOLLOWING
         ways = (np.asarray(here + share * (start - here)) for share in SHARES_OF_START)
@@ -213,11 +203,11 @@ def without_effect(base: Baseline, one: Candidate) -> Baseline | None:
     def less(model: Model) -> Model:
         case = model.case
         effects = {name: entry for name, entry in case.effects.items() if name != one.key}
-        parameters = {name: prior for name, prior in case.parameters.items() if name != one.parameter}
+        parameters = {name: prior for name, prior in case.parameters.items() if name not in one.priors}
         return replace(model, case=case.model_copy(update={"effects": effects, "parameters": parameters}))
 
     search = search_model(base)
-    kept = np.array([name != one.parameter for name in base.model.names])
+    kept = np.array([name not in one.priors for name in base.model.names])
     near = linearise(less(search.model), search.point.z[kept], search.point)
     if near is None:
         return None

@@ -82,6 +82,38 @@ def inflow_peak(boundary: BoundaryValues, excess: Array, middle: Array, width: A
     return {"spread": boundary.spread * (1.0 + excess * np.exp(-(((boundary.position - middle) / width) ** 2)))}
 
 
+# Modes of the distribution over an inflow. Chosen: four tell a side, the middle and both sides, and a jet.
+MODES = 4
+
+
+def inflow_distribution(
+    boundary: BoundaryValues, excess: Array, mode: Array, second: Array, third: Array, fourth: Array
+) -> dict[str, Array]:
+    """q -> q exp(sum_k a_k cos(k pi (1 + s)/2) / k), k = 1 .. 4, s = -1 .. 1 across each inflow.
+
+    Parameters
+    ----------
+    boundary : BoundaryValues
+    excess : (m,) [-]
+        a_k of the mode k.
+    mode : (m,) [-]
+        that k, 1 to 4.
+    second, third, fourth : (m,) [-]
+        a_k of the other modes, in their order.
+
+    Returns
+    -------
+    dict
+        `spread` (inflow, cell, m) [-].
+    """
+    others, log, mode = (second, third, fourth), np.zeros((1, 1, 1)), np.rint(mode)
+    for k in range(1, MODES + 1):
+        of_others = np.where(mode > k, others[min(k, MODES - 1) - 1], others[max(k - 2, 0)])
+        size = np.where(mode == k, excess, of_others)
+        log = log + size * np.cos(0.5 * np.pi * k * (1.0 + boundary.position)) / k
+    return {"spread": boundary.spread * np.exp(log)}
+
+
 def lateral_inflow(boundary: BoundaryValues, share: Array) -> dict[str, Array]:
     """q_lateral -> q_lateral + r Q, Q the sum of all inflows [m3/s].
 
@@ -116,6 +148,10 @@ def outlet_level(boundary: BoundaryValues, rise: Array) -> dict[str, Array]:
     return {"level": boundary.level + rise}
 
 
+# Standard deviation of each a_k [-]: then q / q_0 has (1/2 sum_k 1/k^2)^(1/2) OF_INFLOW = 0.32 = (beta - 1)^(1/2), that
+# of velocities over a section of natural streams, beta = 1.10 (Chow 1959, table 2-1; not checked against it).
+OF_INFLOW = 0.38
+
 EFFECTS = (
     Effect(
         name="discharge_error",
@@ -134,7 +170,15 @@ EFFECTS = (
         title="More water enters on one side of the inflow",
         equation="q -> q (1 + a s), s from -1 to 1 across the inflow towards larger y",
         act=inflow_skew,
-        amplitude=Amplitude("skew", "-", "relative excess a at the end of the inflow", 0.4, -0.9, 0.9),
+        amplitude=Amplitude(
+            "skew",
+            "-",
+            "relative excess a at the end of the inflow",
+            0.4,
+            -0.9,
+            0.9,
+            basis="r.m.s. of (beta - 1)^(1/2) = 0.22, beta = 1.05 of regular channels, Chow (1959), table 2-1",
+        ),
         source="definition",
         checked=True,
         mirrored=False,
@@ -159,6 +203,32 @@ EFFECTS = (
         shapes=(
             Shape("middle", "-", "middle c of that part", 0.0, -1.0, 1.0, (-0.75, -0.45, -0.15, 0.15, 0.45, 0.75)),
             Shape("width", "-", "its half width w", 0.3, 0.05, 2.0),
+        ),
+        source="definition",
+        checked=True,
+        mirrored=False,
+    ),
+    Effect(
+        name="inflow_distribution",
+        stage="boundary",
+        title="The inflow is distributed otherwise than by conveyance: it is not developed",
+        equation="q -> q exp(sum_k a_k cos(k pi (1 + s)/2)/k), k = 1 .. 4, s from -1 to 1 across the inflow",
+        act=inflow_distribution,
+        amplitude=Amplitude(
+            "excess",
+            "-",
+            "a_k of the mode k",
+            OF_INFLOW,
+            -3.0,
+            3.0,
+            basis="r.m.s. of all of (beta - 1)^(1/2) = 0.32, beta = 1.10 of natural streams, Chow (1959), table 2-1",
+        ),
+        shapes=(
+            Shape("mode", "-", "that k", 1.0, 1.0, 4.0, (1.0, 2.0, 3.0, 4.0)),
+            *(
+                Shape(name, "-", f"a_k of the {name} mode, k left out", 0.0, -3.0, 3.0, sd=OF_INFLOW)
+                for name in ("second", "third", "fourth")
+            ),
         ),
         source="definition",
         checked=True,

@@ -67,6 +67,8 @@ class Amplitude:
         the unit.
     low_of
         Scale of which `low` is a multiple, if it is another.
+    basis
+        The relation of the literature that the plausible size comes from; "": it is chosen, see docs/sensitivity.md.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Amplitude:
     power: int = 1
     of: str = ""
     low_of: str = ""
+    basis: str = ""
 
     @property
     def only_sign(self) -> int:
@@ -135,6 +138,8 @@ class Shape:
         Values that a search tries; empty: the default alone.
     of
         Scale of the site of which all of these are multiples; "": they are in the unit.
+    sd
+        Standard deviation of its prior around `default` if it is calibrated together with the amplitude; 0: a number.
     """
 
     name: str
@@ -145,6 +150,7 @@ class Shape:
     high: float
     grid: tuple[float, ...] = ()
     of: str = ""
+    sd: float = 0.0
 
 
 @dataclass(frozen=True)

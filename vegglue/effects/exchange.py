@@ -16,6 +16,10 @@ LEAST_RELATIVE_DEPTH = 0.2
 CURRENTS_END = 1.5
 # Speed over that of the site [-], whose square is added to |U|^2: slower water has no direction that would show a bend.
 STILL = 0.1
+# Mixing length over the width of a shear layer [-] (van Prooijen et al. 2005).
+MIXING_OF_LAYER = 0.07
+# Least rate at which a difference of speeds fades [1/m]: below, over a thousand kilometres, none does.
+LEAST_RATE = 1e-6
 # a [-] at which b of `helical_flow` is held: the formula is for smoother beds.
 LARGEST_ROUGHNESS = 0.5
 
@@ -136,6 +140,28 @@ def coherent_structures(cells: Cells, coefficient: Array, width: Array, mean_dep
     return {"viscosity": coefficient**2 * width**2 * shallow * np.abs(cells.u_y)}
 
 
+def growing_shear_layer(cells: Cells, spreading: Array) -> dict[str, Array]:
+    """nu -> nu + (b d)^2 |du/dy|, d = s (1 - exp(-2 k x)) / (2 k), x the distance from the inflow, k that of the bed.
+
+    A layer of width 0 at the inflow grows by s dx, until friction of the bed has used up the difference of speeds.
+
+    Parameters
+    ----------
+    cells : Cells
+    spreading : (m,) [-]
+        growth s of its width, some 0.085 times the difference of both speeds over their mean.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
+    """
+    along = cells.geometry.x - cells.geometry.x[0] + 0.5 * cells.geometry.dx
+    rate = np.maximum(2.0 * cells.bed_rate, LEAST_RATE)
+    width = spreading * -np.expm1(-rate * along) / rate
+    return {"viscosity": (MIXING_OF_LAYER * width) ** 2 * np.abs(cells.u_y)}
+
+
 def wake_mixing(cells: Cells, coefficient: Array, length: Array) -> dict[str, Array]:
     """nu -> nu + c |U| exp(-s / L) behind a patch, s the distance from its end [m].
 
@@ -233,7 +259,17 @@ EFFECTS = (
         title="Eddy viscosity larger or smaller than assumed",
         equation="nu -> nu + nu_1",
         act=viscosity,
-        amplitude=Amplitude("added", "m2/s", "viscosity nu_1 added", 0.15, -0.9, 5.0, of="eddy", low_of="viscosity"),
+        amplitude=Amplitude(
+            "added",
+            "m2/s",
+            "viscosity nu_1 added",
+            0.15,
+            -0.9,
+            5.0,
+            of="eddy",
+            low_of="viscosity",
+            basis="0.15 h u*, Fischer et al. (1979) for straight flumes",
+        ),
         source="definition",
         checked=True,
     ),
@@ -243,7 +279,15 @@ EFFECTS = (
         title="Turbulence made by the bed",
         equation="nu -> nu + lambda h u*, u* = (k_bed h)^(1/2) |U|",
         act=elder,
-        amplitude=Amplitude("coefficient", "-", "lambda, some 0.07 to 0.5", 0.2, 0.0, 5.0),
+        amplitude=Amplitude(
+            "coefficient",
+            "-",
+            "lambda, some 0.07 to 0.5",
+            0.2,
+            0.0,
+            5.0,
+            basis="between 0.07 of a log law and 0.6 of natural streams, Fischer et al. (1979), the mean of both logs",
+        ),
         source="Elder (1959)",
         doi="10.1017/S0022112059000374",
     ),
@@ -264,7 +308,17 @@ EFFECTS = (
         title="Turbulence made by lateral shear",
         equation="nu -> nu + l^2 |du/dy|",
         act=mixing_length,
-        amplitude=Amplitude("length", "m", "mixing length l", 0.5, 0.0, 3.0, power=2, of="depth"),
+        amplitude=Amplitude(
+            "length",
+            "m",
+            "mixing length l",
+            0.5,
+            0.0,
+            3.0,
+            power=2,
+            of="depth",
+            basis="6 times the vertical one of 0.09 h, Stansby (2003), doi:10.1017/S0022112003006384",
+        ),
         source="Prandtl (1925)",
         doi="10.1002/zamm.19250050212",
     ),
@@ -286,13 +340,34 @@ EFFECTS = (
         title="Large horizontal eddies between deep and shallow water",
         equation="nu -> nu + b^2 d^2 (h_m/h) |du/dy|, h at least h_m/5",
         act=coherent_structures,
-        amplitude=Amplitude("coefficient", "-", "b, some 0.07", 0.1, 0.0, 1.0, power=2),
+        amplitude=Amplitude(
+            "coefficient", "-", "b, some 0.07", 0.1, 0.0, 1.0, power=2, basis="0.07 of its source, to one digit up"
+        ),
         shapes=(
             Shape("width", "m", BAND, 1.0, 0.05, 13.0, of="half_width"),
             Shape("mean_depth", "m", "depth h_m between both", 1.0, 0.05, 10.0, of="mean_depth"),
         ),
         source="van Prooijen, Battjes and Uijttewaal (2005)",
         doi="10.1061/(ASCE)0733-9429(2005)131:3(175)",
+    ),
+    Effect(
+        name="growing_shear_layer",
+        stage="exchange",
+        title="A shear layer that grows from the inflow: water of two speeds meets where it enters",
+        equation="nu -> nu + (0.07 d)^2 |du/dy|, d = s (1 - exp(-2 k x))/(2 k), x the distance from the inflow",
+        act=growing_shear_layer,
+        amplitude=Amplitude(
+            "spreading",
+            "-",
+            "growth s of its width, some 0.085",
+            0.1,
+            0.0,
+            1.0,
+            power=2,
+            basis="0.085 of its source for speeds that differ by their mean, to one digit up",
+        ),
+        source="after van Prooijen and Uijttewaal (2002)",
+        doi="10.1063/1.1514660",
     ),
     Effect(
         name="wake_mixing",
@@ -314,7 +389,15 @@ EFFECTS = (
         title="Secondary currents: mirrored cells carry momentum across the floor",
         equation="-(1/h) d(K h u^2)/dy with K = k sin(pi eta) exp(-(eta/1.5)^4), eta = 1 at the toe of the bank",
         act=secondary_current,
-        amplitude=Amplitude("strength", "-", "strength k of the cells", 0.02, -0.2, 0.2),
+        amplitude=Amplitude(
+            "strength",
+            "-",
+            "strength k of the cells",
+            0.02,
+            -0.2,
+            0.2,
+            basis="between 0.005 of straight and 0.05 of meandering channels, its source, the mean of both logs",
+        ),
         source="Ervine et al. (2000)",
         doi="10.1061/(ASCE)0733-9429(2000)126:9(653)",
     ),
@@ -324,7 +407,15 @@ EFFECTS = (
         title="Velocity varies over the depth, so that more momentum is carried than its mean says",
         equation="-(1/h) div((beta - 1) h U U)",
         act=dispersion,
-        amplitude=Amplitude("excess", "-", "beta - 1, momentum coefficient less one", 0.1, 0.0, 1.0),
+        amplitude=Amplitude(
+            "excess",
+            "-",
+            "beta - 1, momentum coefficient less one",
+            0.1,
+            0.0,
+            1.0,
+            basis="beta = 1.10 of natural streams, Chow (1959), table 2-1",
+        ),
         source="definition",
         checked=True,
     ),

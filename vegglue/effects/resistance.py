@@ -235,6 +235,8 @@ def stem_blockage(cells: Cells, share: Array) -> dict[str, Array]:
     return {"rate": cells.rate * (1.0 - share * cells.geometry.planted) ** -2.0}
 
 
+# n = 0.030 of a clean main channel and 0.050 of a floodplain with scattered brush: 2 ln(5/3).
+TWO_SURFACES = "2 ln(0.050/0.030), floodplain with brush and clean main channel, Chow (1959), table 5-6"
 REFERENCE_DEPTH = Shape("reference_depth", "m", "depth h_0 at which nothing changes", 0.5, 0.05, 5.0, of="depth")
 EFFECTS = (
     Effect(
@@ -313,7 +315,9 @@ EFFECTS = (
         title="Floor and banks, or floodplains, are two surfaces of different roughness",
         equation="k -> k exp(a) beyond the toe of the banks",
         act=bank_roughness,
-        amplitude=Amplitude("log_ratio", "-", "logarithm a of friction there over that of the law", 1.0, -4.0, 4.0),
+        amplitude=Amplitude(
+            "log_ratio", "-", "logarithm a of friction there over that of the law", 1.0, -4.0, 4.0, basis=TWO_SURFACES
+        ),
         source="definition",
         checked=True,
         tags=("common",),
@@ -325,7 +329,7 @@ EFFECTS = (
         title="The left and the right of the floor are two surfaces of different roughness",
         equation="k -> k exp(a/2) on the floor without plants at larger y than the axis, k exp(-a/2) on the other side",
         act=floor_difference,
-        amplitude=Amplitude("log_ratio", "-", "logarithm a of the ratio of both", 1.0, -4.0, 4.0),
+        amplitude=Amplitude("log_ratio", "-", "logarithm a of the ratio of both", 1.0, -4.0, 4.0, basis=TWO_SURFACES),
         source="definition",
         checked=True,
         mirrored=False,
@@ -336,7 +340,9 @@ EFFECTS = (
         title="A stretch of the floor is of another roughness than the rest",
         equation="k -> k exp(a exp(-((x/L - c)/(s/2))^4)) on the floor without plants, x/L from -1/2 to 1/2",
         act=bed_stretch,
-        amplitude=Amplitude("log_ratio", "-", "logarithm a of friction there over that of the rest", 1.0, -4.0, 4.0),
+        amplitude=Amplitude(
+            "log_ratio", "-", "logarithm a of friction there over that of the rest", 1.0, -4.0, 4.0, basis=TWO_SURFACES
+        ),
         shapes=(
             Shape("middle", "-", "its middle c over the length of the channel", 0.0, -0.5, 0.5, (-0.33, 0.0, 0.33)),
             Shape("share", "-", "its share s of the length of the channel", 0.33, 0.02, 1.0),

@@ -223,17 +223,25 @@ class CandidateLaws:
         Probability of all together among all that was compared [-].
     laws
         Those that hold 95 % of it, the most probable first.
+    calibrated
+        Whether the probabilities are those of calibrated laws, else to first order.
     """
 
     p: float
     tried: int
     chance: float
     laws: tuple[CandidateLaw, ...]
+    calibrated: bool = False
 
     @property
     def likelier(self) -> bool:
         """Whether laws are likelier than all else together."""
         return self.chance > 0.5
+
+    @property
+    def clear(self) -> bool:
+        """Whether laws are strong_odds times as likely as all else together."""
+        return self.chance > constants().strong_odds * (1.0 - self.chance)
 
     @property
     def alike(self) -> tuple[CandidateLaw, ...]:

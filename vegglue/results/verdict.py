@@ -540,6 +540,8 @@ Conclusion = Literal[
     "law_beside_instrument",
     "law_in_doubt",
     "law",
+    "law_rather_than_effects",
+    "law_or_effects",
     "law_possible",
     "field",
     "several_possible",
@@ -631,6 +633,8 @@ class Verdict:
         if self.doubts_the_data:
             return "measurements_to_correct"
         if self.laws is not None:
+            if self.effects:
+                return "law_rather_than_effects" if self.kind == "none-of-these" else "law_or_effects"
             if self.kind == "instrument":
                 return "law_beside_instrument"
             if reason is not None:
@@ -746,7 +750,7 @@ def make_verdict(inputs: VerdictInputs) -> Verdict:
     )
     found = _concluded(inputs, plain)
     remaining: list[Remaining] = []
-    if (inputs.steps or inputs.places) and found.kind != "cannot-tell" and found.laws is None and inputs.field is None:
+    if (inputs.steps or inputs.places) and found.kind != "cannot-tell" and inputs.field is None:
         if inputs.errors.clearly_larger:
             remaining.append(ErrorsStillLarger(inputs.errors.scale))
         if ranked := sorted(inputs.significant_effects.items(), key=lambda one: one[1]):
@@ -781,7 +785,10 @@ def _concluded(inputs: VerdictInputs, plain: Verdict) -> Verdict:
             effects = tuple(Rival(name, "effect", first.chance[name]) for name in first.rivals)
             return replace(plain, reasons=(TooManyGroups(effects),))
         single = all(len(step.rivals) == 1 and not step.others for step in inputs.steps)
-        return replace(plain, kind="identified" if single else "one-of", instruments=inputs.instruments)
+        kind: VerdictKind = "identified" if single and laws is None else "one-of"
+        if laws is not None and laws.clear:
+            kind = "none-of-these"
+        return replace(plain, kind=kind, laws=laws, instruments=inputs.instruments)
     if inputs.undecided:
         return replace(plain, undecided=inputs.undecided, reasons=(NoneLeads(),))
     return _silent(inputs, plain)

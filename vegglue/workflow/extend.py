@@ -13,7 +13,7 @@ import pandas as pd
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import Candidate, start_amplitude
 from vegglue.case.config import load_case
-from vegglue.case.parameter_space import z_at
+from vegglue.case.parameter_space import middle_value, z_at
 from vegglue.case.resolved_config import as_yaml, case_hash, refuse_parent, write_made
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
@@ -325,6 +325,7 @@ def calibrated_with_additions(
     theta = {name: value for name, value in values_tried(parent.case, found).items() if name in child.parameters}
     for one, _ in added:
         theta.setdefault(one.parameter, start_amplitude(one.amplitude, one.amplitude.plausible_gain))
+        theta = {name: float(middle_value(child, name)) for name in one.free.values()} | theta
     known = z_at(child, {name: np.array([theta[name]]) for name in child.parameters})[0]
     try:
         return calibrated_anew(replace(parent, case=child), known, aside)
