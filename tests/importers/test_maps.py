@@ -248,7 +248,7 @@ def test_a_survey_of_sections_states_the_error_of_its_bed(tmp_path: Path) -> Non
     x, middle = site_of_case.grid.x, error.shape[1] // 2
     on, between = (error[np.abs(x - at).argmin(), middle] for at in (24.0, 28.0))
     assert on < 0.6 * between
-    assert case.model_error == ModelError(friction=0.05, bed=0.01, edges=0.1, probes=0.03, discharge=0.02, stems=0.1)
+    assert case.model_error == ModelError(friction=0.05, bed=0.01, edges=0.1, probes=0.03)
     (plain,) = without_surveys(case).bed
     assert plain.survey is None
 

@@ -25,9 +25,7 @@ from vegglue.case.zones import BANK_SLOPE
 from vegglue.effects.physical_constants import GRAVITY
 from vegglue.errors import InputError, path_from, shown_path
 from vegglue.importers.config_parts import (
-    COUNTED_STEMS,
     FIRST_LOOK,
-    GAUGED_DISCHARGE,
     MODEL_ERROR_OF_FLUME,
     PLACE_OF_VERTICAL,
     POLYGON_SIDES,
@@ -177,8 +175,7 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         tree |= MODEL_ERROR_OF_FLUME
     elif site.bed is not None:  # of a natural reach, surveyed outdoors
         walked = any(patch.polygon is not None for patch in patches)
-        usual = {"probes": PLACE_OF_VERTICAL, "discharge": GAUGED_DISCHARGE}
-        usual |= ({"stems": COUNTED_STEMS} if patches else {}) | ({"edges": POLYGON_SIDES} if walked else {})
+        usual = {"probes": PLACE_OF_VERTICAL} | ({"edges": POLYGON_SIDES} if walked else {})
         tree["model_error"] = tree["model_error"] | usual
     if site.exclude:
         tree["exclude"] = dict(site.exclude)
