@@ -16,8 +16,8 @@ MODEL_ERROR: Tree = {"model_error": {"friction": 0.05, "bed": 0.01}}
 # Error of each side of a polygon of plants [m]: a stand ends within a stem or two of where it was walked. Error of how
 # far across a vertical stood [m]: a tape read to 0.1 m, which is 0.1 / 12^(1/2) m. Both chosen after river-a, whose
 # exact polygons show no error; a site of straight patches and a stated channel was laid out, and has neither.
-# Discharges and stems get no error here: a diagnosis names them. With the 2 % of a usual gauging the smallest error of a
-# discharge that is detected on river-a rises from 2.4 to 11 %; with 10 % of stems that of a patch by a quarter.
+# Discharges and stems get no error here: a diagnosis names them. With the 2 % of a usual gauging, the smallest error
+# of a discharge that is detected on river-a rises from 2.4 to 11 %; with 10 % of stems, that of a patch by a quarter.
 POLYGON_SIDES, PLACE_OF_VERTICAL = 0.1, 0.03
 # Name of the eddy viscosity among the parameters, and the factor by which one that nobody knows is off at one standard
 # deviation: transverse mixing is 0.1 to 0.2 h u* in straight flumes and 0.3 to 0.9 h u* in streams (Fischer et al.
