@@ -6,42 +6,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 from coarse_twin import coarse_twin
+from surveyed_twin import OF_BED, surveyed_twin
 
 from vegglue.calibration.baseline import baseline, model_that_errs
-from vegglue.calibration.learned_bed import bed_of_spots, changed_by, learned_bed
+from vegglue.calibration.learned_bed import bed_of_spots, learned_bed
 from vegglue.calibration.model_error import cell_responses, model_error_columns
 from vegglue.case.bed import read_bed_survey, read_raster
 from vegglue.case.bed_error import bed_error_columns, surveyed_lines, without_surveys
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import ModelError, Planned, PlannedErrors
-from vegglue.case.site_schema import BedLayer, CovarianceOfBed, SurveyOfBed
+from vegglue.case.site_schema import BedLayer
 from vegglue.case.survey_error import BedSurvey, bed_survey_text, line_weights
 from vegglue.diagnosis.next_measurement import surveys
 from vegglue.diagnosis.refits import relevelled
 from vegglue.engine.interface import Model, Point
 
-OF_BED = CovarianceOfBed(chance=1.0, along=4.0, across=1.5, sd=0.05, point_error=0.005)
-
 
 @pytest.fixture(scope="module")
 def surveyed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Model, Point]:
-    """The twin with its own bed as a raster that comes from lines across the channel."""
-    model, point = coarse_twin()
-    folder, grid = Path(tmp_path_factory.mktemp("survey")), model.site.grid
-    size = min(grid.dx, grid.dy)
-    x = np.arange(grid.x[0] - grid.dx, grid.x[-1] + 2.0 * grid.dx, size)
-    y = np.arange(grid.y[0] - grid.dy, grid.y[-1] + 2.0 * grid.dy, size)
-    level = np.stack([np.interp(y, grid.y, model.site.bed[int(np.abs(grid.x - at).argmin())]) for at in x])
-    head = f"ncols {x.size}\nnrows {y.size}\nxllcenter {x[0]}\nyllcenter {y[0]}\ncellsize {size}\n"
-    rows = "\n".join(" ".join(f"{one:.5f}" for one in row) for row in level.T[::-1])
-    (folder / "bed.asc").write_text(head + rows + "\n", encoding="utf-8")
-    every = np.linspace(0, grid.x.size - 1, 5).astype(int)
-    points = [(grid.x[i], grid.y[j], model.site.bed[i, j]) for i in every for j in range(grid.y.size)]
-    line = np.repeat(np.arange(every.size), grid.y.size)
-    (folder / "survey.csv").write_text(bed_survey_text(BedSurvey(np.array(points), line)), encoding="utf-8")
-    survey = SurveyOfBed(file=folder / "survey.csv", covariances=(OF_BED,))
-    layer = BedLayer(raster=folder / "bed.asc", survey=survey)
-    return replace(model, case=model.case.model_copy(update={"bed": (layer,)})), point
+    return surveyed_twin(Path(tmp_path_factory.mktemp("survey")))
 
 
 def test_the_survey_adds_its_error_and_a_case_without_one_has_none(surveyed: tuple[Model, Point]) -> None:
@@ -74,7 +57,8 @@ def test_the_flow_finds_a_bed_that_was_drawn(surveyed: tuple[Model, Point]) -> N
     left = true - found.correction.ravel()
     assert np.sum(left**2) < np.sum(true**2)
     assert np.mean(np.abs(left) <= 2.5 * found.error.ravel() + 1e-3) > 0.9
-    better = value - before.fitted.point.prediction - changed_by(found, model, before.fitted.point)[0]
+    cells = cell_responses(model, before.fitted.point, ("bed",)).of["bed"].reshape(len(model.station), -1)
+    better = answers - cells @ found.correction.ravel()
     assert np.sum(better**2) < 0.7 * np.sum(answers**2)
 
 
@@ -149,9 +133,9 @@ def test_a_line_levelled_wrongly_is_that_by_flow_and_survey(
     assert found.offset == pytest.approx(offset, abs=2.5 * found.error)
     assert (found.log_factor > 3.0) == (offset > 0.0)
     # Its level is not used: the bed is that of a survey without the error.
-    loose = found.base.model.case.bed[0].survey
-    assert loose is not None
-    assert loose.loose == (2,)
+    without = found.base.model.case.bed[0].survey
+    assert without is not None
+    assert without.relevelled == (2,)
     assert np.abs(found.base.model.site.bed - model.site.bed).max() < 0.5 * max(offset, 0.1)
 
 

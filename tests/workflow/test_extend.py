@@ -5,15 +5,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import a_candidate_effect, a_diagnosis, candidate_laws_of
+from diagnoses import a_candidate_effect, a_diagnosis, an_instrument, candidate_laws_of
 from linear_baseline import stations_of
 from reach import said_to
+from surveyed_twin import surveyed_twin
 
 from vegglue.calibration.candidates import candidates_in_case, candidates_of, with_effect
 from vegglue.calibration.fingerprints import EFFECT_AT_PLACE
+from vegglue.case.bed import bed_levels, read_bed_survey
+from vegglue.case.bed_error import surveyed_lines
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
+from vegglue.case.survey_error import bed_survey_text, line_offsets
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error, with_additions
 from vegglue.diagnosis.stepwise_choice import (
     Addition,
@@ -33,7 +37,14 @@ from vegglue.results.causes import LocalAnomaly, Step
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import write_diagnosis
 from vegglue.wording.sentences import sentence
-from vegglue.workflow.extend import ExtensionReason, extend, extension_reason, write_child
+from vegglue.workflow.extend import (
+    ExtensionReason,
+    extend,
+    extension_reason,
+    without_levels,
+    write_child,
+    write_relevelled,
+)
 
 ROOT = Path(__file__).parents[2]
 
@@ -261,3 +272,26 @@ def test_what_cannot_be_added_is_refused(
     code, error = said_to(monkeypatch, capsys, "extend", ROOT / "configs" / "twin.yaml", *arguments, "--runs", tmp_path)
     assert code == 2
     assert said in error
+
+
+def test_a_line_at_a_wrong_level_is_taken_out_of_the_bed_of_a_child(tmp_path: Path) -> None:
+    """The child reads back with the bed of the survey without that level; a line that it lacks already is left."""
+    model, _ = surveyed_twin(tmp_path)
+    case, grid, survey = model.case, model.site.grid, model.case.bed[0].survey
+    assert survey is not None
+    read = read_bed_survey(survey.file)
+    read.points[read.lines[1], 2] += 0.1
+    survey.file.write_text(bed_survey_text(read), encoding="utf-8")
+    line = surveyed_lines(case, grid).lines[0]
+    off = an_instrument(kind="line", x=line.x, y=line.y, stations=(), offset=0.12, unit="m")
+    found = replace(a_diagnosis(), instruments=(off,))
+    relevelled = without_levels(case, grid, found)
+    child = write_relevelled(case, relevelled, tmp_path / "child.yaml")
+    assert child.bed == relevelled.bed
+    offset = line_offsets(read, survey.covariances)[0][1]
+    assert offset == pytest.approx(0.1, abs=0.02)
+    moved = (bed_levels(child, grid) - bed_levels(case, grid)).ravel()
+    assert moved == pytest.approx(-offset * surveyed_lines(case, grid).weights[:, 0], abs=1e-3)
+    assert line.number not in [one.number for one in surveyed_lines(child, grid).lines]
+    assert without_levels(child, grid, found) is child
+    assert without_levels(case, grid, a_diagnosis()) is case

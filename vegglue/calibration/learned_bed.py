@@ -26,7 +26,6 @@ from vegglue.calibration.score_test import project
 from vegglue.case.bed_error import SurveyedLine, bed_error_columns, surveyed_lines
 from vegglue.case.grid import Grid
 from vegglue.decision_constants import constants
-from vegglue.engine.interface import Model, Point
 
 # Below it a standard error counts as this [m]: far less than any bed is known to.
 LEAST_KNOWN = 1e-9
@@ -126,12 +125,3 @@ def line_offset(loose: Baseline, line: SurveyedLine, tight: Baseline) -> tuple[f
     squared = float(of_survey @ of_survey) + float(seen.length[0]) ** 2
     offset = float(of_survey @ h) / float(of_survey @ of_survey)
     return offset + float(seen.fingerprints[:, 0] @ seen.residual) / squared, float(squared**-0.5)
-
-
-def changed_by(learned: LearnedBed, model: Model, point: Point) -> tuple[Array, Array]:
-    """How predictions (station,) change with the correction, and columns (station, k) of what its error leaves, by one
-    linear step; model: on the cells of the correction, at any stations.
-    """
-    answers = cell_responses(model, point, ("bed",)).of["bed"].reshape(len(model.station), -1).astype(float)
-    answers[model.station["experiment"].isin(model.site.own)] = 0.0
-    return answers @ learned.correction.ravel(), answers @ learned.columns

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.case.grid import Grid, centres, places_on_map
 from vegglue.case.schema import Case
-from vegglue.case.site_schema import BedLayer
+from vegglue.case.site_schema import BedLayer, SurveyOfBed
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.case.survey_error import FEWEST_SURVEYED, MOST_SURVEYED, BedSurvey, mean_level
 from vegglue.case.text_files import read_text
@@ -217,7 +217,7 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
     """Level z_b (nx, ny) [m] of one layer, NaN for no data; upstream: x of the upstream edge of the case [m].
 
     A trapezoid has z_b = level - S (x - x_0) + s min(max(|y - axis| - b/2, 0), (B - b)/2), with floor b and top B [m].
-    Loose lines of a survey change it by what the kriged mean changes by without their levels.
+    Relevelled lines of a survey change it by what the kriged mean changes by without their levels.
     """
     if layer.trapezoid is not None:
         channel = layer.trapezoid
@@ -231,12 +231,18 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
         level = survey_levels(layer.points, *places_on_map(grid))
     else:
         return np.full((grid.x.size, grid.y.size), np.nan)
-    if layer.survey is not None and layer.survey.loose:
-        places = cell_places(grid)
-        loose, tight = (read_bed_survey(layer.survey.file, lines) for lines in (layer.survey.loose, ()))
-        without, with_all = (mean_level(one, layer.survey.covariances, places) for one in (loose, tight))
-        level = level + (without - with_all).reshape(level.shape)
+    if (survey := layer.survey) is not None and survey.relevelled:
+        as_made = read_bed_survey(survey.file, survey.loose)
+        without, before = (
+            mean_level(one, survey.covariances, cell_places(grid)) for one in (surveyed(survey), as_made)
+        )
+        level = level + (without - before).reshape(level.shape)
     return level
+
+
+def surveyed(survey: SurveyOfBed) -> BedSurvey:
+    """The survey of a layer as it counts now. Errors: InputError."""
+    return read_bed_survey(survey.file, (*survey.loose, *survey.relevelled))
 
 
 def cell_places(grid: Grid) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from vegglue.arrays import Array, Mask
-from vegglue.case.bed import cell_places, layer_levels, read_bed_survey
+from vegglue.case.bed import cell_places, layer_levels, surveyed
 from vegglue.case.grid import Grid
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import BedLayer, CovarianceOfBed
@@ -119,11 +119,11 @@ def surveyed_lines(case: Case, grid: Grid) -> SurveyedLines:
     return SurveyedLines(tuple(line for one in found for line in one.lines), weights, (h, columns))
 
 
-def with_loose_line(case: Case, line: SurveyedLine) -> Case:
+def without_level(case: Case, line: SurveyedLine) -> Case:
     """The case with the level of a surveyed line unknown."""
     layer = case.bed[line.layer]
     assert layer.survey is not None
-    survey = layer.survey.model_copy(update={"loose": (*layer.survey.loose, line.number)})
+    survey = layer.survey.model_copy(update={"relevelled": (*layer.survey.relevelled, line.number)})
     bed = [one if one is not layer else layer.model_copy(update={"survey": survey}) for one in case.bed]
     return case.model_copy(update={"bed": tuple(bed)})
 
@@ -136,8 +136,7 @@ def _surveyed_layers(case: Case, grid: Grid, experiment: str = "") -> Iterator[S
     for index, layer in reversed(list(enumerate(layers))) if any(one.survey is not None for one in layers) else ():
         level = layer_levels(layer, grid, case.grid.x[0]).ravel()
         if (survey := layer.survey) is not None:
-            read = read_bed_survey(survey.file, survey.loose)
-            yield SurveyedLayer(index, survey.covariances, read, level, free & ~np.isnan(level))
+            yield SurveyedLayer(index, survey.covariances, surveyed(survey), level, free & ~np.isnan(level))
         free &= np.isnan(level)
 
 

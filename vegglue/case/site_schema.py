@@ -217,7 +217,10 @@ class SurveyOfBed(Part):
     )
     left_out: LinesLeftOut | None = Field(default=None, description="how well lines are predicted that are left out")
     loose: tuple[Annotated[int, Field(strict=True, ge=0)], ...] = Field(
-        default=(), description="numbers of lines whose level counts as unknown, only their shape as surveyed"
+        default=(), description="numbers of lines without whose level the bed was made; their shape counts"
+    )
+    relevelled: tuple[Annotated[int, Field(strict=True, ge=0)], ...] = Field(
+        default=(), description="numbers of lines whose level is taken out of the bed again; their shape counts"
     )
 
 

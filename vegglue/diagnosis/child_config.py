@@ -129,6 +129,22 @@ def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapp
     return tree
 
 
+def relevelled_tree(parent: Case, relevelled: Case, target: Path) -> Tree:
+    """Keys and values of the child that `target` is to hold: the bed of a case without levels of surveyed lines."""
+    here, layers = target.resolve().parent, list[Tree]()
+    for layer in relevelled.bed:
+        tree = layer.model_dump(mode="json", exclude_unset=True)
+        files = ((tree, "raster", layer.raster), (tree, "points", layer.points))
+        files += () if layer.survey is None else ((tree["survey"], "file", layer.survey.file),)
+        for part, key, path in files:
+            if path is not None:
+                part[key] = path_from(here, path)
+        layers.append(tree)
+    name = case_name(f"{parent.name}-survey")
+    title = f"{parent.title or parent.name}, without the level of a surveyed line"
+    return {"extends": path_from(here, parent.source), "name": name, "title": title, "bed": layers}
+
+
 def child_name(parent: str, added: Sequence[Candidate]) -> str:
     """A name for the child's folder of results."""
     words = "-".join([parent, *(candidate.key for candidate in added)])

@@ -21,12 +21,10 @@ from scipy.special import ndtri
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import interval95
-from vegglue.calibration.learned_bed import changed_by, learned_bed
-from vegglue.calibration.model_error import model_error_columns
 from vegglue.calibration.noise import covariance_of
-from vegglue.case.bed_error import without_surveys
+from vegglue.case.bed_error import beds_of
+from vegglue.diagnosis.held_out import unseen_errors
 from vegglue.engine.interface import Model, linearise
-from vegglue.engine.model import coarser
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
@@ -97,25 +95,15 @@ def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
     inside = [float(np.mean(known < ndtri(0.5 + 0.5 * level))) if known.size else float("nan") for level in (0.5, 0.95)]
     validated = within = float("nan")
     if validation is not None and (there := linearise(validation, point.z)) is not None:
-        rows, predicted, learned = leading_velocities(validation.station), there.prediction, learned_bed(base)
-        if learned is not None:  # the bed is calibrated, too
-            same = learned.correction.shape == validation.site.bed.shape
-            cells = validation if same else coarser(validation)
-            on_cells = there if same or cells is None else linearise(cells, point.z)
-            if cells is not None and on_cells is not None:
-                change, of_bed = changed_by(learned, cells, on_cells)
-                predicted = predicted + change
-                # What the bed still leaves, with the errors of friction, sides, parameters, grid and reading.
-                allowed = cells.case.model_error.model_copy(update={"probes": 0.0})
-                plain = replace(cells, case=without_surveys(cells.case))
-                of_model = model_error_columns(plain, on_cells, allowed)
-                of_parameters = on_cells.slope @ np.linalg.cholesky(base.fitted.covariance)
-                variance = sum((one[rows] ** 2).sum(axis=1) for one in (of_bed, of_model, of_parameters))
-                stated = np.nan_to_num(validation.station["standard_error"].to_numpy(float)[rows])
-                variance = variance + stated**2 + float(np.mean(noise.grid_error[velocity] ** 2))
-                missed = validation.station["value"].to_numpy(float)[rows] - predicted[rows]
-                within = float(np.mean(np.abs(missed) < NORMAL95 * np.sqrt(variance)))
-        validated = root_mean_square(validation.station["value"].to_numpy(float)[rows] - predicted[rows])
+        rows, change = leading_velocities(validation.station), None
+        missed = validation.station["value"].to_numpy(float)[rows] - there.prediction[rows]
+        if any(layer.survey is not None for layer in beds_of(model.case)):
+            change = unseen_errors(base, validation, there)  # the bed is calibrated, too
+        if change is not None:
+            missed = missed - change.mean[rows]
+            stated = np.nan_to_num(validation.station["standard_error"].to_numpy(float)[rows])
+            within = float(np.mean(np.abs(missed) < NORMAL95 * np.hypot(change.error[rows], stated)))
+        validated = root_mean_square(missed)
     return ModelScore(
         name=model.case.name,
         title=model.case.title,

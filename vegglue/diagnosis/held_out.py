@@ -31,14 +31,15 @@ import scipy.linalg
 from scipy.special import chdtri
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, model_that_errs
-from vegglue.calibration.model_error import any_error, model_error_columns
+from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs
+from vegglue.calibration.model_error import CellResponses, any_error, model_error_columns, site_error_columns
 from vegglue.case.bed_error import without_surveys
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import ModelError
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.field_scan import free_of_prior
-from vegglue.engine.interface import Model, linearise, predict
+from vegglue.engine.interface import Model, Point, linearise, predict
+from vegglue.engine.model import coarser
 from vegglue.measurements.kinds import leading_velocities
 from vegglue.measurements.observations import section_places, station_table
 
@@ -86,6 +87,55 @@ def held_out_errors(base: Baseline, held_out: Model) -> HeldOutErrors:
     return HeldOutErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
 
 
+@dataclass(frozen=True)
+class UnseenErrors:
+    """Measured less predicted at stations that no calibration uses, as the calibrated ones let expect: mean and
+    standard error (station,) [unit of the station], without the error of reading.
+    """
+
+    mean: Array
+    error: Array
+
+
+def unseen_errors(base: Baseline, unseen: Model, there: Point) -> UnseenErrors | None:
+    """Those of a calibrated model, e of the head of this file with all errors of model and site that stations share;
+    there: the point of the same parameters. None where no flow is found on the cells of the model's own error.
+
+    The error of the grid is that at the stations; that of a discharge is no calibrated one's.
+    """
+    where = model_that_errs(base)
+    same = where.model.site.bed.shape == unseen.site.bed.shape
+    coarse = coarser(unseen)
+    on_coarse = None if coarse is None else linearise(coarse, there.z)
+    cells, point = (unseen, there) if same else (coarse, on_coarse)
+    if cells is None or point is None:
+        return None
+    allowed = where.model.case.model_error
+    shared = allowed.model_copy(update={"probes": 0.0, "discharge": 0.0})
+    at_stations, elsewhere = (
+        np.hstack([at.slope, model_error_columns(model, at, shared)])
+        for model, at in ((where.model, where.point), (cells, point))
+    )
+    mean, covariance = _given_residual(where, at_stations[where.noise.rows], elsewhere, point)
+    of_discharge = ModelError(discharge=allowed.discharge)
+    own = site_error_columns(cells, point, of_discharge, CellResponses(cells.site.grid, {}))
+    of_grid = constants().grid_error_share * (there.prediction - (there if on_coarse is None else on_coarse).prediction)
+    variance = np.diag(covariance) + (own**2).sum(axis=1) + of_grid**2
+    return UnseenErrors(mean, np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _given_residual(where: SearchModel, at_stations: Array, there: Array, point: Point) -> tuple[Array, Array]:
+    """Mean (k,) and covariance (k, k) of e at other stations, see the head of this file.
+
+    at_stations, there: [J, M] and [J_e, M_e] (stations, p + m); point: that of the other stations.
+    """
+    whole, residual = free_of_prior(where)
+    factor = scipy.linalg.cho_factor(whole, lower=True)
+    shared = at_stations @ there.T
+    mean = shared.T @ scipy.linalg.cho_solve(factor, residual) - there[:, : point.z.size] @ point.z
+    return mean, there @ there.T - shared.T @ scipy.linalg.cho_solve(factor, shared)
+
+
 # Share of the cases in which the errors are to be smaller than the reported bound, and draws of them: the 95 % point of
 # 2,000 is known to half a per cent of the share.
 SHARE_BELOW, DRAWN_ERRORS = 0.95, 2000
@@ -109,12 +159,7 @@ def largest_error_between(base: Baseline) -> float:
     columns = np.hstack([point.slope, model_error_columns(plain, point, allowed)])
     site = ModelError(edges=model.case.model_error.edges)
     of_site = model_error_columns(wide, point, site)[count:] if any_error(model.case, site) else np.zeros((1, 0))
-    at_stations, there = columns[:count][noise.rows], columns[count:]
-    whole, residual = free_of_prior(where)
-    factor = scipy.linalg.cho_factor(whole, lower=True)
-    shared = at_stations @ there.T
-    mean = shared.T @ scipy.linalg.cho_solve(factor, residual) - point.slope[count:] @ point.z
-    covariance = there @ there.T - shared.T @ scipy.linalg.cho_solve(factor, shared)
+    mean, covariance = _given_residual(where, columns[:count][noise.rows], columns[count:], point)
     random = np.random.default_rng(1)
     drawn = random.multivariate_normal(mean, covariance, DRAWN_ERRORS, check_valid="ignore", method="eigh")
     expected = float(np.mean(base.noise.data_error[seen] ** 2)) + float((of_site**2).sum(axis=1).mean())

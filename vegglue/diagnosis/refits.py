@@ -31,7 +31,7 @@ from vegglue.calibration.candidates import Candidate, candidate_in_case, start_w
 from vegglue.calibration.fit import MapEstimate, at_point, fit, interval95, log_evidence_under
 from vegglue.calibration.learned_bed import line_offset
 from vegglue.calibration.score_test import log_factors
-from vegglue.case.bed_error import SurveyedLine, surveyed_lines, with_loose_line
+from vegglue.case.bed_error import SurveyedLine, surveyed_lines, without_level
 from vegglue.case.gridded_site import build_site
 from vegglue.decision_constants import constants
 from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse, linearise_from
@@ -150,7 +150,7 @@ def relevelled(base: Baseline, line: SurveyedLine) -> Relevelled | None:
 
     What the survey says of the offset is the prior of the flow in the first term, and counts once.
     """
-    case = with_loose_line(base.model.case, line)
+    case = without_level(base.model.case, line)
     try:
         loose = baseline(replace(base.model, case=case, site=build_site(case)), base.fitted.point.z, base.noise)
     except InputError:

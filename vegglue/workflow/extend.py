@@ -12,11 +12,13 @@ import pandas as pd
 
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import Candidate, start_amplitude
+from vegglue.case.bed_error import surveyed_lines, without_level
 from vegglue.case.config import load_case
+from vegglue.case.grid import Grid
 from vegglue.case.parameter_space import middle_value, z_at
 from vegglue.case.resolved_config import as_yaml, case_hash, refuse_parent, write_made
 from vegglue.case.schema import Case
-from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, with_additions
+from vegglue.diagnosis.child_config import candidate_at, candidate_named, child_tree, relevelled_tree, with_additions
 from vegglue.diagnosis.comparison import excluded_by, model_score
 from vegglue.diagnosis.stepwise_choice import (
     Addition,
@@ -183,9 +185,19 @@ def extend_stepwise(
 
 def extended(run: CaseRun, found: Diagnosis) -> StepwiseExtension:
     """The parent and its children, each better than the one before; a model that is only tried leaves no file."""
-    case, aside = run.case, excluded_by(found)
-    run.watch(Progress(with_compilation(f"calibrating {case.name}")))
+    aside = excluded_by(found)
+    run.watch(Progress(with_compilation(f"calibrating {run.case.name}")))
     parent = calibrated(run, aside)
+    several, bases = [run], [parent]
+    loose = without_levels(run.case, run.site.grid, found)
+    if loose is not run.case:  # as an instrument that is off it is excluded, whatever errors that were held out do
+        target = run.case.source.with_name(f"{run.case.source.stem}+survey{run.case.source.suffix}")
+        run.watch(Progress("calibrating without the level of a surveyed line"))
+        run = run.of(write_relevelled(run.case, loose, target, run.force))
+        parent = calibrated(run, aside)
+        several.append(run)
+        bases.append(parent)
+    case = run.case
     named = {candidate.name: (candidate, shapes) for candidate, shapes in tried_additions(case, found)}
     tried: dict[Names, Baseline | None] = {(): parent}
 
@@ -196,7 +208,6 @@ def extended(run: CaseRun, found: Diagnosis) -> StepwiseExtension:
         return tried[names]
 
     choice = choice_among(case, found, base_with)
-    several, bases = [run], [parent]
     for names in choice.stages[1:]:
         base = tried[names]
         assert base is not None
@@ -213,6 +224,15 @@ def extended(run: CaseRun, found: Diagnosis) -> StepwiseExtension:
     return StepwiseExtension(
         cases, ladder, found.verdict.sentence, sentence(extension_reason(case, found, choice)), tuple(choice.unclear)
     )
+
+
+def without_levels(case: Case, grid: Grid, found: Diagnosis) -> Case:
+    """The case with the level of each surveyed line unknown that a diagnosis found to be off; itself without any."""
+    for off in (one for one in found.instruments if one.kind == "line"):
+        lines = [one for one in surveyed_lines(case, grid).lines if (one.x, one.y) == (off.x, off.y)]
+        if lines:
+            case = without_level(case, lines[0])
+    return case
 
 
 def verdict_digest(found: Diagnosis) -> str:
@@ -265,6 +285,8 @@ class ExtensionReason:
         Falls of held-out errors that may be chance, by the name of what was added.
     refused
         Why each of the others was not kept, by name.
+    lines
+        x of surveyed lines whose level is not used [m].
     """
 
     added: tuple[str, ...]
@@ -272,16 +294,18 @@ class ExtensionReason:
     spread: tuple[tuple[str, float, float], ...] = ()
     unclear: Mapping[str, Any] = field(default_factory=dict)
     refused: Mapping[str, Any] = field(default_factory=dict)
+    lines: tuple[float, ...] = ()
 
 
 def extension_reason(case: Case, found: Diagnosis, choice: Choice) -> ExtensionReason:
     """The outcome of a choice among what a diagnosis found."""
     added = choice.stages[-1]
+    lines = tuple(one.x for one in found.instruments if one.kind == "line")
     if not added and not choice.refused:
-        return ExtensionReason((), "law" if found.law_stands_out else found.verdict.kind)
+        return ExtensionReason((), "law" if found.law_stands_out else found.verdict.kind, lines=lines)
     places = [(candidate_at(case, place).name, place) for place in places_tried(found)]
     spread = tuple((name, place.length, place.width) for name, place in places if name in added)
-    return ExtensionReason(added, "", spread, choice.unclear, choice.refused)
+    return ExtensionReason(added, "", spread, choice.unclear, choice.refused, lines)
 
 
 def named_candidates(
@@ -315,6 +339,14 @@ def write_child(parent: Case, target: Path, added: Sequence[Addition], force: bo
     text = f"# Made by `vegglue extend`: {parent.name} with {names}.\n"
     write_made({target: text + as_yaml(tree)}, "move it away", force)
     return load_case(target, trust=True)  # what it can run, its parent has run
+
+
+def write_relevelled(parent: Case, loose: Case, target: Path, force: bool = False) -> Case:
+    """Write the config of the parent without levels of surveyed lines, and read it back, as `write_child`."""
+    refuse_parent(target, parent.source)
+    text = f"# Made by `vegglue extend`: {parent.name} without the level of a surveyed line.\n"
+    write_made({target: text + as_yaml(relevelled_tree(parent, loose, target))}, "move it away", force)
+    return load_case(target, trust=True)
 
 
 def calibrated_with_additions(
