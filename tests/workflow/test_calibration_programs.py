@@ -106,10 +106,15 @@ def test_pyemu_reads_the_ensembles(written: Written) -> None:
 
 @pytest.mark.slow
 @OF_OTHERS
-def test_draws_of_pyemu_run_as_an_ensemble(written: Written) -> None:
+@pytest.mark.parametrize("draw", ["uniform", "gaussian"])
+def test_draws_of_pyemu_run_as_an_ensemble(written: Written, draw: str) -> None:
     pyemu = pytest.importorskip("pyemu")
     control = pyemu.Pst(str(written.pest / "brook.pst"))
-    draws = pyemu.ParameterEnsemble.from_uniform_draw(control, num_reals=5)
+    if draw == "uniform":
+        draws = pyemu.ParameterEnsemble.from_uniform_draw(control, num_reals=5)
+    else:
+        prior = pyemu.Cov.from_uncfile(str(written.pest / "brook.unc"), pst=control)
+        draws = pyemu.ParameterEnsemble.from_gaussian_draw(control, cov=prior, num_reals=5)
     draws.enforce()
     file = written.runs.parent / "draws.csv"
     draws.to_csv(file)
