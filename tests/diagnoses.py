@@ -17,6 +17,7 @@ from vegglue.results.causes import (
     FieldFound,
     LocalAnomaly,
     ModelErrorUsed,
+    PatchOutline,
     PlaceMap,
     Rival,
     ScoreTest,
@@ -64,6 +65,18 @@ def an_anomaly(**fields: Any) -> LocalAnomaly:
         x=33.0, y=-0.6, length=1.8, width=0.45, term="drag", effect="unlisted_object", amplitude=0.4,
         interval95=(0.3, 0.5), unit="1/m", score=12.0, experiments=("low", "high"), odds={"eddies": 30.0, "bed": 4.0},
         plausible=1.0,
+    )  # fmt: skip
+    return replace(usual, **fields)
+
+
+def a_patch(**fields: Any) -> LocalAnomaly:
+    """Plants that are not on the map; fields: to be changed."""
+    outline = PatchOutline(
+        angle=-5.0, height=0.9, proportional=0.0, length_error=0.6, width_error=0.2, angle_error=4.0, like="reeds"
+    )
+    usual = an_anomaly(
+        effect="unlisted_patch", length=3.0, width=1.25, unit="-", amplitude=4.0, interval95=(3.0, 5.5), plausible=5.0,
+        x_error=0.8, y_error=0.15, outline=outline,
     )  # fmt: skip
     return replace(usual, **fields)
 
@@ -179,7 +192,11 @@ NO_LOCATION = replace(a_diagnosis(verdict={"places": ()}), places=(), instrument
 # A field and places of other terms, and instruments that stood at no one place.
 EVERY_KIND = replace(
     a_diagnosis(verdict={"kind": "none-of-these", "field": a_field()}, place_map={"term": "inflow"}),
-    places=(an_anomaly(term="inflow", effect="unlisted_inflow", unit="m3/s"), an_anomaly(term="bed", odds={})),
+    places=(
+        an_anomaly(term="inflow", effect="unlisted_inflow", unit="m3/s"),
+        an_anomaly(term="bed", odds={}),
+        a_patch(),
+    ),
     instruments=(an_instrument(), an_instrument(kind="probe", x=np.nan, stations=(0, 3), interval95=(-np.inf, 0.2))),
     field=a_field(),
     laws=candidate_laws_of("law_bank_speed_step", "law_bank_speed_ramp"),

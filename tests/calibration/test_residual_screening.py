@@ -11,8 +11,9 @@ from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import SearchModel, search_model
-from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Fingerprints, Places
+from vegglue.calibration.fingerprints import Fingerprints, Places
 from vegglue.calibration.fit import at_point, chi2, covariance, objective
+from vegglue.calibration.model_error import EFFECT_AT_PLACE
 from vegglue.calibration.noise import noise_of, with_correlation
 from vegglue.calibration.residual_screening import (
     MOST_CONDITIONAL,

@@ -1,7 +1,7 @@
 """Every effect against a number worked out by hand from its equation; one row each, none left out."""
 
 from dataclasses import fields, replace
-from math import cos, exp, log, pi, sin, sqrt
+from math import cos, exp, log, pi, sin, sqrt, tanh
 
 import numpy as np
 import pytest
@@ -77,6 +77,8 @@ HELIX = sqrt(0.05 * 0.8) / 0.41
 # Two half lengths and one half width from the middle of a spot.
 SPOT = {"x": 1.0, "y": 1.5, "length": 0.3, "width": 0.5}
 NEAR = geometry(x=1.6, y=2.0)
+# The share of a cell there within a rectangle turned by 90 degrees: 0.5 m along and -0.6 m across from its middle.
+WITHIN = 0.25 * (tanh(3.2) - tanh(0.8)) * (tanh(-0.8) - tanh(-8.8))
 LE = 1.0 - (1.0 - 0.9 * 64.0 ** (-1 / 3)) / (1.0 + 64.0**-1.5 * 8.0)
 
 # name: (what it gets, amplitude and shapes, what it hands on in the middle)
@@ -224,6 +226,11 @@ ROWS = {
     "gauge_datum": (gauge(), {"shift": 0.02}, {"value": 0.52}),
     "gauge_head": (gauge(u=0.981), {"share": 1.0}, {"value": 0.5 + 0.981 * 0.981 / 19.62}),
     "unlisted_object": (cells(on=NEAR), {"drag": 2.0, **SPOT}, {"rate": 0.1 + 2.0 * exp(-5.0)}),
+    "unlisted_patch": (
+        cells(on=NEAR),
+        {"drag": 2.0, **SPOT, "angle": 90.0, "height": 0.4, "proportional": 0.0},
+        {"rate": 0.1 + WITHIN * ((1.04**-0.5 + log(2.0) / 0.41) ** -2 - (0.04**-0.5 + log(2.0) / 0.41) ** -2) / 0.8},
+    ),
     "unlisted_bed": (NEAR, {"rise": 0.2, **SPOT}, {"bed": 0.2 * exp(-5.0)}),
     "unlisted_inflow": (NEAR, {"discharge": 0.2, **SPOT}, {"inflow": 0.2 * exp(-5.0) / (pi * 0.3 * 0.5)}),
     "unlisted_viscosity": (cells(on=NEAR), {"viscosity": 0.02, **SPOT}, {"viscosity": 0.02 * exp(-5.0)}),

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses import a_candidate_effect, a_diagnosis, an_instrument, candidate_laws_of
+from diagnoses import a_candidate_effect, a_diagnosis, a_patch, an_instrument, candidate_laws_of
 from linear_baseline import stations_of
 from reach import said_to
 from surveyed_twin import surveyed_twin
 
 from vegglue.calibration.candidates import candidates_in_case, candidates_of, with_effect
-from vegglue.calibration.fingerprints import EFFECT_AT_PLACE
+from vegglue.calibration.model_error import EFFECT_AT_PLACE
 from vegglue.case.bed import bed_levels, read_bed_survey
 from vegglue.case.bed_error import surveyed_lines
 from vegglue.case.config import load_case
@@ -95,10 +95,11 @@ def at_places(case: Case, *places: LocalAnomaly) -> list[Addition]:
     return [(candidate_at(case, place), place.shapes) for place in places]
 
 
-@pytest.mark.parametrize("term", EFFECT_AT_PLACE)
-def test_a_child_holds_a_place_with_numbers_and_a_plausible_prior(term: Term, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "place", [*map(a_place, EFFECT_AT_PLACE), a_patch(x=47.29, y=-0.29)], ids=lambda one: one.effect
+)
+def test_a_child_holds_a_place_with_numbers_and_a_plausible_prior(place: LocalAnomaly, tmp_path: Path) -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
-    place = a_place(term)
     child = write_child(case, tmp_path / "child.yaml", at_places(case, place))
     key = f"{place.effect}_x47_29_y_0_29"
     parameter = next(iter(set(child.parameters) - set(case.parameters)))

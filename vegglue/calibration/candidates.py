@@ -44,7 +44,8 @@ class Candidate:
     """An effect and where it would act; empty tuples mean everywhere.
 
     at: its patch or its place, as a target of `EffectIdentity`; fixed: the shapes of it; scale: a plausible size in
-    this case, None for that of the effect; above_off: whether the amplitude may only lie above off.
+    this case, None for that of the effect; above_off: whether the amplitude may only lie above off; fitted: priors of
+    shapes that are fitted with the amplitude, from their values in `fixed`.
     """
 
     effect: Effect
@@ -55,6 +56,7 @@ class Candidate:
     fixed: tuple[tuple[str, float], ...] = ()
     scale: float | None = None
     above_off: bool = False
+    fitted: tuple[tuple[str, Parameter], ...] = ()
 
     @property
     def identity(self) -> EffectIdentity:
@@ -82,7 +84,8 @@ class Candidate:
     @property
     def free(self) -> dict[str, str]:
         """Parameters of the shapes that are calibrated together with the amplitude, by the shape."""
-        return {one.name: f"{self.key}_{one.name}" for one in self.effect.shapes if one.sd}
+        names = [*(one.name for one in self.effect.shapes if one.sd), *(name for name, _ in self.fitted)]
+        return {name: f"{self.key}_{name}" for name in names}
 
     @property
     def priors(self) -> dict[str, Parameter]:
@@ -100,7 +103,7 @@ class Candidate:
                 meaning=one.meaning,
             )
             for name, one, mean, sd in all_of
-        }  # fmt: skip
+        } | {free[name]: prior for name, prior in self.fitted}  # fmt: skip
 
     def settings(self) -> list[dict[str, float]]:
         """Values of the shapes to try: those that are fixed, else their grids, or their defaults; none of `free`."""
@@ -270,9 +273,13 @@ def start_amplitude(amplitude: Amplitude, gain: float) -> float:
 
 
 def start_with(candidate: Candidate, z: Array, gain: float) -> Array:
-    """z (p + q,) with a candidate: z (p,), the amplitude of that gain, and its q - 1 free shapes in the middle."""
-    amplitude = start_amplitude(candidate.amplitude, gain)
-    return np.concatenate([z, [z_of(candidate.priors[candidate.parameter], amplitude)], np.zeros(len(candidate.free))])
+    """z (p + q,) with a candidate: z (p,), the amplitude of that gain, its q - 1 free shapes in the middle, those that
+    are fitted at their values.
+    """
+    amplitude, at = start_amplitude(candidate.amplitude, gain), dict(candidate.fixed)
+    middle = np.zeros(len(candidate.free) - len(candidate.fitted))
+    of_fitted = [z_of(prior, at[name]) for name, prior in candidate.fitted]
+    return np.concatenate([z, [z_of(candidate.priors[candidate.parameter], amplitude)], middle, of_fitted])
 
 
 InstrumentKind = Literal["reading", "position", "probe", "gauge", "line"]

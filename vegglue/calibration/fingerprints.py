@@ -19,7 +19,6 @@ from vegglue.arrays import Array, Mask
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Candidate, candidates_of, cause_of
 from vegglue.calibration.model_error import (
-    TERM_OF,
     CellResponses,
     GaussianBasis,
     cell_responses,
@@ -62,8 +61,6 @@ LEAST_DEPTH = 0.05
 FROM_ENDS = 2.0
 # Share of a spot under plants [-] up to which it lies on a bare bed.
 WITHOUT_PLANTS = 0.02
-# The effect of the library that stands for a term at a place.
-EFFECT_AT_PLACE: Mapping[Term, str] = {term: effect for effect, term in TERM_OF.items()}
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ Source: a model has its own error in weak-constraint data assimilation (Tremolet
 checked against it); the fields are a definition of this project, and which errors are meant is chosen (see DECISIONS).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,23 +35,27 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.case.bed_error import bed_error_columns, beds_of
 from vegglue.case.case_effects import effect_of, value_of
-from vegglue.case.channel_geometry import half_width, patches_present
+from vegglue.case.channel_geometry import channel_geometry, half_width, patches_present
 from vegglue.case.grid import Grid
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
 from vegglue.decision_constants import constants
+from vegglue.effects.unlisted import rectangle
 from vegglue.engine.interface import Cause, Model, Point, responses, responses_to_cells
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.parallel import in_threads
 
-# The term that each unlisted effect of the library changes at its place.
-TERM_OF: dict[str, Term] = {
-    "unlisted_object": "drag",
-    "unlisted_bed": "bed",
-    "unlisted_inflow": "inflow",
-    "unlisted_viscosity": "viscosity",
+# The effect of the library that is a spot of a term, and the term that each unlisted effect changes at its place.
+EFFECT_AT_PLACE: dict[Term, str] = {
+    "drag": "unlisted_object",
+    "bed": "unlisted_bed",
+    "inflow": "unlisted_inflow",
+    "viscosity": "unlisted_viscosity",
 }
+# Plants that are not on the map, and the shapes that are fitted to them.
+PATCH, OF_OUTLINE = "unlisted_patch", ("x", "y", "length", "width", "angle")
+TERM_OF: dict[str, Term] = {PATCH: "drag", **{effect: term for term, effect in EFFECT_AT_PLACE.items()}}
 # Radius of a basis function over the half width of the floor [-]: friction differs from one stone, tuft or stem count
 # to the next, a survey from one line of points to the next. Chosen, not measured.
 FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
@@ -76,7 +81,7 @@ class CellResponses:
 
 def excluded_terms(case: Case) -> set[Term]:
     """Terms that no place and no field may change: the case excludes their effect, or walls keep water out."""
-    excluded = {TERM_OF[name] for name in case.exclude or () if name in TERM_OF}
+    excluded = {term for term, name in EFFECT_AT_PLACE.items() if name in (case.exclude or ())}
     return excluded if case.friction.walls is None else excluded | {"inflow"}
 
 
@@ -209,21 +214,33 @@ def _columns_of_shape(model: Model, point: Point, cells: CellResponses, key: str
     size = value(effect.amplitude.name, effect.amplitude.off)
     half, grid = FRICTION_RADIUS * half_width(model.site), model.site.grid
     basis = gaussian_basis(grid, half, half)
-    spot = gaussian_basis_at(grid, np.array([place["x"]]), np.array([place["y"]]), place["length"], place["width"])
+    if effect.name == PATCH:
+        share = share_within(model, place)
+    else:
+        x, y = (np.array([place[name]]) for name in ("x", "y"))
+        spot = gaussian_basis_at(grid, x, y, place["length"], place["width"])
+        share = spot.along.T @ spot.across
     along = ((basis.x - place["x"]) / (place["length"] + basis.length)) ** 2
     across = ((basis.y - place["y"]) / (place["width"] + basis.width)) ** 2
     near = along[:, None] + across[None] < AROUND**2
-    whole = size if term == "inflow" else size * float(spot.areas(grid)[0, 0])
+    whole = size if term == "inflow" else size * float(share.sum()) * grid.dx * grid.dy
     in_each = constants().shape_error * whole / np.sqrt(max(int(near.sum()), 1))
-    own, others = responses_to_basis(cells, term, spot)[:, 0, 0], responses_to_basis(cells, term, basis)[:, near]
+    own = np.asarray(cells.of[term].reshape(len(cells.of[term]), -1) @ share.ravel(), dtype=float)
+    others = responses_to_basis(cells, term, basis)[:, near]
     acts = np.ones(len(own)) if entry.experiments is None else model.station["experiment"].isin(entry.experiments)
     # Without their part along the spot's own trace, weighted by 1 / s^2; 0 if no standard error s is stated.
     error = model.station["standard_error"].where(model.station["used"])
     weight = np.nan_to_num(error.to_numpy(float) ** -2.0) * acts
     squared = float(weight @ own**2)
-    share = (weight * own) @ others / squared if squared > 0.0 else np.zeros(others.shape[1])
-    columns = np.asarray(others - np.outer(own, share))
+    along_own = (weight * own) @ others / squared if squared > 0.0 else np.zeros(others.shape[1])
+    columns = np.asarray(others - np.outer(own, along_own))
     return np.asarray(in_each / basis.areas(grid)[near] * columns * np.asarray(acts)[:, None])
+
+
+def share_within(model: Model, outline: Mapping[str, float]) -> Array:
+    """Share of each cell (nx, ny) [-] that lies within the outline of plants that are not on the map."""
+    geometry = channel_geometry(model.case, model.site, next(iter(model.case.experiments)))
+    return rectangle(geometry, **{name: np.array([outline[name]]) for name in OF_OUTLINE})[..., 0]
 
 
 def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: CellResponses) -> Array:

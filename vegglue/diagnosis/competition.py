@@ -38,13 +38,21 @@ from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Instrument, InstrumentKind, place_candidate, start_with, with_effect
-from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Places, digits_of_place, places_around
+from vegglue.calibration.fingerprints import Places, digits_of_place, places_around
+from vegglue.calibration.fit import interval95
+from vegglue.calibration.model_error import EFFECT_AT_PLACE, PATCH, share_within
 from vegglue.calibration.residual_screening import Screening, conditional_screenings, refit_start
 from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors
 from vegglue.case.case_effects import effect_named
+from vegglue.case.channel_geometry import patches_present, site_scales
+from vegglue.case.schema import Parameter
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.refits import Refit, RefitTrial, Relevelled, refits_of, relevelled
+from vegglue.engine.newton import problem_at
+from vegglue.flow.closures import bed_drag, drag
+from vegglue.normal_range import NORMAL95
 from vegglue.progress import Progress, Watch
+from vegglue.results.causes import PatchOutline
 
 # Odds beyond e^this are reported as this: larger numbers mean no more.
 LARGEST_LOG_ODDS = 100.0
@@ -94,13 +102,14 @@ class Window:
 class FoundPlace:
     """A refit where it explains most; log_evidence: of its term over all places; errors: root mean square distance in x
     and y of where it may lie [m], by chances that allow for traces that are not nature's; spread: the same by the
-    evidence as it is.
+    evidence as it is; outline: of plants that are not on the map, which have no spread.
     """
 
     refit: Refit
     log_evidence: float
     errors: tuple[float, float]
     spread: tuple[float, float]
+    outline: PatchOutline | None = None
 
 
 def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot: int, refit: Refit) -> FoundPlace:
@@ -143,6 +152,93 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
     return FoundPlace(moved, total, tuple(errors), tuple(spread))
 
 
+# Plants that are not on the map: standard deviations of ln length and ln width around the medians of the patches on it
+# [-], and of the inclination [deg], with its largest; share of the outline that may lie on the plants of the map [-],
+# beyond which a side of a patch lies off. Chosen before any patch was fitted, and not changed since.
+LOG_SIZE, TURNED, LARGEST_TURN, MOST_COVERED = 0.7, 15.0, 60.0, 0.5
+
+
+def drag_of_patches(search: SearchModel, height: float) -> dict[str, float]:
+    """Drag phi [-] of each patch of the map: twice h k of its plants in water as deep as they are high [m], the mean
+    over its cells and experiments.
+    """
+    model, names = search.model, [patch.name for patch in search.model.case.plants.patches]
+    patch, sums = model.site.main_patch, np.zeros((2, len(names)))
+    depth = np.full((*patch.shape, 1), height)
+    for experiment in search.point.flows:
+        problem = problem_at(model, experiment, search.point.z)
+        own = 2.0 * height * (drag(problem, depth) - bed_drag(problem, depth))[..., 0]
+        for index in patches_present(model.case, experiment):
+            sums[:, index] += own[patch == index].sum(), model.site.cover[patch == index].sum()
+    return {name: float(of / cells) for name, of, cells in zip(names, *sums, strict=True) if cells > 0.0 < of}
+
+
+def found_patch(
+    search: SearchModel, places: Places, kind: HypothesisKind, starts: Sequence[tuple[float, float]]
+) -> FoundPlace | None:
+    """Plants that are not on the map: a rectangle of drag whose middle, sizes and inclination are fitted with all else.
+
+        ln E = ln B + ln prior,   x, y uniform over the places, ln 2l and ln 2w normal around the patches of the map
+
+    B is Laplace's of all six (`refits`), so that each is charged, and the prior that of all spots of drag together.
+    Such plants block the water: no response to first order leads there. starts: x, y [m]. None if the map has no
+    plants, no flow is found, what is found is no longer than a spot, or it lies on the plants of the map.
+    """
+    case, scales = search.model.case, site_scales(search.model.case, search.model.site)
+    told = drag_of_patches(search, scales.canopy)
+    if not told or PATCH in (case.exclude or ()):
+        return None
+    like = max(told, key=told.__getitem__)
+    effect, plausible = effect_named(case, PATCH), told[like]
+
+    def within(values: Array, start: float) -> tuple[float, Parameter]:
+        low, high = float(values.min()), float(values.max())
+        margin = 0.01 * (high - low)
+        prior = Parameter(distribution="uniform", low=low, high=high, unit="m")
+        return float(np.clip(start, low + margin, high - margin)), prior
+
+    trials = []
+    for start in starts:
+        (x, of_x), (y, of_y) = within(places.x, start[0]), within(places.y, start[1])
+        half = {"length": 0.5 * scales.patch_length, "width": 0.5 * scales.patch_width}
+        shapes = {"x": x, "y": y, **half, "angle": 0.0, "height": scales.canopy}
+        shapes["proportional"] = float(case.numerics.emergent == "proportional")
+        free = {"x": of_x, "y": of_y} | {
+            name: Parameter(distribution="lognormal", median=size, log_sd=LOG_SIZE, unit="m")
+            for name, size in half.items()
+        }
+        free["angle"] = Parameter(
+            distribution="normal", mean=0.0, sd=TURNED, low=-LARGEST_TURN, high=LARGEST_TURN, unit="deg"
+        )
+        candidate = replace(place_candidate(effect, shapes, plausible), fitted=tuple(free.items()))
+        at = [start_with(candidate, search.point.z, share * plausible) for share in START_SHARES]
+        trials.append(RefitTrial(candidate, shapes, tuple(at)))
+    ended = [one for one in refits_of(search, trials) if one is not None]
+    if not ended:
+        return None
+    best = max(ended, key=lambda one: one.log_factor)
+    model, names = replace(search.model, case=with_effect(case, best.candidate, best.shapes)), best.candidate.free
+    ends = {name: interval95(model, best.fitted, parameter) for name, parameter in names.items()}
+    errors = {name: (high - low) / (2.0 * NORMAL95) for name, (_, low, high) in ends.items()}
+    digits = digits_of_place(ends["width"][0])
+    shapes = {**best.shapes} | {name: round(middle, digits) for name, (middle, _, _) in ends.items()}
+    share = share_within(search.model, shapes)
+    covered = float((share * search.model.site.cover).sum() / share.sum())
+    candidate = place_candidate(effect, shapes, plausible)
+    if shapes["length"] <= places.length.min() or covered > MOST_COVERED or candidate.key in case.effects:
+        return None
+    (fixed,) = refits_of(search, [RefitTrial(candidate, shapes, (best.fitted.point.z[: -len(names)],))])
+    if fixed is None:
+        return None
+    of_sizes = {f"{name}_error": errors[name] for name in ("length", "width", "angle")}
+    own = {name: shapes[name] for name in ("angle", "height", "proportional")}
+    outline = PatchOutline(**own, **of_sizes, like=like)
+    evidence = best.log_factor + float(logsumexp(kind.log_prior))
+    return FoundPlace(
+        replace(fixed, interval95=best.interval95), evidence, (errors["x"], errors["y"]), (0.0, 0.0), outline
+    )
+
+
 def _window(search: SearchModel, places: Places, refit: Refit) -> Window:
     """Places around a refit, to first order in the flow with it."""
     point, noise, place = refit.fitted.point, search.noise, refit.shapes
@@ -173,7 +269,7 @@ START_SHARES = (1.0, 0.3)
 class Hypothesis:
     """A hypothesis with its evidence E [-]. kind: effect, a term at a place, or an instrument's kind; column: of its
     fingerprint among those of its kind; what: its refit, or the instrument; errors, spread: of x and y of a
-    place [m], see `FoundPlace`; without: of a surveyed line the model without its level.
+    place [m], and outline, see `FoundPlace`; without: of a surveyed line the model without its level.
     """
 
     kind: str
@@ -184,6 +280,7 @@ class Hypothesis:
     errors: tuple[float, float] = (0.0, 0.0)
     spread: tuple[float, float] = (0.0, 0.0)
     without: Relevelled | None = None
+    outline: PatchOutline | None = None
 
 
 def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf) -> list[Hypothesis]:
@@ -263,10 +360,43 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
                 found.append(
                     Hypothesis(its_kind.name, name, there.log_evidence, spot, there.refit, there.errors, there.spread)
                 )
+        if spots and PATCH not in tried:
+            names.append(PATCH)
+            found = with_patch(screening, found)
         tried |= set(names)
         promising = [float(of_each[j]) for j in _promising(of_each) if prints.candidates[j].name not in tried]
         promising += [kind_named(screening.kinds, one.term).total for one in prints.places if one.name not in tried]
         best = max(elsewhere, *(one.log_evidence for one in found), *promising)
+
+
+def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The hypotheses with plants that are not on the map in place of a spot of drag that they lead by strong_odds; they
+    are fitted from where most drag is promised, and from the place that has most evidence.
+    """
+    places = next((one for one in screening.fingerprints.places if one.term == "drag"), None)
+    at_places = [one for one in found if isinstance(one.what, Refit) and one.kind != "effect"]
+    if places is None or not at_places:
+        return list(found)
+    kind = kind_named(screening.kinds, "drag")
+    spot = int(np.argmax(np.where(kind.scores > 0.0, kind.log_evidence, -np.inf)))
+    best = max(at_places, key=lambda one: one.log_evidence).what
+    assert isinstance(best, Refit)
+    starts = [(float(places.x[spot]), float(places.y[spot])), (best.shapes["x"], best.shapes["y"])]
+    patch = found_patch(screening.search, places, kind, starts)
+    spots = [one.log_evidence for one in at_places if one.kind == "drag"]
+    against = max(spots, default=kind.total)
+    if patch is None or tempered_odds(patch.log_evidence, against) < constants().strong_odds:
+        return list(found)
+    shapes = patch.refit.shapes
+    nearest = int(np.argmin(np.hypot(places.x - shapes["x"], places.y - shapes["y"])))
+    others = [one for one in found if one.kind != "drag"]
+    name = patch.refit.candidate.name
+    return [
+        *others,
+        Hypothesis(
+            "drag", name, patch.log_evidence, nearest, patch.refit, patch.errors, outline=patch.outline
+        ),
+    ]  # fmt: skip
 
 
 def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:

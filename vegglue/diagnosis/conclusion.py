@@ -355,9 +355,13 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
 
 
 def as_calibrated(place: LocalAnomaly, base: Baseline) -> LocalAnomaly:
-    """The place with its amplitude in the last model, in which what was accepted after it is calibrated, too."""
+    """The place with its amplitude in the last model, in which what was accepted after it is calibrated, too; with an
+    outline, which that model holds fixed, the interval keeps its width over the amplitude.
+    """
     parameter = candidate_at(base.model.case, place).parameter
     value, low, high = interval95(base.model, base.fitted, parameter)
+    if place.outline is not None:
+        low, high = (value * end / place.amplitude for end in place.interval95)
     return replace(place, amplitude=value, interval95=(low, high))
 
 

@@ -31,7 +31,8 @@ from vegglue.calibration.detection import (
     lowest,
     single_threshold,
 )
-from vegglue.calibration.fingerprints import EFFECT_AT_PLACE, Fingerprints, Places, places_of
+from vegglue.calibration.fingerprints import Fingerprints, Places, places_of
+from vegglue.calibration.model_error import EFFECT_AT_PLACE
 from vegglue.calibration.noise import (
     Noise,
     draw_whitened_errors,

@@ -41,8 +41,9 @@ from vegglue.parallel import parallel_map
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.causes import CandidateEffect
 
-# Steps that a refit may take. Chosen, not measured: most need four.
-REFIT_STEPS = 10
+# Steps that a refit may take, and how many more for each shape that is fitted, too. Chosen, not measured: most need
+# four; an outline needs up to twenty, and stops far from the best with ten.
+REFIT_STEPS, SHAPE_STEPS = 10, 3
 # Shares of the way to a start at which a flow is looked for, the next where the one before has none. Chosen, not
 # measured: with a tenth of a size nearly every flow is found that is found without.
 SHARES_OF_START = (1.0, 0.3, 0.1)
@@ -106,7 +107,8 @@ def _best_of_starts(search: SearchModel, trial: RefitTrial) -> MapEstimate | Non
         ways = (np.asarray(here + share * (start - here)) for share in SHARES_OF_START)
         point = next((one for z in ways if (one := linearise_from(model, z, search.point)) is not None), None)
         if point is not None:
-            found = fit(model, search.noise, point, REFIT_STEPS, enough)
+            steps = REFIT_STEPS + SHAPE_STEPS * len(candidate.fitted)
+            found = fit(model, search.noise, point, steps, enough)
             best = found if best is None or found.objective < best.objective else best
     return best
 

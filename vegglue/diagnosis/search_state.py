@@ -236,7 +236,7 @@ def anomaly_found(screening: Screening, hypotheses: Sequence[Hypothesis], which:
     evidence = {of.name: of.total for of in screening.kinds if of.name != "effect"}
     evidence |= {_rival_name(one): one.log_evidence for one in reversed(hypotheses)}
     return LocalAnomaly(
-        **refit.shapes,
+        **{name: refit.shapes[name] for name in ("x", "y", "length", "width")},
         x_error=best.errors[0],
         y_error=best.errors[1],
         x_spread=best.spread[0],
@@ -249,7 +249,8 @@ def anomaly_found(screening: Screening, hypotheses: Sequence[Hypothesis], which:
         score=float(kind.scores[best.column]),
         experiments=tuple(name for name, part in share.items() if part > POINTS_AT_IT),
         odds={name: tempered_odds(best.log_evidence, other) for name, other in evidence.items() if name != best.kind},
-        plausible=places.plausible,
+        plausible=refit.candidate.amplitude.scale,
+        outline=best.outline,
     )
 
 

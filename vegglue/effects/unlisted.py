@@ -1,13 +1,14 @@
 """Something of no named kind at one place: what a diagnosis tries where no effect of the library fits.
 
-Every one of them is a spot exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) in one term of the equations. Parameters are
-(m,); unit and meaning of each stand in EFFECTS.
+All but one are a spot exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) in one term of the equations; plants that are not on
+the map fill a rectangle. Parameters are (m,); unit and meaning of each stand in EFFECTS.
 """
 
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.effects.definition import Act, Amplitude, Effect, Shape, Stage
+from vegglue.effects.physical_constants import KARMAN
 from vegglue.effects.scales import SPOT_WIDTH
 from vegglue.effects.surroundings import Cells, ChannelGeometry
 
@@ -32,6 +33,50 @@ def unlisted_object(cells: Cells, drag: Array, **place: Array) -> dict[str, Arra
         `rate` (nx, ny, m) [1/m].
     """
     return {"rate": cells.rate + drag * spot(cells.geometry, **place)}
+
+
+def rectangle(geometry: ChannelGeometry, x: Array, y: Array, length: Array, width: Array, angle: Array) -> Array:
+    """Share of each cell within a rectangle (nx, ny, m) [-], its edges as wide as a cell.
+
+        P = p(s, l, dx) p(n, w, dy),   p(s, l, d) = (tanh(2 (s + l) / d) - tanh(2 (s - l) / d)) / 2
+
+    s and n are the distances from its middle along and across it: every parameter has a derivative.
+    """
+    turned, east, north = np.deg2rad(angle), geometry.x - x, geometry.y - y
+    along = east * np.cos(turned) + north * np.sin(turned)
+    across = north * np.cos(turned) - east * np.sin(turned)
+    share = np.ones(1)
+    for distance, half, cell in ((along, length, geometry.dx), (across, width, geometry.dy)):
+        share = share * 0.5 * (np.tanh(2.0 * (distance + half) / cell) - np.tanh(2.0 * (distance - half) / cell))
+    return np.asarray(share)
+
+
+def unlisted_patch(cells: Cells, drag: Array, height: Array, proportional: Array, **outline: Array) -> dict[str, Array]:
+    """k -> k + P (k_v(phi) - k_v(0)), P the share of a cell within a rectangle, by the law of Baptist et al. (2007).
+
+        (h k_v)^(-1/2) = (h k_b + phi/2)^(-1/2) + ln(max(h/H, 1)) / kappa
+
+    Parameters
+    ----------
+    cells : Cells
+    drag : (m,) [-]
+        drag phi = C_D m D H of the plants.
+    height : (m,) [m]
+        height H of the plants.
+    proportional : (m,) [-]
+        1 if phi h/H takes the place of phi where plants stand out of the water, see `numerics.emergent`; else 0.
+
+    Returns
+    -------
+    dict
+        `rate` (nx, ny, m) [1/m].
+    """
+    depth, of_bed = cells.depth, cells.depth * cells.bed_rate
+    emerged = np.minimum(depth / height, 1.0)
+    resisted = of_bed + 0.5 * drag * (1.0 - proportional * (1.0 - emerged))
+    above = np.log(np.maximum(depth / height, 1.0)) / KARMAN
+    planted, bare = (((resistance**-0.5 + above) ** -2.0) / depth for resistance in (resisted, of_bed))
+    return {"rate": cells.rate + rectangle(cells.geometry, **outline) * (planted - bare)}
 
 
 def unlisted_bed(geometry: ChannelGeometry, rise: Array, **place: Array) -> dict[str, Array]:
@@ -96,9 +141,22 @@ PLACE = (
 SPOT = "exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2)"
 
 
-def _at_place(name: str, stage: Stage, title: str, equation: str, act: Act, amplitude: Amplitude) -> Effect:
+OUTLINE = (
+    *PLACE[:2],
+    Shape("length", "m", "half its length l", 0.5, 0.006, 1e4, of="patch_length"),
+    Shape("width", "m", "half its width w", 0.5, 0.006, 1e4, of="patch_width"),
+    Shape("angle", "deg", "by which it turns from x towards y", 0.0, -90.0, 90.0),
+    Shape("height", "m", "height H of its plants", 1.0, 0.006, 1e4, of="canopy"),
+    Shape("proportional", "-", "1 if phi falls with the depth of plants that stand out of the water", 0.0, 0.0, 1.0),
+)
+
+
+def _at_place(
+    name: str, stage: Stage, title: str, equation: str, act: Act, amplitude: Amplitude,
+    shapes: tuple[Shape, ...] = PLACE,
+) -> Effect:  # fmt: skip
     return Effect(
-        name, stage, title, equation, act, amplitude, PLACE,
+        name, stage, title, equation, act, amplitude, shapes,
         source="definition", checked=True, mirrored=False, tags=("search",),
     )  # fmt: skip
 
@@ -111,6 +169,15 @@ EFFECTS = (
         f"k -> k + c {SPOT}",
         unlisted_object,
         Amplitude("drag", "1/m", "drag c of the object per length of flow through it", 0.5, -5.0, 50.0, of="object"),
+    ),
+    _at_place(
+        "unlisted_patch",
+        "resistance",
+        "Plants stand that are not on the map",
+        "k -> k + P (k_v(phi, H) - k_v(0, H)), P the share within 2l by 2w around x_0, y_0",
+        unlisted_patch,
+        Amplitude("drag", "-", "drag phi of the plants", 3.0, 0.0, 100.0),
+        OUTLINE,
     ),
     _at_place(
         "unlisted_bed",

@@ -10,7 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse, Polygon
+from matplotlib.patches import Ellipse, Patch, Polygon
 
 from vegglue.arrays import Array
 from vegglue.case.schema import Case
@@ -37,13 +37,16 @@ GREYS = LinearSegmentedColormap.from_list("greys", ["#f3f2ef", COLOUR["muted"]])
 
 @dataclass(frozen=True)
 class MarkedSpot:
-    """A spot that was found: middle x, y, half length, half width [m], and what is written beside it."""
+    """What was found: middle x, y, half length, half width [m], what is written beside it, and the inclination of a
+    rectangle [deg], None for an ellipse.
+    """
 
     x: float
     y: float
     length: float
     width: float
     words: str
+    angle: float | None = None
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,14 @@ def _paint_marks(axes: Axes, marks: PlanMarks) -> None:
     axes.plot(*marks.stations.T, ".", markersize=2.2, color=COLOUR["ink"], markeredgewidth=0, alpha=0.7)
     axes.plot(*marks.aside.T, "x", markersize=5.5, markeredgewidth=1.3, color=COLOUR["ink"], zorder=6)
     for number, one in enumerate(marks.spots):
-        outline = Ellipse((one.x, one.y), 2 * one.length, 2 * one.width, fill=False, edgecolor=EDGE_COLOUR, zorder=6)
+        if one.angle is None:
+            size = 2 * one.length, 2 * one.width
+            outline: Patch = Ellipse((one.x, one.y), *size, fill=False, edgecolor=EDGE_COLOUR, zorder=6)
+        else:
+            sides = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [one.length, one.width]
+            turned = np.deg2rad(one.angle)
+            turn = np.array([[np.cos(turned), np.sin(turned)], [-np.sin(turned), np.cos(turned)]])
+            outline = Polygon(sides @ turn + [one.x, one.y], fill=False, edgecolor=EDGE_COLOUR, zorder=6)
         outline.set_linestyle((0, (4, 2)))
         axes.add_patch(outline)
         axes.plot(one.x, one.y, "*", markersize=13, color=COLOUR["measured"], markeredgecolor=COLOUR["paper"], zorder=7)
@@ -186,7 +196,9 @@ def plan_marks(diagnosis: Diagnosis, patches: Sequence[Outline]) -> PlanMarks:
     spots = []
     for one in diagnosis.places:
         of_term = "" if one.term == diagnosis.place_map.term else f"{phrase('acting', one.term, one.amplitude)}: "
-        spots.append(MarkedSpot(one.x, one.y, one.length, one.width, of_term + phrase("place", one.x, one.y)))
+        angle = None if one.outline is None else one.outline.angle
+        words = of_term + phrase("place", one.x, one.y)
+        spots.append(MarkedSpot(one.x, one.y, one.length, one.width, words, angle))
     return PlanMarks(
         patches=patches,
         stations=station[["x", "y"]].drop_duplicates().to_numpy(float),

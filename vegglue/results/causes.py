@@ -21,13 +21,37 @@ NEEDS_MORE = 3.3
 
 
 @dataclass(frozen=True)
+class PatchOutline:
+    """Plants that are not on the map, as a rectangle.
+
+    Attributes
+    ----------
+    angle, height, proportional
+        Inclination to x [deg], height of the plants [m] and how they act where they stand out of the water, the shapes
+        of the effect beside those of a spot.
+    length_error, width_error, angle_error
+        Standard errors of half length, half width [m] and inclination [deg].
+    like
+        The patch of the map whose drag is the plausible size.
+    """
+
+    angle: float
+    height: float
+    proportional: float
+    length_error: float
+    width_error: float
+    angle_error: float
+    like: str
+
+
+@dataclass(frozen=True)
 class LocalAnomaly:
     """A place where something unlisted changes a term of the equations.
 
     Attributes
     ----------
     x, y, length, width
-        Middle, half length and half width of the spot [m].
+        Middle, half length and half width of the spot, or of the outline [m].
     term, effect
         The term, and the effect that stands for the place in the library.
     amplitude, interval95, unit
@@ -43,7 +67,9 @@ class LocalAnomaly:
     x_error, y_error
         Standard errors over all spots that could be it [m].
     x_spread, y_spread
-        The same if traces are nature's own, over which `extend` spreads it [m].
+        The same if traces are nature's own, over which `extend` spreads it [m]; 0 with an outline.
+    outline
+        Of plants that are not on the map; None for a spot.
     """
 
     x: float
@@ -63,6 +89,7 @@ class LocalAnomaly:
     y_error: float = 0.0
     x_spread: float = 0.0
     y_spread: float = 0.0
+    outline: PatchOutline | None = None
 
     @property
     def nearest_odds(self) -> tuple[tuple[str, float], ...]:
@@ -75,7 +102,9 @@ class LocalAnomaly:
     @property
     def shapes(self) -> dict[str, float]:
         """The shapes of the effect there."""
-        return {"x": self.x, "y": self.y, "length": self.length, "width": self.width}
+        names, more = ("angle", "height", "proportional"), self.outline
+        of_outline = {} if more is None else {name: getattr(more, name) for name in names}
+        return {"x": self.x, "y": self.y, "length": self.length, "width": self.width} | of_outline
 
 
 @dataclass(frozen=True)
