@@ -40,6 +40,7 @@ FLOWS = {"May": (2.6, 0.70), "October": (7.6, 1.25), "June": (4.8, 0.98)}
 HELD_OUT = "June"
 SECTIONS = (16.0, 28.0, 42.0, 53.0, 66.0)
 SECTIONS_HELD_OUT = (16.0, 35.0, 42.0, 60.0, 66.0)
+PATCHES = ("reeds", "bush", "sedge")
 GAUGES = (8.0, 28.0, 45.0, 60.0, 77.0)
 VELOCITY_ERROR, LEVEL_ERROR, SURVEY_ERROR = 0.015, 0.003, 0.01
 # Of bars [m]: standard deviation, and e-folding lengths along and across; of texture.
@@ -265,7 +266,7 @@ def write_folder(folder: Path, seed: int, site: NaturalReach, hidden: HiddenThin
         z = z + hidden.amplitude * (x == wrong)
         survey += [f"P{x:.0f},{x:.2f},{a:.2f},{value:.3f}" for a, value in zip(at, z, strict=True)]
     corners = ["name,x,y,stems"]
-    for name, polygon, density in zip(("reeds", "bush", "sedge"), site.told, site.density, strict=True):
+    for name, polygon, density in zip(PATCHES, site.told, site.density, strict=True):
         corners += [f"{name},{x:.2f},{y:.2f},{60.0 * density:.1f}" for x, y in polygon]
     stated = {name: {"discharge_m3_s": q, "downstream_level_m": level} for name, (q, level) in FLOWS.items()}
     about = {
@@ -314,7 +315,19 @@ def sized(seed: int, null: Mapping[str, Any]) -> list[HiddenThing]:
     return found
 
 
-def judged(hidden: HiddenThing, found: Mapping[str, Any]) -> dict[str, Any]:
+# From which error a discharge or the stems of a patch count as wrong on a site that is stated roughly [-].
+TRULY_OFF = {"discharge_error": 0.01, "patch_density": 0.05}
+
+
+def told_wrongly(site: NaturalReach) -> set[str]:
+    """Names of what the site states wrongly by TRULY_OFF or more: where nothing else is hidden they are right."""
+    stems = site.stems / np.mean(site.stems)
+    off = {f"discharge_error[{name}]": share - 1.0 for name, share in site.discharges.items() if name != HELD_OUT}
+    off |= {f"patch_density[{name}]": share - 1.0 for name, share in zip(PATCHES, stems, strict=True)}
+    return {name for name, error in off.items() if abs(error) >= TRULY_OFF[name.split("[")[0]]}
+
+
+def judged(site: NaturalReach, hidden: HiddenThing, found: Mapping[str, Any]) -> dict[str, Any]:
     """What a diagnosis made of it."""
     names, where = set(found["set"]), found["where"]
     near = bool(where) and np.hypot(where["x"] - hidden.x, where["y"] - hidden.y) <= NEAR + hidden.half_length
@@ -330,8 +343,8 @@ def judged(hidden: HiddenThing, found: Mapping[str, Any]) -> dict[str, Any]:
     place = where and [where["x"], where["y"], where["term"], where["amplitude"]]
     return {"verdict": found["verdict"], "set": sorted(names), "where": place, "bed_off": found.get("bed_off"),
             "instruments": [[one["kind"], one["x"], one["offset"]] for one in found["instruments"]],
-            "hit": bool(hit), "listed": bool(listed), "named": named, "chi2": found["chi2"]["last"],
-            "freedom": found["chi2"]["freedom"]}  # fmt: skip
+            "hit": bool(hit), "wrongly_told": bool(names & told_wrongly(site)), "listed": bool(listed), "named": named,
+            "chi2": found["chi2"]["last"], "freedom": found["chi2"]["freedom"]}  # fmt: skip
 
 
 def diagnosed(folder: Path, site: NaturalReach, hidden: HiddenThing) -> dict[str, Any]:
@@ -363,14 +376,14 @@ def sets_of(seed: int, runs: Path, done: set[tuple[int, str]]) -> Iterator[dict[
     write_folder(folder / "none", seed, site, HiddenThing(), flows)
     null = diagnosed(folder / "none", site, HiddenThing())
     if (seed, "none") not in done:
-        yield about | {"kind": "none", "hidden": "none", "amplitude": 0.0} | judged(HiddenThing(), null)
+        yield about | {"kind": "none", "hidden": "none", "amplitude": 0.0} | judged(site, HiddenThing(), null)
     for kind, hidden in zip(("listed", "unlisted"), sized(seed, null), strict=False):
         if (seed, kind) in done:
             continue
         measured_only = hidden.name == "gauge" or hidden.name == "line" or hidden.name.startswith("probe_gain")
         own = flows if measured_only else {name: flow_of(site, hidden, name, flows[name]) for name in FLOWS}
         write_folder(folder / kind, seed, site, hidden, own)
-        found = judged(hidden, diagnosed(folder / kind, site, hidden))
+        found = judged(site, hidden, diagnosed(folder / kind, site, hidden))
         yield about | {"kind": kind, "hidden": hidden.name, "amplitude": hidden.amplitude} | found
 
 
@@ -388,12 +401,14 @@ def figures(records: list[dict[str, Any]]) -> list[str]:
                 one["bed_off"] is not None and abs(one["bed_off"]) >= 0.03 and one["bed_off"] * one["where"][3] > 0.0
                 for one in named
             )
+            told = sum(one["wrongly_told"] for one in named)
             lines.append(
                 f"nothing hidden: {len(own)} sets, silent {silent}, something named {len(named)}, of which a bed that "
-                f"is truly off by 3 cm or more {true}"
+                f"is truly off by 3 cm or more {true}, what the site states wrongly {told}"
             )
             continue
-        hit, wrong = sum(one["hit"] for one in own), sum(one["named"] and not one["hit"] for one in own)
+        hit = sum(one["hit"] for one in own)
+        wrong = sum(one["named"] and not (one["hit"] or one["wrongly_told"]) for one in own)
         either = sum(one["hit"] or one["listed"] for one in own)
         lines.append(f"{kind}: {len(own)} sets, named {hit}, named or listed {either}, a wrong name {wrong}")
     return lines
