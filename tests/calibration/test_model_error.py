@@ -12,6 +12,7 @@ from vegglue.calibration.baseline import with_own_error
 from vegglue.calibration.candidates import effect_entry, place_candidate, with_effect
 from vegglue.calibration.model_error import (
     CellResponses,
+    beside_walls,
     cell_responses,
     field_columns,
     gaussian_basis,
@@ -24,6 +25,7 @@ from vegglue.case.grid import Grid
 from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
+from vegglue.case.site_schema import FrictionClass
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, linearise
 
@@ -339,3 +341,17 @@ def test_errors_add_up_and_none_is_none(
     apart = sum(sizes[part] ** 2 * columns[part] @ columns[part].T for part in PARTS)
     assert both @ both.T == pytest.approx(apart, rel=1e-6, abs=1e-12)
     assert not site_error_columns(*flowing, ModelError(friction=0.05), cells).any()
+
+
+def test_probes_within_a_cell_of_a_wall_stand_up_to_half_a_cell_from_the_velocity_of_the_model() -> None:
+    """Of the model without walls none do; elsewhere a site without errors of its own has none."""
+    model, point = coarse_twin()
+    (south, _), width = model.case.grid.y, model.case.grid.cell[1]
+    walls = FrictionClass(law="manning", n=0.01)
+    between = model.case.model_copy(update={"friction": model.case.friction.model_copy(update={"walls": walls})})
+    beside_it = np.arange(len(model.station)) == 3
+    station = model.station.assign(y=np.where(beside_it, south + 0.4 * width, model.station["y"]))
+    for case, beside in ((between, [3]), (model.case, [])):
+        assert np.flatnonzero(beside_walls(replace(model, case=case, station=station))).tolist() == beside
+    cells = cell_responses(model, point, ("friction",))
+    assert site_error_columns(model, point, ModelError(friction=0.05), cells).shape[1] == 0

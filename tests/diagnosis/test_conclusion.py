@@ -17,6 +17,7 @@ from vegglue.calibration.candidates import with_effect
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of, with_correlation, with_grid_error
 from vegglue.calibration.residual_screening import Screening, screen
+from vegglue.case.channel_geometry import site_scales
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, EffectEntry
 from vegglue.case.site_schema import CentrelineShape, Frame
@@ -26,6 +27,7 @@ from vegglue.diagnosis.candidate_effects import candidate_effects_of
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.conclusion import (
     estimated_errors,
+    inflow_develops,
     mapped_places,
     measured_stretch,
     misfit_of,
@@ -34,6 +36,7 @@ from vegglue.diagnosis.conclusion import (
 )
 from vegglue.diagnosis.search_state import SearchState, Undecided
 from vegglue.effects.definition import Amplitude
+from vegglue.measurements.kinds import velocity_rows
 from vegglue.progress import silent
 from vegglue.results.causes import Rival
 from vegglue.results.verdict import MeasuredStretch, NameHangsOnSection, PlacesOnMap
@@ -182,3 +185,16 @@ def test_with_a_law_instead_of_a_place_effects_are_those_of_the_model_without_it
     found = conclusion.assemble_diagnosis(first, first, held, with_place, None, lambda: None, silent)
     assert (found.places, found.verdict.places, found.verdict.undecided) == ((), (), ())
     assert {one.name: one for one in found.candidate_effects} == candidate_effects_of(first)
+
+
+def test_a_fault_of_the_probes_near_the_inflow_may_be_an_inflow_that_develops() -> None:
+    """The only section within 76 depths, and no fault of any other kind."""
+    model, _ = coarse_twin()
+    velocity = model.station[velocity_rows(model.station)]
+    first = velocity.groupby("section")["x"].mean()
+    depth, near = site_scales(model.case, model.site).depth, str(first.idxmin())
+    (found,) = inflow_develops(model, [f"probe_gain[{near}]", "elder"])
+    assert found.distance == pytest.approx(first.min() - model.case.grid.x[0])
+    assert found.depths == pytest.approx(found.distance / depth)
+    far = model.station.assign(x=model.station["x"] + 100.0 * depth)
+    assert list(inflow_develops(replace(model, station=far), [f"probe_gain[{near}]"])) == []

@@ -33,6 +33,7 @@ from vegglue.diagnosis.held_out import HeldOutErrors, held_out_errors, largest_e
 from vegglue.diagnosis.law_search import laws_beside_accepted
 from vegglue.diagnosis.search_state import SearchState, rivals_in
 from vegglue.effects.definition import Stage
+from vegglue.effects.identity import EffectIdentity
 from vegglue.engine.interface import Model, Point
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import STREAMWISE, kind_of, velocity_rows
@@ -54,6 +55,7 @@ from vegglue.results.diagnosis import Diagnosis, FirstScreening, Misfit, Paramet
 from vegglue.results.verdict import (
     BedCorrected,
     EstimatedErrors,
+    InflowDevelops,
     MeasuredStretch,
     NameHangsOnSection,
     Note,
@@ -132,6 +134,9 @@ FEW_SECTIONS = 4
 SMALL_PART = 0.5
 # Stages whose effects may change from place to place along the channel; others act at an end, or in what is read.
 ALONG_THE_CHANNEL: tuple[Stage, ...] = ("plants", "resistance", "exchange", "force")
+# Length over which a turbulent profile over the depth develops behind an inflow [depths]: 76 - 1e-4 Re/Fr, Kirkgoz and
+# Ardiclioglu (1997), doi:10.1061/(ASCE)0733-9429(1997)123:12(1099); not checked against it.
+DEVELOPMENT = 76.0
 # Shares of the allowed model error of which the likelihood is computed [-].
 ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
@@ -284,6 +289,7 @@ def _verdict(
     surroundings: list[Note] = [*mapped_places(model.case, named_places(found.places, undecided))]
     surroundings += measured_stretch(model.case, model.station)
     surroundings += parameter_doubts(base)
+    surroundings += inflow_develops(model, found.effects)
     if not any(one.x.size for one in last.fingerprints.places):
         surroundings.append(TooShallow(least_depth(model)))
     return make_verdict(
@@ -394,6 +400,18 @@ def measured_stretch(case: Case, station: pd.DataFrame) -> Iterator[MeasuredStre
     whole = case.grid.x[1] - case.grid.x[0]
     if along and not used.empty and used.max() - used.min() < SMALL_PART * whole:
         yield MeasuredStretch(float(used.min()), float(used.max()), float(whole), along)
+
+
+def inflow_develops(model: Model, accepted: Sequence[str]) -> Iterator[InflowDevelops]:
+    """Accepted faults of the probes of a section within DEVELOPMENT depths of the beginning of the grid."""
+    station, depth = model.station[velocity_rows(model.station)], site_scales(model.case, model.site).depth
+    for name in accepted:
+        identity = EffectIdentity.parse(name)
+        there = station["x"][station["section"].isin(identity.target)]
+        if identity.name == "probe_gain" and not there.empty:
+            distance = float(there.mean()) - model.case.grid.x[0]
+            if distance < DEVELOPMENT * depth:
+                yield InflowDevelops(name, distance, distance / depth, DEVELOPMENT)
 
 
 def significant_effects(last: Screening, found: SearchState, slack: float = 0.0) -> dict[str, float]:

@@ -343,6 +343,18 @@ class BeyondHandbook:
 
 
 @dataclass(frozen=True)
+class InflowDevelops:
+    """An accepted fault of the probes of a section so near the inflow, distance [m] and depths [-] behind it, that the
+    profile over the depth may still develop there; length: over which it does [depths].
+    """
+
+    effect: str
+    distance: float
+    depths: float
+    length: float
+
+
+@dataclass(frozen=True)
 class EstimateOffPrior:
     """A calibrated parameter some standard deviations from the middle of its prior, at `value` [unit]."""
 
@@ -516,6 +528,7 @@ Note = (
     | ImplausibleAmplitude
     | EstimateAtBound
     | BeyondHandbook
+    | InflowDevelops
     | EstimateOffPrior
     | EffectsNotExcluded
     | EffectsExcluded
