@@ -199,8 +199,9 @@ def refitted_laws(screening: LawScreening, known: float, watch: Watch) -> tuple[
 def laws_beside_accepted(
     screening: LawScreening, accepted: Sequence[str], log_prior: float, known: float, watch: Watch
 ) -> tuple[list[Hypothesis], Array, float]:
-    """`refitted_laws`, and ln evidence of what was accepted in the same model under the same errors: refitted if it is
-    one listed effect of this ln prior, else as `known`.
+    """`refitted_laws`, and ln evidence of what was accepted: `known`, with the errors as estimated beside it, or of
+    one listed effect of this ln prior, refitted in the same model under the same errors; the larger of both, as the
+    known goes before the vague. Chosen after open-o, see DECISIONS.
     """
     listed, names = screening.listed, [one.name for one in screening.listed.fingerprints.candidates]
     if len(accepted) == 1 and accepted[0] in names:
@@ -208,7 +209,7 @@ def laws_beside_accepted(
         column = listed.best_column(j)
         one, shapes = listed.fingerprints.candidates[j], listed.fingerprints.settings[column]
         (refit,) = refits_of(listed.search, [RefitTrial(one, shapes, (refit_start(listed, j, column),))], watch)
-        known = known if refit is None else refit.log_factor + log_prior
+        known = known if refit is None else max(known, refit.log_factor + log_prior)
     return *refitted_laws(screening, known, watch), known
 
 
