@@ -8,15 +8,18 @@ import pytest
 from coarse_twin import coarse_twin
 from surveyed_twin import OF_BED, surveyed_twin
 
-from vegglue.calibration.baseline import baseline, model_that_errs
+from vegglue.calibration.baseline import Baseline, baseline, model_that_errs, with_error_there
+from vegglue.calibration.fit import at_point
 from vegglue.calibration.learned_bed import bed_of_spots, learned_bed
 from vegglue.calibration.model_error import cell_responses, model_error_columns
+from vegglue.calibration.noise import noise_of, with_model_error
 from vegglue.case.bed import read_bed_survey, read_raster
 from vegglue.case.bed_error import bed_error_columns, surveyed_lines, without_surveys
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import ModelError, Planned, PlannedErrors
 from vegglue.case.site_schema import BedLayer
 from vegglue.case.survey_error import BedSurvey, bed_survey_text, line_weights
+from vegglue.diagnosis.held_out import unseen_errors
 from vegglue.diagnosis.next_measurement import surveys
 from vegglue.diagnosis.refits import relevelled
 from vegglue.engine.interface import Model, Point
@@ -66,7 +69,7 @@ def test_bed_and_parameters_are_known_as_in_their_joint_gaussian(surveyed: tuple
     """The error of the bed was that of known parameters: in some cells less than half of it."""
     model, _ = surveyed
     base = baseline(model)
-    found, where = learned_bed(base), model_that_errs(base)
+    found, where = learned_bed(base), with_error_there(model_that_errs(base))
     assert found is not None
     columns = bed_error_columns(where.model.case, where.model.site.grid)
     bed = cell_responses(where.model, where.point, ("bed",)).of["bed"].reshape(len(where.model.station), -1) @ columns
@@ -158,3 +161,28 @@ def test_a_line_midway_takes_its_share_of_the_error(surveyed: tuple[Model, Point
         assert exact.less is not None
         assert one.less is not None
         assert np.trace(one.less @ one.less.T) < 0.5 * np.trace(exact.less @ exact.less.T)
+
+
+def test_ninety_five_of_a_hundred_unseen_values_lie_within_their_bands(surveyed: tuple[Model, Point]) -> None:
+    """Of parameters, a bed and errors of the model that are drawn; every other station is calibrated."""
+    model, _ = surveyed
+    base = baseline(model)
+    point, random = base.fitted.point, np.random.default_rng(5)
+    used = model.station["used"] & (np.arange(len(model.station)) % 2 == 0)
+    seen = replace(model, station=model.station.assign(used=used))
+    alike = np.hstack([point.slope, model_error_columns(model, point, model.case.model_error)])
+    error = model.station["standard_error"].to_numpy(float)
+    noise = with_model_error(noise_of(seen.station), alike[:, point.z.size :])
+    within, ratios = [], []
+    for _ in range(25):
+        off = alike @ random.standard_normal(alike.shape[1]) - point.slope @ point.z
+        value = point.prediction + off + error * random.standard_normal(error.size)
+        its_noise = replace(noise, value=value[noise.rows])
+        half = Baseline(seen, its_noise, at_point(its_noise, point), None, None)
+        found = unseen_errors(half, model, point)
+        assert found is not None
+        left = (off - found.mean)[~used.to_numpy()]
+        within.append(np.abs(left) < 1.96 * found.error[~used.to_numpy()])
+        ratios.append(np.sum(left**2) / np.sum(off[~used.to_numpy()] ** 2))
+    assert 0.92 <= np.mean(within) <= 0.985
+    assert np.mean(ratios) < 0.5  # what was measured beside them says most of it

@@ -200,6 +200,14 @@ def model_that_errs(base: Baseline) -> SearchModel:
     return search_model(base)
 
 
+def with_error_there(where: SearchModel) -> SearchModel:
+    """The model with its own error as computed at its point: what is known of parts of that error then is no more than
+    all of it. That of a baseline is of a point before its last fit.
+    """
+    columns = model_error_columns(where.model, where.point, where.model.case.model_error)
+    return replace(where, noise=with_model_error(where.noise, columns))
+
+
 def search_model(base: Baseline) -> SearchModel:
     """The model on cells of twice the size, y_coarse = y - (f - f_coarse): residuals are those of the fine model.
 

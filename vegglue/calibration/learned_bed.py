@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, model_that_errs
+from vegglue.calibration.baseline import Baseline, model_that_errs, with_error_there
 from vegglue.calibration.model_error import cell_responses
 from vegglue.calibration.score_test import project
 from vegglue.case.bed_error import SurveyedLine, bed_error_columns, surveyed_lines
@@ -90,6 +90,7 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
     columns = bed_error_columns(model.case, grid)
     if not columns.any():
         return None
+    where = with_error_there(where)
     answers = cell_responses(model, where.point, ("bed",)).of["bed"].reshape(len(model.station), -1) @ columns
     answers[model.station["experiment"].isin(model.site.own)] = 0.0
     residual = where.noise.whiten(where.noise.residual(where.point.prediction))

@@ -31,7 +31,7 @@ import scipy.linalg
 from scipy.special import chdtri
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs
+from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs, with_error_there
 from vegglue.calibration.model_error import CellResponses, any_error, model_error_columns, site_error_columns
 from vegglue.case.bed_error import without_surveys
 from vegglue.case.gridded_site import build_site
@@ -103,7 +103,7 @@ def unseen_errors(base: Baseline, unseen: Model, there: Point) -> UnseenErrors |
 
     The error of the grid is that at the stations; that of a discharge is no calibrated one's.
     """
-    where = model_that_errs(base)
+    where = with_error_there(model_that_errs(base))
     same = where.model.site.bed.shape == unseen.site.bed.shape
     coarse = coarser(unseen)
     on_coarse = None if coarse is None else linearise(coarse, there.z)
