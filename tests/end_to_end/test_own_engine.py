@@ -69,7 +69,9 @@ def test_weighed_members_give_the_same_posterior(pair: Pair) -> None:
 def test_draws_give_the_same_posterior(pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vegglue.inference.refine.EFFECTIVE_DRAWS", WORTH)
     monkeypatch.setattr("vegglue.inference.importance_sampling.FIRST_DRAWS", FIRST)
-    inside, command = (vegglue.infer(case, runs=pair.runs, jobs=2) for case in (pair.inside, pair.command))
+    inside, command = (
+        vegglue.infer(case, runs=pair.runs, jobs=2, method="refine") for case in (pair.inside, pair.command)
+    )
     assert inside.refinement is not None
     assert command.refinement is not None
     np.testing.assert_array_equal(command.refinement.draws.drawn, inside.refinement.draws.drawn)

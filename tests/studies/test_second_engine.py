@@ -28,24 +28,26 @@ KNOWN = {"k_s": 0.5, "canopy_height": 0.7, "eddy_viscosity": EDDY_VISCOSITY}
 # A secondary current of this strength [-] is some twenty standard errors long, and plausible.
 HIDDEN = {"secondary_current": {"strength": 0.02}}
 CHANGES = (
-    ("  mid: {discharge: 2.0, level: 0.90}\n", ""),
     ("../data/twin/", ""),
     ("canopy_height: canopy_height", f"canopy_height: {KNOWN['canopy_height']}"),
     ("k_s: k_s}", f"k_s: {KNOWN['k_s']}}}"),
 )
 
 
-def small_twin(folder: Path) -> Path:
-    """The short channel in two experiments and with two parameters, so that a test of it is short."""
+MID = "  mid: {discharge: 2.0, level: 0.90}\n"
+
+
+def small_twin(folder: Path, mid: bool = False) -> Path:
+    """The short channel in two experiments, three with mid, and two parameters, so that a test of it is short."""
     text = (ROOT / "configs" / "twin.yaml").read_text(encoding="utf-8")
     told = ("  k_s:", "  canopy_height:")
     text = "".join(line for line in text.splitlines(keepends=True) if not line.startswith(told))
-    for old, new in CHANGES:
+    for old, new in CHANGES if mid else (*CHANGES, (MID, "")):
         assert old in text
         text = text.replace(old, new)
     for name in ("velocities", "levels"):
         table = pd.read_csv(ROOT / "data" / "twin" / f"{name}.csv")
-        table[table["experiment"] != "mid"].to_csv(folder / f"{name}.csv", index=False)
+        table[mid | (table["experiment"] != "mid")].to_csv(folder / f"{name}.csv", index=False)
     (folder / "twin.yaml").write_text(text, encoding="utf-8")
     return folder / "twin.yaml"
 

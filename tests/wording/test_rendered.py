@@ -73,6 +73,8 @@ from vegglue.inference.statements import (
     ParametersCorrelated,
     ReadingsExcluded,
     StationsStandOut,
+    SurrogateLearned,
+    ValidationProposed,
     WeightTailHeavy,
     posterior_statements,
 )
@@ -272,7 +274,9 @@ STATEMENTS = (
     ParameterBetweenExperiments(PHI, True, (("low", 0.9, 0.02), ("high", 1.1, 0.03)), 33.0, 1, 1e-8, 16.9, "differs"),
     MisfitOfExperiments((("low", 20.0, 12.0, 15), ("high", 15.0, np.nan, 15)), 1.2, 8.0, 1, 0.005),
     ParametersAlike((N_B,), 0.3),
-    ErrorsOfComparison(False, 1.2), CalibrationTransfers(), CalibrationDiffers((PHI,), 1.2),
+    SurrogateLearned(22, 0, True, 0.0123, 0.034, 0.051), SurrogateLearned(100, 41, False, 0.21, 0.33, np.nan),
+    ValidationProposed(1.0, 4.0), ErrorsOfComparison(False, 1.2), CalibrationTransfers(),
+    CalibrationDiffers((PHI,), 1.2),
 )  # fmt: skip
 STEPS = (
     *(NextStep(action, "brook.yaml") for action in ("diagnose", "discover", "extend", "extend-again", "mend", "next")),

@@ -17,7 +17,7 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.engine.command import command_runs
-from vegglue.engine.corrected import corrected, correction_at
+from vegglue.engine.corrected import Correction, corrected, correction_at
 from vegglue.engine.interface import Model, Point, linearise, predict, responses
 from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
@@ -192,7 +192,8 @@ def test_measurements_for_validation_are_predicted_by_the_command(tmp_path: Path
     unseen = f"validation: {{experiments: {flow}, observations: [{file}]}}\nsimulate:"
     case = commanded(tmp_path, SMOOTH, "", COARSE, SMALL, WITH_ERROR, ("simulate:", unseen))
     run = CaseRun(case, tmp_path / "runs")
-    place = {"config_hash": case_hash(case), "z": HERE.tolist(), "settled": True, "places": 1}
+    found = {"z": HERE.tolist(), "settled": True, "places": 1, "run": [HERE.tolist()], "failed": 0}
+    place = {"config_hash": case_hash(case)} | found
     (run.folder / "engine").mkdir(parents=True)
     (run.folder / "engine" / "place.json").write_text(json.dumps(place), encoding="utf-8")
     model = run.validation_model
@@ -202,7 +203,10 @@ def test_measurements_for_validation_are_predicted_by_the_command(tmp_path: Path
     np.testing.assert_allclose(point.prediction, of_the_command(model, HERE[None])[0], atol=1e-12)
 
 
-@pytest.mark.parametrize("text", ["", "{}", '{"config_hash": "x", "z": [0, 0], "settled": true, "places": 1}'])
+ANOTHER = '{"config_hash": "x", "z": [0, 0], "settled": true, "places": 1, "run": [[0, 0]], "failed": 0}'
+
+
+@pytest.mark.parametrize("text", ["", "{}", ANOTHER])
 def test_a_place_that_is_damaged_or_another_is_not_taken(tmp_path: Path, text: str) -> None:
     (tmp_path / "place.json").write_text(text, encoding="utf-8")
     assert kept_place(tmp_path / "place.json", "y", 2) is None
@@ -234,7 +238,9 @@ def test_velocities_of_another_unit_or_sign_are_noticed(tmp_path: Path, times: s
 def test_what_cannot_be_compared_has_no_distance() -> None:
     error = np.array([0.1, np.nan])
     point = Point(np.zeros(1), np.array([0.4, 0.4]), np.zeros((2, 1)), {})
-    place = CommandPlace(cast(Any, None), np.zeros(1), True, 1, ())
+    none = cast(Any, None)
+    correction = Correction((), np.zeros(0), none, np.zeros(2), np.zeros((2, 0)))
+    place = CommandPlace(none, np.zeros(1), True, 1, correction, np.zeros((1, 1)), 0)
     off = command_compared(place, 1, np.array([0.5, 9.0]), "", point, error)
     assert (off.errors, off.careful) == (pytest.approx(1.0), True)
     for failure, linear in (("it ended with code 1.", point), ("", None)):

@@ -4,6 +4,7 @@ At each place the built-in engine is corrected to the predictions and slopes of 
 calibrated; where that ends, the command is run again. A place is kept when the command itself fits better there.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,15 +27,17 @@ MOST_PLACES, MOST_HALVINGS = 8, 4
 @dataclass(frozen=True)
 class CommandPlace:
     """A model with the engine of its command, corrected at z (p,) where the command fits best; settled: whether the
-    next step would have been negligible; places: at how many the slopes of the command were taken; rough: parameters
-    whose slopes there are mostly noise.
+    next step would have been negligible; places: at how many the slopes of the command were taken; correction: that at
+    z; run: where the command ran in the search (k, q); failed: how many runs failed.
     """
 
     model: Model
     z: Array
     settled: bool
     places: int
-    rough: tuple[str, ...]
+    correction: Correction
+    run: Array
+    failed: int
 
 
 def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace:
@@ -45,6 +48,16 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
     InputError
         If the command runs at none of these places, or the built-in engine finds no flow.
     """
+
+    tried: list[Correction] = []
+
+    def correction_there(z: Array, phase: Watch, slopes: bool = True) -> Correction:
+        tried.append(correction_at(runs, model, z, phase, slopes))
+        return tried[-1]
+
+    def found(settled: bool) -> CommandPlace:
+        run = np.unique(np.concatenate([one.run for one in tried]), axis=0)
+        return CommandPlace(here, z, settled, places, correction, run, sum(one.failed for one in tried))
 
     def in_phase(words: str) -> Watch:
         """A phase of its own, so that the time that is left is that of its runs."""
@@ -62,7 +75,7 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
         before, step = objective_at(here, base.noise, z), base.fitted.point.z - z
         for _ in range(MOST_HALVINGS):
             try:
-                there = correction_at(runs, model, z + step, phase, slopes=False)
+                there = correction_there(z + step, phase, slopes=False)
             except InputError:  # the command fails there: it may not nearer by
                 there = None
             if there is not None and objective_at(model_at(there, phase), base.noise, z + step) < before:
@@ -70,31 +83,31 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
             step = step / 2.0
         return None
 
-    z, correction = _start(runs, model, in_phase("place 1"))
+    z, correction = _start(model, lambda z, slopes: correction_there(z, in_phase("place 1"), slopes))
     here = model_at(correction)
     base = baseline(here)
     for places in range(1, MOST_PLACES + 1):
         away = base.fitted.point.z - z
         if away @ np.linalg.solve(base.fitted.covariance, away) < NEGLIGIBLE_DECREASE:
-            return CommandPlace(here, z, True, places, correction.rough)
+            return found(True)
         if places == MOST_PLACES:
             break
         lower = lower_place(here, base, z, in_phase(f"on the way to place {places + 1}"))
         if lower is None:
             break
-        z, correction = lower, correction_at(runs, model, lower, in_phase(f"place {places + 1}"))
+        z, correction = lower, correction_there(lower, in_phase(f"place {places + 1}"))
         here = model_at(correction)
         base = baseline(here, z)
-    return CommandPlace(here, z, False, places, correction.rough)
+    return found(False)
 
 
-def _start(runs: CommandRuns, model: Model, watch: Watch) -> tuple[Array, Correction]:
+def _start(model: Model, correction_there: Callable[[Array, bool], Correction]) -> tuple[Array, Correction]:
     """The middle of the prior or, if the command fails there, the next of its Sobol' points."""
     refused = InputError(f"{model.case.name}: the command has no place to start from.")
     for z in places_of_prior(len(model.names)):
         try:
-            correction_at(runs, model, z, watch, slopes=False)  # alone: a command that fails may take its time
-            return z, correction_at(runs, model, z, watch)
+            correction_there(z, False)  # alone: a command that fails may take its time
+            return z, correction_there(z, True)
         except InsensitiveCommandError:  # it fails anywhere else too
             raise
         except InputError as error:

@@ -182,6 +182,11 @@ def with_model_error(noise: Noise, columns: Array) -> Noise:
     return _with_cholesky(replace(noise, model_error=used @ used.T))
 
 
+def with_more_error(noise: Noise, columns: Array) -> Noise:
+    """The noise with M + columns columns', columns (n, k) of the used stations."""
+    return _with_cholesky(replace(noise, model_error=noise.model_error + columns @ columns.T))
+
+
 def with_unknown_errors(noise: Noise, columns: Array) -> Noise:
     """The noise with one more instrument that is off: what columns (n, k) [-] can make in its readings, zero elsewhere,
     counts for nothing, see `candidates.error_columns`.

@@ -37,7 +37,7 @@ NOT_SIMULATED = dict.fromkeys(
     "bed": {"__all__": {"survey"}},
     "simulate": {"field_budget"},
     "observations": {"__all__": {"synthetic"}},
-    "engine": {"keep", "step"},
+    "engine": {"keep", "step", "most_runs"},
 }
 # Goes up whenever the same case gets other numbers, so that results of before no longer fit it.
 EQUATIONS = 8

@@ -49,6 +49,9 @@ class CommandEngine(Part):
     step: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.1, description="step of differences [standard deviations of the prior]"
     )
+    most_runs: Annotated[int, Field(strict=True, gt=0)] = Field(
+        default=100, description="runs at most for a posterior by `method: surrogate`"
+    )
 
     @model_validator(mode="after")
     def _words_that_are_known(self) -> Self:
@@ -265,7 +268,9 @@ class Simulate(Part):
 
 
 class Infer(Part):
-    method: Literal["refine", "glue"] = Field(default="refine", description="draws around the best members, or these")
+    method: Literal["refine", "surrogate", "glue"] = Field(
+        default="refine", description="draws around the best members, the same of a surrogate of `engine`, or members"
+    )
     likelihood: Literal["gaussian", "nse", "inverse-variance"] = Field(
         default="gaussian", description="how residuals weigh"
     )
@@ -400,6 +405,15 @@ class Case(Part):
     validation: Validation | None = Field(default=None, description="measurements to judge a finished model by")
     reference: Reference | None = Field(default=None, description="values of others, printed beside ours")
     canopy_correction: CanopyCorrection | None = Field(default=None, description="phi for another canopy height")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _surrogate_of_a_command(cls, given: object) -> object:
+        """With an `engine`, `infer.method` is `surrogate` unless it is given: a run may take minutes."""
+        if not isinstance(given, dict) or given.get("engine") is None:
+            return given
+        infer = given.get("infer") or {}
+        return given | {"infer": {"method": "surrogate"} | infer} if isinstance(infer, dict) else given
 
     @property
     def of_another_model(self) -> bool:

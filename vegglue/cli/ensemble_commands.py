@@ -90,7 +90,7 @@ def simulate_command(
 def infer_command(
     config: Config,
     method: Annotated[
-        Literal["refine", "glue"] | None,
+        Literal["refine", "surrogate", "glue"] | None,
         typer.Option(help=HELP["infer.method"]),
     ] = None,
     members: Members = None,

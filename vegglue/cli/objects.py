@@ -120,7 +120,7 @@ def _law(one: LawFound) -> Object:
 
 
 def _posterior(case: Case, found: Posterior) -> Object:
-    refined, marginals = found.refinement, found.marginals
+    refined, marginals, learned = found.refinement, found.marginals, found.surrogate
     misfit = None if refined is None or refined.error_model.errors == "estimated" else refined.misfit
     parameters = {
         name: {
@@ -137,6 +137,11 @@ def _posterior(case: Case, found: Posterior) -> Object:
         "parameters": parameters, "correlation": marginals.correlation, "used_stations": found.fit.used,
         "rmse": found.fit.rmse, "sigma": found.fit.sigma,
         "chi2": None if misfit is None else {"chi2": misfit.chi2, "freedom": misfit.freedom, "p": misfit.p_misfit},
+        "surrogate": None if learned is None else {
+            "runs": learned.runs, "failed": learned.failed, "settled": bool(learned.settled),
+            "median_error": learned.median_error, "sd_error": learned.sd_error, "last_error": learned.last_error,
+            "validation_discharges": [learned.validation_low, learned.validation_high],
+        },
         "sentences": sentences(posterior_statements(found, case.reference.table if case.reference else None)),
     }  # fmt: skip
 

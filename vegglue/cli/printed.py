@@ -26,6 +26,7 @@ from vegglue.inference.statements import (
     pressed_bounds,
     sample_statements,
     stations_standing_out,
+    surrogate_statements,
     transfer_verdict,
     weight_statements,
 )
@@ -224,7 +225,7 @@ def posterior_lines(posterior: Posterior, kept_in: str, command: str) -> list[st
         rows.append((f"{name}{unit}", *middle, f"{low} .. {high}", share, odd))
     left = len(posterior.parameters) - MOST_PARAMETERS
     head = wrapped([sentence(found)]) + columns(rows) + ([phrase("more_parameters", left)] if left > 0 else [])
-    body = list(fit_statements(posterior))
+    body = [*surrogate_statements(posterior), *fit_statements(posterior)]
     if (tested := misfit_tested(posterior)) is not None:
         body.append(tested)
     elif refined is not None:

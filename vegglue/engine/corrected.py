@@ -11,11 +11,12 @@ References: first-order correction of one model by another, Alexandrov and Lewis
 checked against it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.parameter_space import FURTHEST, theta_at
@@ -50,6 +51,8 @@ class Correction:
         f_c - F_0 (n,) [unit of each station] and J_c - J_0 (n, q), zero if slopes were not wanted.
     rough
         Parameters whose slopes are mostly noise.
+    run
+        Where the command ran for it (k, q); failed: how many more runs failed.
     """
 
     names: tuple[str, ...]
@@ -58,12 +61,12 @@ class Correction:
     value: Array
     slope: Array
     rough: tuple[str, ...] = ()
+    run: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    failed: int = 0
 
     def at(self, model: Model, z: Array) -> tuple[Array, Array]:
         """What is added to predictions (n,) and slopes (n, p) of the built-in engine at z (p,)."""
-        known = {key: row for row, key in enumerate(self.station[SAME_STATION].itertuples(index=False, name=None))}
-        keys = model.station[SAME_STATION].itertuples(index=False, name=None)
-        rows = np.array([known.get(key, -1) for key in keys], dtype=np.int64)
+        rows = rows_of_stations(self.station, model.station)
         columns = [model.names.index(name) for name in self.names]
         of_stations = np.vstack([self.slope, np.zeros((1, len(columns)))])[rows]
         slope = np.zeros((rows.size, z.size))
@@ -71,25 +74,37 @@ class Correction:
         return np.append(self.value, 0.0)[rows] + of_stations @ (z[columns] - self.z), slope
 
 
+# What is added to predictions (n,) and slopes (n, p) of the built-in engine at z (p,).
+Added = Callable[[Model, Array], tuple[Array, Array]]
+
+
+def rows_of_stations(known: pd.DataFrame, wanted: pd.DataFrame) -> NDArray[np.int64]:
+    """The row of each wanted station among the known ones, -1 if it is none of them."""
+    if wanted is known:
+        return np.arange(len(known))
+    rows = {key: row for row, key in enumerate(known[SAME_STATION].itertuples(index=False, name=None))}
+    return np.array([rows.get(key, -1) for key in wanted[SAME_STATION].itertuples(index=False, name=None)], np.int64)
+
+
 class InsensitiveCommandError(InputError):
     """A command that predicts the same whatever its parameters are."""
 
 
-def with_correction(correction: Correction, name: str) -> Engine:
-    """F(z) and what is added there: the built-in engine corrected at one place; name: of the engine."""
+def with_correction(added: Added, name: str) -> Engine:
+    """F(z) and what is added there: the built-in engine, corrected; name: of the engine."""
 
     def linearise_corrected(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
-        value, slope = correction.at(model, z)
+        value, slope = added(model, z)
         point = NEWTON.linearise(model, z, near, lambda prediction: wanted(prediction + value))
         if point is None:
             return None
         return replace(point, prediction=point.prediction + value, slope=point.slope + slope)
 
     def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
-        return NEWTON.predict(model, points, z) + np.stack([correction.at(model, one)[0] for one in z])
+        return NEWTON.predict(model, points, z) + np.stack([added(model, one)[0] for one in z])
 
     def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
-        value, _ = correction.at(model, point.z)
+        value, _ = added(model, point.z)
         return NEWTON.responses(model, replace(point, prediction=point.prediction - value), causes)
 
     return replace(NEWTON, name=name, linearise=linearise_corrected, predict=predict, responses=responses)
@@ -121,7 +136,7 @@ def corrected(correction: Correction, runs: CommandRuns, watch: Watch) -> Engine
             return np.full_like(found, np.nan)
         return found + NEWTON.predict(model, points, z) - NEWTON.predict(bare, known, z_own)
 
-    return replace(with_correction(correction, "command"), predict=predict)
+    return replace(with_correction(correction.at, "command"), predict=predict)
 
 
 def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slopes: bool = True) -> Correction:
@@ -160,8 +175,10 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slope
     if np.isnan(found[0]).any():
         raise InputError(f"{name}: the command failed where it is calibrated: {reasons[0]}.")
     value = found[0] - own.prediction
+    ran = np.isfinite(found).all(axis=1)
+    run, failed = points[ran], int((~ran).sum())
     if not slopes:
-        return Correction(names, here, model.station, value, np.zeros_like(own.slope))
+        return Correction(names, here, model.station, value, np.zeros_like(own.slope), (), run, failed)
     slope = np.zeros((found.shape[1], q))
     for j in range(q):  # central differences; one-sided if the command fails on the other side
         ahead, behind = 1 + j, 1 + q + j
@@ -183,7 +200,7 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slope
     curve = np.sqrt(np.mean((ahead_of + behind_of - 2.0 * found[0]) ** 2, axis=1))
     change = np.sqrt(np.mean((ahead_of - behind_of) ** 2, axis=1))
     rough = tuple(name for name, a, b in zip(names, curve, change, strict=True) if a > ROUGH_SHARE * b)
-    return Correction(names, here, model.station, value, slope - own.slope, rough)
+    return Correction(names, here, model.station, value, slope - own.slope, rough, run, failed)
 
 
 def without_effects(model: Model) -> Model:

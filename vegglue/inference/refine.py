@@ -4,6 +4,7 @@ from points of the prior; and what it gives besides its draws: modes, errors, an
     p(z | y) ~ exp(-|W (y - f(z))|^2 / 2 - |z|^2 / 2),   W' W the inverse covariance of the errors
 
 z are the parameters on a scale on which the prior is standard normal. f is the flow model itself: every draw is a run.
+Of a command it may be a surrogate, which is learned first.
 """
 
 from dataclasses import replace
@@ -21,10 +22,11 @@ from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, predict
 from vegglue.inference.glue import check_stations, efficiency
 from vegglue.inference.homogeneity import transfer
-from vegglue.inference.importance_sampling import Sample, mixture_at_modes, sample
+from vegglue.inference.importance_sampling import LogDensity, Sample, mixture_at_modes, sample
 from vegglue.inference.leave_one_out import leave_one_out, leave_out, log_likelihoods, share_inside
 from vegglue.inference.posterior_modes import ModesAndErrors, members_of, modes_and_errors, points_of_prior
 from vegglue.inference.posterior_summary import posterior_of
+from vegglue.inference.surrogate import CommandToLearn, learn
 from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
@@ -54,7 +56,9 @@ DRAWN_WITHIN = 0.02
 OUTLIER_BELOW = 0.01
 
 
-def refine(ensemble: Ensemble | None, model: Model, watch: Watch = silent) -> Posterior:
+def refine(
+    ensemble: Ensemble | None, model: Model, watch: Watch = silent, command: CommandToLearn | None = None
+) -> Posterior:
     """EFFECTIVE_DRAWS of the posterior, or as many as some thousand runs give, and how well they predict held-out data.
 
     Parameters
@@ -65,6 +69,8 @@ def refine(ensemble: Ensemble | None, model: Model, watch: Watch = silent) -> Po
         Of the case, with the stations of its measurements; `infer.sigma` sets where the errors come from.
     watch : callable
         Is called with each phase.
+    command : CommandToLearn, optional
+        Its surrogate is drawn from; the engine of the model is then the built-in one, corrected where it fits best.
 
     Returns
     -------
@@ -85,14 +91,19 @@ def refine(ensemble: Ensemble | None, model: Model, watch: Watch = silent) -> Po
         check_stations(ensemble, station, case.source)
         tried = members_of(ensemble, model)
     base = modes_and_errors(model, tried, case.infer.sigma, watch)
-    noise, fits = base.noise, base.fits
-    run = partial(predict, solved_for(base.model, noise), [one.point for one in fits])
+    fits, learned = base.fits, None
+    density: LogDensity = partial(log_posterior, base.noise)
     # A component for each mode, its share proportional to exp(-objective / 2) |covariance|^(1/2) (Laplace).
     covariances = np.stack([one.covariance for one in fits])
     mass = np.array([-0.5 * one.objective for one in fits]) + 0.5 * np.linalg.slogdet(covariances)[1]
     start = mixture_at_modes(np.stack([one.point.z for one in fits]), covariances, mass)
+    if command is not None:
+        learned = learn(command, base, start, watch)
+        base, density = learned.base, learned.density
+    noise, fits = base.noise, base.fits
+    run = partial(predict, solved_for(base.model, noise), [one.point for one in fits])
     finished = counted(watch, f"drawing around {so_many(len(fits), 'mode')}", EFFECTIVE_DRAWS, "effective draws")
-    drawn = sample(run, partial(log_posterior, noise), start, EFFECTIVE_DRAWS, case.simulate.seed, finished)
+    drawn = sample(run, density, start, EFFECTIVE_DRAWS, case.simulate.seed, finished)
     watch(Progress("summing up"))
     theta, residual = theta_at(case, drawn.z), station["value"].to_numpy(float) - drawn.values
     precision = np.asarray(np.linalg.inv(covariance_of(noise)))
@@ -110,7 +121,7 @@ def refine(ensemble: Ensemble | None, model: Model, watch: Watch = silent) -> Po
         prediction=drawn.values,
     )
     settings = InferenceSettings(
-        method="refine",
+        method="refine" if command is None else "surrogate",
         likelihood="gaussian",
         sigma_rule=case.infer.sigma,
         threshold=-np.inf,
@@ -128,6 +139,7 @@ def refine(ensemble: Ensemble | None, model: Model, watch: Watch = silent) -> Po
         posterior_of(settings, weighted, case, station, error, sigma, factor),
         refinement=_refinement_of(base, drawn, precision, drawn.values[weighted.best]),
         transfer=transfer(base.model, noise, fits[0].point, case.infer.sigma == "known"),
+        surrogate=None if learned is None else learned.result,
     )
 
 

@@ -63,6 +63,26 @@ class SearchSummary:
 
 
 @dataclass(frozen=True)
+class SurrogateLearned:
+    """Runs of a command that a posterior rests on; see `results.posterior.Surrogate`."""
+
+    runs: int
+    failed: int
+    settled: bool
+    median_error: float
+    sd_error: float
+    last_error: float
+
+
+@dataclass(frozen=True)
+class ValidationProposed:
+    """Discharges beyond those of the case at which measurements would test its model [m3/s]."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class ModeFound:
     number: int
     values: tuple[tuple[NamedParameter, float], ...]
@@ -341,6 +361,7 @@ def posterior_statements(
         *validation_statements(posterior),
         *transfer_statements(posterior, others or {}, symbols),
         *canopy_statements(posterior, symbols),
+        *surrogate_statements(posterior)[1:],
     ]
 
 
@@ -374,6 +395,7 @@ def sample_statements(posterior: Posterior, symbols: Mapping[str, str] | None = 
     modes, model = refined.modes, refined.error_model
     count = modes.mode_chi2.size
     yield SearchSummary(modes.starts, not settings.ensemble_hash, count, sample.members, sample.failed)
+    yield from surrogate_statements(posterior)[:1]
     for number, (theta, chi2, weight) in enumerate(
         zip(modes.mode_theta, modes.mode_chi2, modes.mode_weight, strict=True), 1
     ):
@@ -390,6 +412,16 @@ def sample_statements(posterior: Posterior, symbols: Mapping[str, str] | None = 
             yield ErrorsScaled(model.scale)
     if model.correlation != 0.0:
         yield ErrorsCorrelated(model.correlation)
+
+
+def surrogate_statements(posterior: Posterior) -> list[object]:
+    """What a surrogate rests on, and at which discharge measurements would test it; none without one."""
+    one = posterior.surrogate
+    if one is None:
+        return []
+    learned = SurrogateLearned(one.runs, one.failed, bool(one.settled), one.median_error, one.sd_error, one.last_error)
+    known = math.isnan(one.validation_low)
+    return [learned] if known else [learned, ValidationProposed(one.validation_low, one.validation_high)]
 
 
 def weight_statements(posterior: Posterior) -> Iterator[object]:

@@ -116,7 +116,7 @@ ByKind = Annotated[dict[str, float], Stored(("kind",), VALUE_UNIT)]
 class InferenceSettings:
     """How the members were weighed, and which ensemble they come from."""
 
-    method: str  # glue: members of the ensemble weighed; refine: draws around the modes of the posterior
+    method: str  # glue: members of the ensemble weighed; refine: draws around the modes; surrogate: of a surrogate
     likelihood: str  # gaussian, nse or inverse-variance
     sigma_rule: str  # best-member or known
     threshold: float  # smallest efficiency of a member with weight [-]; -inf: none
@@ -235,6 +235,24 @@ class Transfer:
 
 
 @dataclass(frozen=True)
+class Surrogate:
+    """Of a command: what a posterior by a surrogate rests on, and how far it is known.
+
+    Errors are standard errors over realisations of what the surrogate does not know, the largest of any parameter.
+    """
+
+    runs: int  # of the command, with those that failed
+    failed: int
+    settled: int  # 1 if the errors were small enough, and stayed so when runs were added
+    median_error: float  # of a median [standard deviations of the posterior]
+    sd_error: float  # of a standard deviation, over itself [-]
+    last_error: float  # of the surrogate at the last runs, root mean square [standard errors of the data]
+    validation_low: float  # discharges at which measurements would test it [m3/s]; NaN if the case has any
+    validation_high: float
+    station_error: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # of the surrogate, counted in the errors
+
+
+@dataclass(frozen=True)
 class Posterior:
     """Everything one inference finds. Arrays over stations count all rows of the table `station`."""
 
@@ -248,6 +266,7 @@ class Posterior:
     canopy: CorrectedCanopy | None
     refinement: Refinement | None
     transfer: Transfer | None  # of several experiments
+    surrogate: Surrogate | None = None  # of a command, with `method: surrogate`
 
     @property
     def parameters(self) -> tuple[str, ...]:

@@ -24,11 +24,20 @@ from vegglue.results.layout import (
     stored_fields,
     table_group,
 )
-from vegglue.results.posterior import CHAINS, DRAWS_PER_CHAIN, LEVELS, CorrectedCanopy, Posterior, Refinement, Transfer
+from vegglue.results.posterior import (
+    CHAINS,
+    DRAWS_PER_CHAIN,
+    LEVELS,
+    CorrectedCanopy,
+    Posterior,
+    Refinement,
+    Surrogate,
+    Transfer,
+)
 
 ROUNDING = 1e-6  # of a sum of a million weights
 LARGEST_PARAMETER = 1e100  # its square is still a number
-PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement, "transfer": Transfer}
+PARTS = {"canopy": CorrectedCanopy, "refinement": Refinement, "transfer": Transfer, "surrogate": Surrogate}
 
 
 def posterior_groups(posterior: Posterior) -> dict[str, Group]:

@@ -21,6 +21,7 @@ from vegglue.engine.corrected import corrected, correction_at, with_correction, 
 from vegglue.engine.finished import compared_flows
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.errors import InputError, shown_path
+from vegglue.inference.surrogate import CommandToLearn
 from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.progress import Watch
@@ -95,7 +96,16 @@ def with_command(model: Model, folder: Path, watch: Watch) -> Model:
         return model
     found = compared_flows(model)
     refuse_unlike(model.case, found.agreement)
-    return replace(model, engine=with_correction(found.correction, FINISHED))
+    return replace(model, engine=with_correction(found.correction.at, FINISHED))
+
+
+def command_to_learn(model: Model, folder: Path, watch: Watch) -> tuple[Model, CommandToLearn]:
+    """The built-in engine corrected where the command of a case fits best, so that many predictions cost no run; and
+    what a surrogate is learned from.
+    """
+    place, runs = place_of_command(model, folder, watch), command_runs(model.case, folder)
+    near = replace(model, engine=with_correction(place.correction.at, "place"))
+    return near, CommandToLearn(runs, place.run, place.failed, runs.settings.most_runs)
 
 
 def refuse_unlike(case: Case, found: ResultCompared) -> None:
@@ -121,7 +131,7 @@ def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch)
     if model.case.engine is None:
         if model.case.finished_result is None:
             return unseen
-        return replace(unseen, engine=with_correction(compared_flows(unseen).correction, FINISHED))
+        return replace(unseen, engine=with_correction(compared_flows(unseen).correction.at, FINISHED))
     runs = command_runs(model.case, folder)
     correction = correction_at(runs, unseen, place_of_command(model, folder, watch).z, watch)
     return replace(unseen, engine=corrected(correction, runs, watch))
@@ -149,10 +159,10 @@ def with_command_compared(found: Diagnosis, model: Model, folder: Path, watch: W
     verdict = replace(found.verdict, notes=(compared, *found.verdict.notes))
     if compared.errors > BEYOND_BELIEF:
         verdict = replace(verdict, kind="cannot-tell", distrust=CommandDiffers(compared.errors))
-    elif place.rough and not place.settled:
+    elif place.correction.rough and not place.settled:
         # Noise in differences alone is a caution, as of a parameter that hardly matters; with a search that did not
         # settle it has led astray: a command with noise of a third of an error, to friction that was not there.
-        verdict = replace(verdict, kind="cannot-tell", distrust=CommandNotSettled(tuple(place.rough)))
+        verdict = replace(verdict, kind="cannot-tell", distrust=CommandNotSettled(tuple(place.correction.rough)))
     return replace(found, verdict=verdict)
 
 
@@ -165,7 +175,13 @@ def command_compared(
         used = np.isfinite(error)
         off = root_mean_square((there - linear.prediction)[used] / error[used])
     return CommandCompared(
-        place.places, parameters, off, failure.removesuffix("."), tuple(place.rough), place.settled, off > CLOSE_ENOUGH
+        place.places,
+        parameters,
+        off,
+        failure.removesuffix("."),
+        tuple(place.correction.rough),
+        place.settled,
+        off > CLOSE_ENOUGH,
     )
 
 
@@ -222,23 +238,31 @@ def place_of_command(model: Model, folder: Path, watch: Watch) -> CommandPlace:
     runs, path, wanted = command_runs(model.case, folder), folder / "engine" / PLACE_FILE, case_hash(model.case)
     known = kept_place(path, wanted, len(model.names))
     if known is not None:
-        z, settled, places = known
+        z, settled, places, run, failed = known
         correction = correction_at(runs, model, z, watch)
         here = replace(model, engine=corrected(correction, runs, watch))
-        return CommandPlace(here, z, settled, places, correction.rough)
+        return CommandPlace(here, z, settled, places, correction, run, failed)
     found = command_place(runs, model, watch=watch)
-    text = json.dumps({"config_hash": wanted, "z": found.z.tolist(), "settled": found.settled, "places": found.places})
+    text = json.dumps(
+        {
+            "config_hash": wanted, "z": found.z.tolist(), "settled": found.settled, "places": found.places,
+            "run": found.run.tolist(), "failed": found.failed,
+        }
+    )  # fmt: skip
     write_text(path, text, MAKE_ROOM)
     return found
 
 
-def kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool, int] | None:
-    """The place in a file: z (p,), whether its search settled, and places tried; None if it is damaged or another."""
+def kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool, int, Array, int] | None:
+    """The place in a file: z (p,), whether its search settled, places tried, where the command ran (k, q), and how many
+    runs failed; None if it is damaged or another.
+    """
     try:
         kept = json.loads(read_text(path, LARGEST_JSON))
-        z = np.array(kept["z"], dtype=float)
-        if kept["config_hash"] == wanted and z.shape == (parameters,) and np.isfinite(z).all():
-            return z, bool(kept["settled"]), int(kept["places"])
+        z, run = np.array(kept["z"], dtype=float), np.array(kept["run"], dtype=float)
+        fitting = z.shape == (parameters,) and run.ndim == 2 and np.isfinite(z).all() and np.isfinite(run).all()
+        if kept["config_hash"] == wanted and fitting:
+            return z, bool(kept["settled"]), int(kept["places"]), run, int(kept["failed"])
     except (InputError, ValueError, KeyError, TypeError, RecursionError):
         pass
     return None

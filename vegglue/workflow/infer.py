@@ -9,7 +9,7 @@ import numpy as np
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import without_stations
-from vegglue.errors import InputError, shown_command
+from vegglue.errors import InputError, shown_command, shown_path
 from vegglue.inference.command_ensemble import refuse_useless
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refinable, refine
@@ -20,9 +20,9 @@ from vegglue.results.posterior import Posterior
 from vegglue.results.result_files import read_ensemble, read_posterior, stored_hash, write_posterior
 from vegglue.results.resume import begun_or_finished
 from vegglue.workflow.case_run import CaseRun, case_run, excluded_in, median_flow, other_size
-from vegglue.workflow.command_model import with_command
+from vegglue.workflow.command_model import command_to_learn, with_command
 
-Method = Literal["refine", "glue"]
+Method = Literal["refine", "surrogate", "glue"]
 
 
 @one_thread()
@@ -52,7 +52,7 @@ def infer(
     runs : Path or str
         Folder that holds the folders of runs.
     method : str, optional
-        `refine` or `glue`, instead of the case's.
+        `refine`, `surrogate` (of the command of `engine`) or `glue`, instead of the case's.
     members : int, optional
         Size of the ensemble, instead of the case's.
     jobs : int
@@ -90,7 +90,11 @@ def infer(
     else:
         with at_most(run.jobs):
             model = replace(run.model, station=observations.table)
-            posterior = refine(ensemble, with_command(model, run.folder, run.watch), run.watch)
+            if chosen == "surrogate":
+                model, command = command_to_learn(model, run.folder, run.watch)
+                posterior = refine(None, model, run.watch, command)
+            else:
+                posterior = refine(ensemble, with_command(model, run.folder, run.watch), run.watch)
     write_posterior(run.folder / "posterior.h5", posterior, resolved_yaml(sized), wanted)
     with at_most(run.jobs):
         median_flow(run, posterior)  # for the page, which shall not have to wait for it
@@ -126,19 +130,25 @@ def own_ensemble(run: CaseRun, given: Ensemble | None, needed: bool) -> Ensemble
 
 
 def needs_ensemble(case: Case, method: Method) -> bool:
-    """Whether a posterior is made of the members of an ensemble: by GLUE, or with a command, whose runs are dear."""
-    return method == "glue" or case.engine is not None
+    """Whether a posterior is made of the members of an ensemble: by GLUE, or with a command that runs each draw."""
+    return method == "glue" or (method == "refine" and case.engine is not None)
 
 
 def chosen_method(case: Case, asked: Method | None) -> Method:
     """The wanted method, else that of the case; an informal likelihood is always weighed. Errors: InputError."""
     if asked not in (None, *get_args(Method)):
         raise InputError(f"--method: expected {' or '.join(get_args(Method))}, got {asked!r}.")
-    if refinable(case):
-        return asked or case.infer.method
-    if asked == "refine":
+    chosen = asked or case.infer.method
+    if chosen == "surrogate" and case.engine is None:
         raise InputError(
-            "--method refine: expected `infer.likelihood: gaussian` without `behavioural`, got an informal likelihood; "
-            "change the config or use --method glue."
+            f"{shown_path(case.source)}: `method: surrogate` expected an `engine`, got none; the built-in engine is "
+            "drawn from by `refine`."
+        )
+    if refinable(case):
+        return chosen
+    if asked in ("refine", "surrogate"):
+        raise InputError(
+            f"--method {asked}: expected `infer.likelihood: gaussian` without `behavioural`, got an informal "
+            "likelihood; change the config or use --method glue."
         )
     return "glue"
