@@ -302,3 +302,40 @@ def test_draws_are_counted_alike_however_many_are_worked_on_together(monkeypatch
     together = alarm_p(kinds, errors, 1)
     monkeypatch.setattr("vegglue.calibration.score_test.NULL_DRAWS_TOGETHER", 7)
     assert alarm_p(kinds, errors, 1) == together
+
+
+def test_other_measurements_of_the_same_amplitudes_are_rows_more(problem: tuple[np.ndarray, np.ndarray]) -> None:
+    """The score is the estimate of least squares over both over its standard error; the alarm draws the rows, too."""
+    slopes, fingerprints = problem
+    random = np.random.default_rng(8)
+    columns, more = random.standard_normal((5, PRINTS)), random.standard_normal(5)
+    residual, nothing = random.standard_normal(ROWS), np.zeros(SLOPES)
+    alone = score_test.project(slopes, residual, nothing, fingerprints)
+    both = score_test.with_evidence(alone, more, columns)
+    for j in range(PRINTS):
+        design = np.vstack([
+            np.column_stack([slopes, fingerprints[:, j]]),
+            np.eye(SLOPES, SLOPES + 1),
+            np.column_stack([np.zeros((5, SLOPES)), columns[:, j]]),
+        ])  # fmt: skip
+        inverse = np.linalg.inv(design.T @ design)
+        estimate = (inverse @ design.T @ np.concatenate([residual, nothing, more]))[-1]
+        assert both.score[j] == pytest.approx(estimate / np.sqrt(inverse[-1, -1]))
+        assert both.length[j] == pytest.approx(inverse[-1, -1] ** -0.5)
+    assert (both.visible <= 1.0).all()
+    errors = random.standard_normal((400, ROWS))
+    quiet = score_test.project(slopes, 0.0 * residual, nothing, fingerprints)
+    loud = score_test.with_evidence(quiet, 30.0 * columns[:, 2] / np.linalg.norm(columns[:, 2]), columns)
+    p_of = {
+        name: alarm_p(
+            [
+                kind_of_hypotheses("effect", quiet, np.full(PRINTS, 0.5), np.full(PRINTS, 1.0 / PRINTS)),
+                kind_of_hypotheses("line", of, np.full(PRINTS, 0.5), np.full(PRINTS, 1.0 / PRINTS)),
+            ],
+            errors,
+            1,
+        )
+        for name, of in (("quiet", score_test.with_evidence(quiet, 0.0 * more, columns)), ("loud", loud))
+    }
+    assert p_of["loud"] < 0.02
+    assert p_of["quiet"] > 0.9

@@ -26,6 +26,7 @@ from vegglue.results.verdict import (
     AT_BOUND,
     AmplitudeAtBound,
     AmplitudeBeyondPlausible,
+    BedCorrected,
     ChiSquare,
     CorrelatedErrors,
     EffectsNotExcluded,
@@ -470,3 +471,40 @@ def test_no_law_is_named_beside_errors_without_sense() -> None:
         found = verdict_on(laws=laws, misfit=MISSES, **absurd)
         assert found.kind == "cannot-tell"
         assert tags(found.reasons)[0] in ("errors_larger_than_stated", "model_error_exceeded")
+
+
+A_POOL = BedCorrected(49.0, -1.2, 1.4, 0.9, 1.3, 1.3, -0.3, (-0.45, -0.15), 9.2, 3.1, (45.0, 54.0))
+A_BAR = replace(A_POOL, x=60.0, change=0.2, interval95=(0.1, 0.3), local_log_factor=1.0)
+
+
+@pytest.mark.parametrize(
+    ("parts", "told"),
+    [
+        ({}, True),
+        ({"instruments": (an_instrument(interval95=(0.09, 0.11)),)}, True),
+        ({"misfit": MISSES}, False),  # cannot tell
+        ({"errors": replace(AS_STATED, scale=1.5)}, False),
+        ({"places": (an_anomaly(),)}, False),  # named itself
+    ],
+)
+def test_where_the_bed_differs_is_told_by_a_verdict_without_doubt(parts: dict[str, Any], told: bool) -> None:
+    plain, found = verdict_on(**parts), verdict_on(**parts, bed=(A_POOL, A_BAR))
+    assert found.kind == plain.kind
+    assert found.bed == (A_POOL if told else None)
+    assert [one for one in found.notes if isinstance(one, BedCorrected)] == ([A_BAR] if told else [A_POOL, A_BAR])
+    if told:
+        assert found.where is not None
+        assert (found.where["term"], found.where["x"], found.where["amplitude"]) == ("bed", 49.0, -0.3)
+    else:
+        assert found.where == plain.where
+
+
+def test_a_surveyed_line_is_the_place_of_a_verdict() -> None:
+    line = an_instrument(kind="line", x=36.0, y=0.0, stations=(), offset=0.15, interval95=(0.11, 0.19), unit="m")
+    found = verdict_on(instruments=(line,), bed=(A_POOL,))
+    assert (found.kind, found.instruments) == ("instrument", (line,))
+    assert found.where is not None
+    assert (found.where["term"], found.where["x"], found.where["amplitude"]) == ("line", 36.0, 0.15)
+    # One that may be chance is excluded, and no verdict.
+    unclear = replace(line, interval95=(0.05, 0.25))
+    assert verdict_on(instruments=(unclear,)).kind == "nothing-missing"
