@@ -1,75 +1,166 @@
-"""Is what `vegglue plan` calls detectable detected? `python tests/studies/plan.py CONFIG --sets 60 --minutes 4`,
+"""Is what `vegglue plan` calls detectable found? `python tests/studies/plan.py channel --solver second --sets 60`,
 and with `--compare 24` a proposed plan against plans made by hand.
 
-The plan of the stations of a config states for each listed effect the size that is detected with 90 %, and the
-chance that a plausible size is. Twins of the built-in engine hide testable effects at that size, and effects that are
-hidden to the plan at a plausible size, each with parameters, errors and a sign of its own. An effect counts as detected
-if the diagnosis is alarmed, and as named if it is among the effects of a step, alone or as one of a few. Records are
-appended to data/plan/CONFIG.jsonl, and a set that is there is not made again.
+Sites: `channel`, a short piece of the paper's channel; `reach`, a natural reach (see natural.py); `flume`, the sample
+in data/samples; or a config. The plan of its stations states for each listed effect the size that is named with 90 %,
+and the chance that a plausible size is. Twins hide testable effects at that size, and effects that are hidden to the
+plan at a plausible size, each with parameters, shapes, errors and a sign of its own. The truth is that of the built-in
+engine on finer cells, or of the second solver (not in the flume). Each is calibrated and diagnosed by the functions of
+`diagnose` up to what is accepted first; an effect counts as named if it is among the effects of that step. Records are
+appended to data/plan/SITE-SOLVER.jsonl, and a set that is there is not made again.
 """
 
 import argparse
 import json
 import time
-from dataclasses import asdict
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import scipy.stats
+import yaml
+from blind_sets import model_of
+from blind_truth import CELLS, KNOWN_TO_THE_FLOW, SENSORS, SETTLED, flows_of, perfect_site, true_values
+from natural import FLOWS, HELD_OUT, LISTED, HiddenThing, drawn_reach, flow_of, read, write_folder
 
 import vegglue
+from vegglue.arrays import Array
+from vegglue.calibration.baseline import baseline
+from vegglue.calibration.residual_screening import screen
+from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, Planned, PlannedGauge, PlannedTransect
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
+from vegglue.diagnosis.competition import hypotheses_of
+from vegglue.diagnosis.diagnose import _best_branch, _with_alarm
 from vegglue.diagnosis.plan import plan_measurements
 from vegglue.diagnosis.plan_model import planned_pieces
+from vegglue.diagnosis.search_state import SearchState, Undecided
 from vegglue.effects.definition import Effect
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
+from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.plain_json import plain
-from vegglue.results.plan import FieldPlan, hours_of
+from vegglue.progress import silent
+from vegglue.results.plan import FieldPlan, PlannedEffect, hours_of
 from vegglue.workflow.case_run import CaseRun
+from vegglue.workflow.hidden_effect import candidate_of, measured_twin, true_place, twin_base
 
 ROOT = Path(__file__).parents[2]
 # Of three sets, two hide what is said to be detected and one what is said to be hidden.
 HIDDEN_EVERY = 3
+# The reach of natural.py that is planned, stated exactly.
+REACH = 2
+# Of the hidden cause by its name and numbers, and the number of the set: what is measured at all stations.
+Truth = Callable[[str, Mapping[str, float], int], Array]
 
 
-def one_set(config: Path, plan: FieldPlan, number: int) -> dict[str, Any]:
+def site_of(name: str, runs: Path) -> tuple[Model, Truth | None, frozenset[str] | None]:
+    """The model of a site with its stations, its truth by the second solver, and which effects that has."""
+    if name == "channel":
+        model = model_of("twin")
+        by_flow = frozenset(KNOWN_TO_THE_FLOW) | {"inflow_skew", "inflow_core", "inflow_peak", "lateral_inflow"}
+        return model, lambda *given: _in_channel(model, *given), by_flow | {*SENSORS, "discharge_error",
+                                                                            "outlet_level_error"}  # fmt: skip
+    if name == "reach":
+        folder, site = runs / "reach", drawn_reach(REACH)
+        known = {one: flow_of(site, HiddenThing(), one, None) for one in FLOWS if one != HELD_OUT}
+        write_folder(folder, REACH, site, HiddenThing(), known)
+        (folder / "holdout.csv").unlink()  # nothing is held out
+        about = yaml.safe_load((folder / "site.yaml").read_text())
+        (folder / "site.yaml").write_text(yaml.safe_dump({key: about[key] for key in about if key != "holdout"}))
+        case = vegglue.import_folder(folder, folder.with_suffix(".yaml"), force=True)
+        model = CaseRun(case).model
+
+        def in_reach(effect: str, numbers: Mapping[str, float], number: int) -> Array:
+            hidden = HiddenThing(effect, next(iter(numbers.values())))
+            station, value = model.station, np.full(len(model.station), np.nan)
+            for one in known:
+                own = effect.startswith("probe_gain")
+                flow = known[one] if own else flow_of(site, hidden, one, known[one])
+                rows = model.rows[one]
+                x, y = (station[key].to_numpy(float)[rows] for key in ("x", "y"))
+                level = (station["kind"].to_numpy()[rows]) == "level"
+                u = read(flow.u, x, y) * np.where(
+                    own & (station["section"].astype(str).to_numpy()[rows] == effect[11:-1]),
+                    1.0 + hidden.amplitude,
+                    1.0,
+                )
+                value[rows] = np.where(level, read(flow.h + site.z[1::2, 1::2], x, y), u)
+            return value
+
+        return model, in_reach, frozenset(LISTED)
+    if name == "flume":
+        case = vegglue.import_folder(ROOT / "data/samples/flume", runs / "flume.yaml", force=True)
+        return CaseRun(case).model, None, None
+    return CaseRun(vegglue.load_case(Path(name))).model, None, None
+
+
+def _in_channel(model: Model, effect: str, numbers: Mapping[str, float], number: int) -> Array:
+    theta = {key: float(one[0]) for key, one in theta_at(model.case, true_place(len(model.names), number)).items()}
+    site = perfect_site(model.case, "twin", theta, len(model.station))
+    starts = flows_of(site, model.case, "twin")
+    return true_values(site, model.case, "twin", model.station, {effect: numbers}, CELLS["twin"], SETTLED, starts)
+
+
+def one_set(model: Model, plan: FieldPlan, number: int, truth: Truth | None, possible: frozenset[str] | None) -> Any:
     """The record of one twin, or why it cannot be made."""
-    hidden = [one for one in plan.effects if one.hidden]
+
+    def made(effects: tuple[PlannedEffect, ...]) -> list[PlannedEffect]:
+        return [one for one in effects
+                if truth is None or possible is None or {one.name, one.name.partition("[")[0]} & possible]  # fmt: skip
+
+    hidden, testable = made(tuple(one for one in plan.effects if one.hidden)), made(plan.testable)
     said_hidden = number % HIDDEN_EVERY == HIDDEN_EVERY - 1 and bool(hidden)
     random = np.random.default_rng((number, 63))
-    of = hidden if said_hidden else plan.testable
+    of = hidden if said_hidden else testable
     effect = of[int(random.integers(len(of)))]
     size = min(effect.plausible, effect.furthest) if said_hidden else effect.smallest
-    case = vegglue.load_case(config)
-    amplitude = listed(case, effect.name).amplitude
+    candidate = candidate_of(model, effect.name)
+    amplitude = candidate.amplitude
     signs = [sign for sign in (1.0, -1.0) if amplitude.low <= amplitude.off + sign * size <= amplitude.high]
     value = amplitude.off + float(random.choice(signs)) * size
-    with TemporaryDirectory() as name:
-        folder = Path(name) / "riddle"
-        try:
-            twin = vegglue.make_twin(case, folder, hide=[f"{effect.name}={value!r}"], seed=number + 1)
-        except InputError as error:
-            return {"set": number, "effect": effect.name, "failed": str(error)}
-        began = time.monotonic()
-        found = vegglue.diagnose(twin, runs=Path(name) / "runs")
-        seconds = time.monotonic() - began
-    verdict = found.verdict
-    alarmed = verdict.kind in ("identified", "one-of", "none-of-these", "instrument") or bool(found.steps)
-    named = sorted({rival for step in found.steps for rival in step.rivals})
-    similar = [other.name for other in effect.confused if other.cosine > constants().alike_cosine]
-    return {
+    began = time.process_time()
+    record = {
         "set": number, "effect": effect.name, "amplitude": value, "said": "hidden" if said_hidden else "detected",
-        "kind": verdict.kind, "alarm": alarmed,
-        "named": effect.name in named, "similar_named": any(one in named for one in similar),
-        "accepted": [step.accepted for step in found.steps], "places": len(found.places), "seconds": round(seconds, 1),
         "said_of_it": {key: asdict(effect)[key] for key in ("smallest", "plausible", "chance_plausible")},
     }  # fmt: skip
+    try:
+        if truth is None:
+            base = twin_base(model, true_place(len(model.names), number + 1))
+            station, _ = measured_twin(base, [f"{effect.name}={value!r}"], 6.0, "white", number + 1)
+        else:
+            shapes = {
+                one.name: float(random.uniform(min(one.grid), max(one.grid))) if one.grid else one.default
+                for one in candidate.effect.shapes
+            } | dict(candidate.fixed)
+            values = truth(effect.name, {amplitude.name: value, **shapes}, number + 1)
+            error = model.station["standard_error"].to_numpy(float)
+            station = model.station.assign(value=values + error * random.standard_normal(len(values)))
+        found, took = first_step(replace(model, station=station)), time.process_time()
+    except (InputError, RuntimeError) as error:
+        return record | {"failed": str(error)}
+    similar = [other.name for other in effect.confused if other.cosine > constants().alike_cosine]
+    rivals = [name for step in found.steps for name in step.rivals]
+    return record | {
+        "alarm": found.alarmed, "named": effect.name in rivals, "rivals": rivals,
+        "similar_named": any(one in rivals for one in similar), "places": [one.term for one in found.places],
+        "instruments": [one.kind for one in found.instruments], "undecided": found.undecided is not None,
+        "seconds": round(took - began, 1),
+    }  # fmt: skip
+
+
+def first_step(model: Model) -> SearchState:
+    """What a diagnosis accepts first; `alarmed` as before it."""
+    screening = screen(baseline(model))
+    found = _with_alarm(screening, SearchState())
+    if not found.alarmed:
+        return found
+    branch = _best_branch(screening, hypotheses_of(screening, silent), found, silent)
+    return replace(found, undecided=branch) if isinstance(branch, Undecided) else branch.found
 
 
 def listed(case: Case, name: str) -> Effect:
@@ -157,28 +248,35 @@ def compare(config: Path, hours: float) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("config", type=Path)
+    parser.add_argument("site", help="channel, reach, flume, or a config")
+    parser.add_argument("--solver", choices=("own", "second"), default="own")
     parser.add_argument("--sets", type=int, default=60)
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--folder", type=Path, default=ROOT / "data/plan")
+    parser.add_argument("--runs", type=Path, default=ROOT / "runs/plan")
+    parser.add_argument("--figures", action="store_true")
     parser.add_argument("--compare", type=float, help="hours: compare a proposed plan with plans made by hand instead")
     given = parser.parse_args()
+    began = time.monotonic()
     if given.compare is not None:
-        compare(given.config, given.compare)
+        compare(Path(given.site), given.compare)
         return
-    case = vegglue.load_case(given.config)
-    path = given.folder / f"{case.name}.jsonl"
+    path = given.folder / f"{Path(given.site).stem}-{given.solver}.jsonl"
     path.parent.mkdir(parents=True, exist_ok=True)
     records = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    done = {one["set"] for one in records}
-    began = time.monotonic()
-    plan = plan_measurements(CaseRun(case).model) if len(done) < given.sets else None
-    for number in range(given.sets):
-        if number in done or plan is None or time.monotonic() - began > 60.0 * given.minutes:
-            continue
-        records.append(one_set(given.config, plan, number))
-        with path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(plain(records[-1]), allow_nan=False) + "\n")
+    left = [number for number in range(given.sets) if number not in {one["set"] for one in records}]
+    if left and not given.figures:
+        given.runs.mkdir(parents=True, exist_ok=True)
+        model, truth, possible = site_of(given.site, given.runs)
+        if given.solver == "second" and truth is None:
+            parser.error(f"{given.site}: the second solver has no truth of it.")
+        plan = plan_measurements(model)
+        for number in left:
+            if time.monotonic() - began > 60.0 * given.minutes:
+                break
+            records.append(one_set(model, plan, number, truth if given.solver == "second" else None, possible))
+            with path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(plain(records[-1]), allow_nan=False) + "\n")
     print(figures(records))
 
 

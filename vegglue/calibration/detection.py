@@ -17,7 +17,7 @@ since parameters and shared errors have standard normal priors (Woodbury's ident
 without the measurements themselves.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ import scipy.linalg
 from scipy.special import ndtr
 
 from vegglue.arrays import Array, Mask
-from vegglue.calibration.score_test import HypothesisKind, log_factors, prior_shrinkage
+from vegglue.calibration.score_test import prior_shrinkage
 
 # Chance with which what is called detectable before measuring is detected [-].
 PLANNED_POWER = 0.9
@@ -90,29 +90,6 @@ def chance_to_separate(squared_distance: Array) -> Array:
     the true one has the larger likelihood [-].
     """
     return np.asarray(ndtr(0.5 * np.sqrt(squared_distance)))
-
-
-def alarm_thresholds(kind: HypothesisKind, columns: Sequence[np.ndarray], level: float) -> Array:
-    """Score of each column at which its own effect alone sounds the alarm of a diagnosis (c,) [standard errors].
-
-        ln sum_k exp(ln B_k(c_jk t) + ln prior_k) = level,   k over the columns of the effect of j
-
-    c_jk is the cosine between projected fingerprints: settings of one effect rise together. What other hypotheses add
-    is left out, so that the chance of detection is a lower bound.
-    """
-    units, found = kind.projected.units, single_threshold(kind.size, kind.log_prior, level)
-    for own in columns:
-        if own.size == 1:
-            continue
-        cosine = units[:, own].T @ units[:, own]
-        size, prior = kind.size[own], kind.log_prior[own]
-
-        def enough(score: Array, cosine: Array = cosine, size: Array = size, prior: Array = prior) -> Mask:
-            evidence = log_factors(score[:, None] * cosine, size) + prior
-            return np.asarray(np.logaddexp.reduce(evidence, axis=1) >= level)
-
-        found[own] = lowest(enough, np.zeros(own.size), found[own])  # others only add
-    return found
 
 
 def single_threshold(size: Array, log_prior: Array, level: float) -> Array:

@@ -8,14 +8,13 @@ of it is computed at several draws of the priors and averaged. Effects act to fi
 A line of bed levels conditions the error of the bed, a random field with a prior, and changes nothing else.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import pairwise
 
 import numpy as np
+from scipy.special import ndtri
 
-from vegglue.arrays import Array, Mask
+from vegglue.arrays import Array
 from vegglue.calibration.candidates import (
     Candidate,
     instruments_of,
@@ -24,11 +23,8 @@ from vegglue.calibration.candidates import (
 )
 from vegglue.calibration.detection import (
     PLANNED_POWER,
-    alarm_thresholds,
-    chance_over_prior,
     detected_length,
     detection_chance,
-    lowest,
     single_threshold,
 )
 from vegglue.calibration.fingerprints import Fingerprints, Places, places_of
@@ -50,7 +46,15 @@ from vegglue.case.schema import (
     Planned,
 )
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.plan_model import PlanDraw, PlanModel, plan_model, planned_pieces, possible_pieces
+from vegglue.diagnosis.first_competition import NAMED_AT, chances_named, first_competition
+from vegglue.diagnosis.plan_model import (
+    PlanModel,
+    plan_model,
+    planned_pieces,
+    possible_pieces,
+    relative_lengths,
+    with_chosen,
+)
 from vegglue.diagnosis.plan_search import plan_search
 from vegglue.engine.interface import Model, Point
 from vegglue.errors import InputError
@@ -77,6 +81,8 @@ SIMILAR_SHOWN = 3
 # ln of the sum of Bayes factors at which a diagnosis is alarmed, before any measurement says so [-]: between 0.4 and
 # 0.9 on the sites of `configs/`.
 USUAL_ALARM = 0.6
+# Sizes at which a chance is computed, down to 1e-4 of the furthest, and of the prior [-].
+SIZES_TRIED, SIZES_OF_PRIOR = 120, 40
 # Draws of errors alone for the alarm [-]: 50 lie beyond the 95 % point.
 ALARM_DRAWS = 1000
 
@@ -118,25 +124,23 @@ def plan_measurements(
     proposed = not len(at_hand) and not base
     if proposed:
         watch(Progress("choosing a first set"))
-        search = plan_search(wide, question, planned, USUAL_ALARM, frozenset())
+        search = plan_search(wide, question, planned, USUAL_ALARM, frozenset(), np.zeros(len(wide.candidates)))
         chosen = search.best_set(planned.hours)
         if not chosen:
             raise InputError(
                 f"{model.case.name}: no measurement fits {planned.hours:g} hours of field work; raise `planned.hours`."
             )
         base = [wide.pieces[j] for j in chosen]
-        taken = {one.place for one in base}
-        others = [one for one in wide.pieces if one.place not in taken]
-        wide = plan_model(model, planned, at_hand, base, others, wide)
+        wide = with_chosen(wide, chosen)
         question = _question(wide.candidates, about, size, between)
     watch(Progress("weighing what they show"))
-    shown = [shown_by(wide, one) for one in wide.draws]
+    shown = shown_by(wide)
     at_places = _chances_at_places(shown)
     flows = frozenset(at_hand["experiment"])
     present = flows | {one.experiment for one in base if one.experiment}
     hours = hours_of(base, planned.costs.discharge, flows)
     watch(Progress("weighing what could be added"))
-    search = plan_search(wide, question, planned, shown[0].level, present)
+    search = plan_search(wide, question, planned, shown.level, present, shown.beyond)
     left = planned.hours - hours
     return FieldPlan(
         case=model.case.name,
@@ -145,10 +149,10 @@ def plan_measurements(
         proposed=proposed,
         hours=hours,
         budget=planned.hours,
-        draws=len(wide.draws),
+        draws=len(shown.relative),
         effects=_effects(wide, shown),
         places=_places(model.case, at_places),
-        instruments=_instruments(wide, shown[0]),
+        instruments=_instruments(wide, shown),
         parameters=_parameters(model.case, shown),
         question=question,
         answer=search.start.mean,
@@ -160,46 +164,66 @@ def plan_measurements(
 
 @dataclass(frozen=True)
 class ShownByPlan:
-    """The hypotheses of a diagnosis at one draw, without a residual: kinds as in a screening, the first of listed
-    effects; thresholds: of each column of these (c,); level: of the alarm; cosines with spots (c,) by term, and with
-    slopes (c, p); spread (p,): standard errors of z.
+    """The hypotheses of a diagnosis in the middle of the priors, without a residual: kinds as in a screening, the first
+    of listed effects; level: of the alarm; cosines with spots (c,) by term, and with slopes (c, p); spread (p,):
+    standard errors of z. lengths: of the traces of each effect at the shapes that it may have (t,) [standard errors per
+    unit of gain]; named (effect, lengths): chance to be named at each of NAMED_AT; relative (draws, effect): length of
+    a trace around the middle of the priors over that in the middle [-].
     """
 
     noise: Noise
     fingerprints: Fingerprints
     kinds: tuple[HypothesisKind, ...]
-    thresholds: Array
     level: float
     with_places: Mapping[str, Array]
     with_slopes: Array
     visible: Array
     spread: Array
+    lengths: tuple[Array, ...]
+    named: Array
+    relative: Array
+
+    @property
+    def beyond(self) -> Array:
+        """By how much the length that is named with even odds is above the score of the alarm (effect,) [standard
+        errors]; that of an effect that never is counts as the largest of NAMED_AT.
+        """
+        even = np.array([_first_at(NAMED_AT, one, 0.5) for one in self.named])
+        kind = self.kinds[0]
+        threshold = single_threshold(kind.size, kind.log_prior, self.level)
+        own = np.array([threshold[one].min() for one in self.fingerprints.columns])
+        return np.clip(even - own, 0.0, NAMED_AT[-1])
 
 
-def shown_by(wide: PlanModel, draw: PlanDraw) -> ShownByPlan:
+def _first_at(x: Array, chance: Array, wanted: float) -> float:
+    """x from which on a chance is `wanted`, linear between the given ones; infinite if it is at none."""
+    reached = np.flatnonzero(chance >= wanted)
+    if not reached.size or reached[0] == 0:
+        return float("inf") if not reached.size else float(x[0])
+    k = int(reached[0])
+    return float(x[k - 1] + (x[k] - x[k - 1]) * (wanted - chance[k - 1]) / (chance[k] - chance[k - 1]))
+
+
+def shown_by(wide: PlanModel) -> ShownByPlan:
     """The screening of a diagnosis of the stations of the plan, before there is a residual."""
-    known = np.arange(wide.count)
-    station = wide.model.station.iloc[known].reset_index(drop=True)
-    case = wide.model.case
+    known, draw = wide.known, wide.draws[0]
+    station = draw.model.station.iloc[known].reset_index(drop=True)
+    case = draw.model.case
     flows = {name: flow for name, flow in draw.point.flows.items() if name in set(station["experiment"])}
     there = case.model_copy(update={"experiments": {name: case.experiments[name] for name in flows}})
-    model = replace(wide.model, case=there, station=station)
+    model = replace(draw.model, case=there, station=station)
     point = Point(draw.point.z, draw.point.prediction[known], draw.point.slope[known], flows)
     noise = with_grid_error(noise_of(station), wide.grid_error[known] / constants().grid_error_share)
-    of_pieces = np.concatenate([np.zeros(0, dtype=int), *wide.rows])
-    surveyed = np.setdiff1d(np.arange(len(wide.model.station), len(draw.shared)), of_pieces)
-    noise = with_model_error(noise, _after_survey(draw.shared, known, surveyed, wide.error))
+    noise = with_model_error(noise, _after_survey(draw.shared, known, wide.surveyed, wide.error))
     settings = [(one, shapes) for one in wide.candidates for shapes in one.settings()]
-    sizes = [len(one.settings()) for one in wide.candidates]
-    ends = np.cumsum([0, *sizes])
     prints = Fingerprints(
         point=point,
         candidates=list(wide.candidates),
-        columns=[np.arange(a, b) for a, b in pairwise(ends)],
+        columns=wide.columns,
         settings=[shapes for _, shapes in settings],
         amplitudes=[one.amplitude for one, _ in settings],
         causes=[],
-        values=draw.values[known],
+        values=wide.values[known],
         places=places_of(model, point, half_width(model.site)),
     )
     slope = noise.whiten(point.slope)
@@ -224,17 +248,23 @@ def shown_by(wide: PlanModel, draw: PlanDraw) -> ShownByPlan:
     spots: dict[str, Array] = {
         str(term): np.abs(units.T @ one.units).max(axis=1, initial=0.0) for term, one in in_places.items()
     }
-    lengths = np.maximum(np.linalg.norm(white, axis=0), 1e-300), np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
+    whole = np.maximum(np.linalg.norm(white, axis=0), 1e-300), np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
+    between = [wide.between[known][:, wide.between_of == j] for j in range(len(wide.candidates))]
+    truths = [against(some if some.size else prints.values[:, own])
+              for some, own in zip(between, prints.columns, strict=True)]  # fmt: skip
+    competition = first_competition(kinds, prints.columns, list(in_places), errors, level)
     return ShownByPlan(
         noise=noise,
         fingerprints=prints,
         kinds=kinds,
-        thresholds=alarm_thresholds(kinds[0], prints.columns, level),
         level=level,
         with_places=spots,
-        with_slopes=(white / lengths[0]).T @ (slope / lengths[1]),
+        with_slopes=(white / whole[0]).T @ (slope / whole[1]),
         visible=projected.visible,
         spread=np.sqrt(np.diag(np.linalg.inv(slope.T @ slope + np.eye(z.size)))),
+        lengths=tuple(one.length for one in truths),
+        named=chances_named(competition, truths),
+        relative=relative_lengths(wide),
     )
 
 
@@ -248,90 +278,65 @@ def _after_survey(shared: Array, known: np.ndarray, surveyed: np.ndarray, error:
     return np.asarray(shared[known] - ((shared[known] @ right.T) * less) @ right)
 
 
-def _effects(wide: PlanModel, shown: Sequence[ShownByPlan]) -> tuple[PlannedEffect, ...]:
-    """Each effect, averaged over draws and settings of its shapes."""
-    kinds, prints = [one.kinds[0] for one in shown], shown[0].fingerprints
-    cosines = np.mean([np.abs(kind.projected.units.T @ kind.projected.units) for kind in kinds], axis=0)
-    size = np.mean([kind.size for kind in kinds], axis=0)
-    best = [int(own[np.argmax(size[own])]) for own in prints.columns]
+def _effects(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedEffect, ...]:
+    """Each effect, averaged over places of the priors and its shapes."""
+    kind, prints = shown.kinds[0], shown.fingerprints
+    cosines = np.abs(kind.projected.units.T @ kind.projected.units)
+    best = [int(own[np.argmax(kind.size[own])]) for own in prints.columns]
+    quantiles = ndtri((np.arange(SIZES_OF_PRIOR) + 0.5) / SIZES_OF_PRIOR / 2.0 + 0.5)
 
     def effect(j: int) -> PlannedEffect:
-        one, own, column = prints.candidates[j], prints.columns[j], best[j]
-        amplitude = one.amplitude
-        length = np.array([kind.projected.length[own] for kind in kinds])
-        threshold = np.array([part.thresholds[own] for part in shown])
+        one, column = prints.candidates[j], best[j]
+        amplitude, relative = one.amplitude, shown.relative[:, j]
 
         def chances(size: float) -> Array:
-            """That a size is detected, of each draw."""
-            gain = abs(size) ** amplitude.power
-            return np.asarray(detection_chance(gain * length, threshold, amplitude.only_sign).mean(axis=1))
+            """That a size is named, of each draw."""
+            length = size**amplitude.power * shown.lengths[j][:, None] * relative
+            return np.asarray(np.interp(length, NAMED_AT, shown.named[j]).mean(axis=0))
 
-        def chance_at(size: float, draw: int) -> float:
-            return float(chances(size)[draw])
-
-        of_draws = [_smallest(partial(chance_at, draw=d), amplitude.furthest) for d in range(len(shown))]
+        sizes = amplitude.furthest * np.geomspace(1e-4, 1.0, SIZES_TRIED)
+        of_sizes = np.array([chances(float(size)) for size in sizes])
+        of_draws = [_first_at(sizes, one, PLANNED_POWER) for one in of_sizes.T]
         others = [
             Confusion(other.name, float(cosines[column, best[k]]))
             for k, other in enumerate(prints.candidates)
             if k != j and cosines[column, best[k]] > SIMILAR_FROM
         ]
-        terms = {term: float(np.mean([part.with_places[term][column] for part in shown])) for term in
-                 shown[0].with_places}  # fmt: skip
+        terms = {term: float(of_spots[column]) for term, of_spots in shown.with_places.items()}
         nearest = max(terms, key=lambda term: terms[term], default="")
-        with_slopes = np.mean([part.with_slopes[column] for part in shown], axis=0)
-        parameter = int(np.argmax(np.abs(with_slopes)))
+        parameter = int(np.argmax(np.abs(shown.with_slopes[column])))
         return PlannedEffect(
             name=one.name,
             title=one.effect.title,
             unit=amplitude.unit,
-            smallest=_smallest(lambda size: float(chances(size).mean()), amplitude.furthest),
+            smallest=_first_at(sizes, of_sizes.mean(axis=1), PLANNED_POWER),
             best=min(of_draws),
             worst=max(of_draws),
             plausible=amplitude.scale,
             furthest=amplitude.furthest,
             chance_plausible=float(chances(min(amplitude.scale, amplitude.furthest)).mean()),
-            chance=float(chance_over_prior(np.array([kind.size[own] for kind in kinds]), threshold).mean()),
-            visibility=float(np.mean([part.visible[column] for part in shown])),
+            chance=float(np.mean([chances(min(amplitude.scale * size, amplitude.furthest)) for size in quantiles])),
+            visibility=float(shown.visible[column]),
             confused=tuple(sorted(others, key=lambda other: -other.cosine)[:SIMILAR_SHOWN]),
             place=Confusion(nearest, terms[nearest]) if terms.get(nearest, 0.0) > SIMILAR_FROM else None,
             parameter=wide.model.names[parameter],
-            cosine=float(with_slopes[parameter]),
+            cosine=float(shown.with_slopes[column, parameter]),
         )
 
     found = [effect(j) for j in range(len(prints.candidates))]
     return tuple(sorted(found, key=lambda one: (-one.chance, one.name)))
 
 
-def _smallest(chance: Callable[[float], float], furthest: float) -> float:
-    """The size at which a chance that rises with it is PLANNED_POWER; infinite if it is not within `furthest`."""
-    if not chance(furthest) >= PLANNED_POWER:
-        return float("inf")
-
-    def enough(log: Array) -> Mask:
-        return np.array(chance(float(np.exp(log))) >= PLANNED_POWER)
-
-    return float(np.exp(lowest(enough, np.log(1e-9 * furthest), np.log(furthest))))
-
-
 ChancesAtPlaces = list[tuple[Places, Array, Array]]
 
 
-def _chances_at_places(shown: Sequence[ShownByPlan]) -> ChancesAtPlaces:
-    """Of each term: its spots at the first draw, the chance that a plausible size is detected there, and the size that
-    is detected.
-    """
+def _chances_at_places(shown: ShownByPlan) -> ChancesAtPlaces:
+    """Of each term: its spots, the chance that a plausible size is detected there, and the size that is detected."""
     found = []
-    for position, places in enumerate(shown[0].fingerprints.places):
-        chance, smallest = [], []
-        for part in shown:
-            kind = part.kinds[1 + position]
-            if kind.size.size != places.x.size:  # other places are under water at this draw
-                continue
-            threshold = single_threshold(kind.size, kind.log_prior, part.level)
-            chance.append(detection_chance(kind.size, threshold))
-            length = np.maximum(kind.projected.length, 1e-300)
-            smallest.append(detected_length(threshold) / length)
-        found.append((places, np.mean(chance, axis=0), np.median(smallest, axis=0)))
+    for places, kind in zip(shown.fingerprints.places, shown.kinds[1:], strict=False):
+        threshold = single_threshold(kind.size, kind.log_prior, shown.level)
+        smallest = detected_length(threshold) / np.maximum(kind.projected.length, 1e-300)
+        found.append((places, detection_chance(kind.size, threshold), smallest))
     return found
 
 
@@ -362,7 +367,7 @@ def _chances_of_drag(at_places: ChancesAtPlaces) -> PlaceChances | None:
 
 
 def _instruments(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedInstruments, ...]:
-    station = wide.model.station.iloc[: wide.count]
+    station = wide.model.station.iloc[wide.known]
     instruments = instruments_of(station)
     found = []
     for kind in shown.kinds:
@@ -378,8 +383,8 @@ def _instruments(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedInstrument
     return tuple(found)
 
 
-def _parameters(case: Case, shown: Sequence[ShownByPlan]) -> tuple[PlannedParameter, ...]:
-    share = np.mean([one.spread for one in shown], axis=0)
+def _parameters(case: Case, shown: ShownByPlan) -> tuple[PlannedParameter, ...]:
+    share = shown.spread
     ends = NORMAL95 * np.array([-1.0, 1.0])
     before = theta_at(case, np.repeat(ends[:, None], share.size, axis=1))
     after = theta_at(case, ends[:, None] * share)

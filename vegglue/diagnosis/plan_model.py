@@ -4,18 +4,20 @@ stations, and flows, slopes, fingerprints and errors at several draws of the pri
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import accumulate, chain, pairwise
 
 import numpy as np
 import pandas as pd
+from scipy.linalg import hadamard
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import FEWEST_CELLS_ACROSS, places_of_prior
+from vegglue.calibration.baseline import FEWEST_CELLS_ACROSS, START_SPREAD
 from vegglue.calibration.candidates import (
     Candidate,
     candidates_of,
     cause_of,
 )
+from vegglue.calibration.detection import information, own_and_shared
 from vegglue.calibration.model_error import (
     BED_RADIUS,
     FRICTION_RADIUS,
@@ -35,7 +37,7 @@ from vegglue.case.schema import (
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.next_measurement import AS_MEASURED, SECTIONS, with_other_discharges
-from vegglue.engine.interface import Model, Point, linearise, linearise_from, responses
+from vegglue.engine.interface import Cause, Model, Point, linearise, linearise_from, responses
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import KINDS, STREAMWISE
@@ -47,8 +49,13 @@ from vegglue.results.plan import (
 )
 from vegglue.results.plan_files import KIND_OF_WORK
 
-# Places of the prior at which a plan is computed [-]. Chosen: each costs the flows and all fingerprints.
-PRIOR_PLACES = 3
+# Places around the middle of the prior at which lengths of traces are computed, on the coarsest cells [-]: of up to
+# seven parameters each is varied by itself. Chosen: each costs the flows and a fingerprint of each effect.
+DRAWS_AROUND = 8
+# Ratio of lengths above which it is not the trace that is longer, but the coarsest cells that are too coarse [-].
+LARGEST_RATIO = 10.0
+# Shapes between its settings at which an effect is thought to be, for each that has any.
+SETTINGS_BETWEEN = 3
 # Other discharges that are thought of, relative to the lowest one of the case; above the highest one HIGHER.
 LOWER_DISCHARGES = (0.5,)
 # Depth below which no velocity is measured [m]: a propeller is covered.
@@ -63,10 +70,12 @@ MOST_ADDED_PLACES, MOST_PATCHES = 20, 8
 
 @dataclass(frozen=True)
 class PlanDraw:
-    """A place of the prior: the slopes (N, p), fingerprints (N, c) and shared errors (N, k) of all rows: stations of
-    the plan and of what could be added, and behind them the bed levels of lines that could be surveyed.
+    """A place of the prior on some cells: the slopes (N, p), fingerprints of one setting of each candidate (N, k) and
+    shared errors (N, q) of all rows: stations of the plan and of what could be added, and behind them the bed levels of
+    lines that could be surveyed.
     """
 
+    model: Model
     point: Point
     slope: Array
     values: Array
@@ -77,19 +86,41 @@ class PlanDraw:
 class PlanModel:
     """All that is needed of a case before measuring.
 
-    model: on the cells of the search, with every station that is or could be measured and every flow; count: how many
-    of them are of the plan, which come first; rows: of each piece that could be added, surveyed levels behind the
-    stations; error (N,): standard errors; grid_error (N,), see `noise`.
+    case: on its own cells; known: rows of the stations of the plan; surveyed: those of the bed levels of its lines;
+    rows: of each piece that could be added; error (N,): standard errors; grid_error (N,), see `noise`. values (N, c):
+    fingerprints of every setting of the candidates, by column: `columns`; between: more of each candidate with shapes,
+    drawn between its settings as nature does (N, b), and the candidate of each (b,). draws: the middle of the priors on
+    the cells of the search, with every flow that is or could be measured; then the middle and places around it on the
+    coarsest cells.
     """
 
-    model: Model
-    count: int
+    case: Case
+    known: np.ndarray
+    surveyed: np.ndarray
     pieces: tuple[PlannedPiece, ...]
     rows: tuple[np.ndarray, ...]
     error: Array
     grid_error: Array
     candidates: tuple[Candidate, ...]
+    values: Array
+    between: Array
+    between_of: np.ndarray
     draws: tuple[PlanDraw, ...]
+
+    @property
+    def model(self) -> Model:
+        """On the cells of the search."""
+        return self.draws[0].model
+
+    @property
+    def columns(self) -> list[np.ndarray]:
+        """Columns of `values` of each candidate."""
+        return columns_of(self.candidates)
+
+
+def columns_of(candidates: Sequence[Candidate]) -> list[np.ndarray]:
+    """Columns of all settings of each candidate, side by side."""
+    return [np.arange(*ends) for ends in pairwise(accumulate((len(one.settings()) for one in candidates), initial=0))]
 
 
 def water_across(model: Model, experiment: str, x: float) -> tuple[Array, Array]:
@@ -271,15 +302,14 @@ def plan_model(
     at_hand: pd.DataFrame,
     base: Sequence[PlannedPiece],
     possible: Sequence[PlannedPiece],
-    known: PlanModel | None = None,
 ) -> PlanModel:
-    """Flows, slopes, fingerprints and errors at several draws of the priors; known: of other pieces of the same case.
+    """Flows, slopes, fingerprints and errors in the middle of the priors and around it.
 
     Errors: InputError if no flow is found.
     """
     for wide in chain((_with_flows(model, lower) for lower in (LOWER_DISCHARGES, ())), [model]):
         kept = [one for one in possible if not one.experiment or one.experiment in wide.case.experiments]
-        found = _plan_model(model, wide, planned, at_hand, base, kept, () if known is None else known.draws)
+        found = _plan_model(model, wide, planned, at_hand, base, kept)
         if found is not None:
             return found
     raise InputError(f"{model.case.name}: no steady flow was found in the middle of the priors; narrow the priors.")
@@ -292,7 +322,6 @@ def _plan_model(
     at_hand: pd.DataFrame,
     base: Sequence[PlannedPiece],
     possible: Sequence[PlannedPiece],
-    known: Sequence[PlanDraw],
 ) -> PlanModel | None:
     stations = station_table(at_hand, stations_of(wide, planned, base, at_hand)[0])
     # A transect with every second vertical is made of stations of the whole one, which stands first.
@@ -304,6 +333,7 @@ def _plan_model(
     places = [(one.x, y) for one in (*base, *possible) if one.work is Work.SURVEY_LINE for y in one.y]
     first = dict(zip((one.place for one in own), np.cumsum([len(stations), *counts])[:-1], strict=True))
     level = len(here.station) + sum(len(one.y) for one in base if one.work is Work.SURVEY_LINE)
+    surveyed = np.arange(len(here.station), level)
     rows = list[np.ndarray]()
     for piece in possible:
         if piece.work is Work.SURVEY_LINE:
@@ -316,27 +346,18 @@ def _plan_model(
     search = on_coarse if on_coarse is not None and cells_across(on_coarse.site) >= FEWEST_CELLS_ACROSS else here
     other = here if search is on_coarse else on_coarse
     candidates = candidates_of(model.case, stations)
-    causes = [cause_of(search.case, one, shapes) for one in candidates for shapes in one.settings()]
-    middle, *others = places_of_prior(len(model.names))[:PRIOR_PLACES]
-    coarsest = None if search is here else coarser(search)
 
     def in_own_flows(one: Model) -> Model:
         flows = {name: one.case.experiments[name] for name in model.case.experiments}
         return replace(one, case=one.case.model_copy(update={"experiments": flows}))
 
-    def settled(of: Model, z: Array, near: Point | None = None) -> Point | None:
-        """The point at z, from a known one, or from the flow on still coarser cells, which costs a part of it."""
-        for one in known:
-            if np.array_equal(one.point.z, z) and one.point.flows.keys() == of.case.experiments.keys():
-                return linearise_from(of, z, one.point)
-        below = coarsest if coarsest is None or of is search else in_own_flows(coarsest)
-        return linearise_from(of, z, near if below is None else linearise(below, z))
-
-    start = settled(search, middle)
+    coarsest = in_own_flows(coarser(search) or search)
+    middle, *around = places_of_draws(len(model.names))
+    below = linearise(coarsest, middle)
+    start = linearise_from(search, middle, None if coarsest.site is search.site else below)
     if start is None:
         return None
-    # Flows that the case does not have are computed in the middle of the priors alone, and have the usual grid error.
-    own_search = in_own_flows(search)
+    # Flows that the case does not have have the usual grid error.
     difference = np.zeros(len(here.station))
     if other is not None:
         kept = list[Array]()
@@ -355,23 +376,136 @@ def _plan_model(
                 difference[(kind == name) & ~np.isfinite(difference)] = usual
     of_stations = here.station["standard_error"].to_numpy(float)
     error = np.concatenate([of_stations, np.full(len(places), planned.errors.survey)])
+    settings = [(one, shapes) for one in candidates for shapes in one.settings()]
+    shaped = [j for j, one in enumerate(candidates) if len(one.settings()) > 1]
+    between = [(j, _between(candidates[j], (j, k))) for j in shaped for k in range(SETTINGS_BETWEEN)]
+    wanted = [*settings, *((candidates[j], shapes) for j, shapes in between)]
+    every = _with_rows(responses(search, start, _causes(search, wanted)), len(places))
+    one_each = np.array([columns[columns.size // 2] for columns in columns_of(candidates)], dtype=int)
 
-    def draw(of: Model, point: Point) -> PlanDraw:
+    def draw(of: Model, point: Point, values: Array | None = None) -> PlanDraw:
         shared = model_error_columns(of, point, of.case.model_error)
-        levels = _bed_levels(search, np.reshape(places, (-1, 2)), shared.shape[1])
-        below = np.zeros((len(places), len(causes)))
-        return PlanDraw(
-            point,
-            np.vstack([np.nan_to_num(point.slope), np.zeros((len(places), point.slope.shape[1]))]),
-            np.vstack([responses(of, point, causes), below]),
-            np.vstack([shared, levels]),
-        )
+        if values is None:
+            values = _with_rows(responses(of, point, _causes(of, [settings[j] for j in one_each])), len(places))
+        levels = _bed_levels(of, np.reshape(places, (-1, 2)), shared.shape[1])
+        slope = _with_rows(np.nan_to_num(point.slope), len(places))
+        return PlanDraw(of, point, slope, values, np.vstack([shared, levels]))
 
-    points = in_threads(settled, [(own_search, z, start) for z in others])
-    draws = in_threads(draw, [(search, start), *((own_search, one) for one in points if one is not None)])
-    grid_error = constants().grid_error_share * np.concatenate([difference, np.zeros(len(places))])
+    def drawn(z: Array) -> PlanDraw | None:
+        point = below if z is middle else linearise_from(coarsest, z, below)
+        return None if point is None else draw(coarsest, point)
+
+    near = [] if below is None else in_threads(drawn, [(z,) for z in (middle, *around)])
     return PlanModel(
-        search, len(stations), tuple(possible), tuple(rows), error, grid_error, tuple(candidates), tuple(draws)
+        case=model.case,
+        known=np.arange(len(stations)),
+        surveyed=surveyed,
+        pieces=tuple(possible),
+        rows=tuple(rows),
+        error=error,
+        grid_error=constants().grid_error_share * np.concatenate([difference, np.zeros(len(places))]),
+        candidates=tuple(candidates),
+        values=every[:, : len(settings)],
+        between=every[:, len(settings) :],
+        between_of=np.array([j for j, _ in between], dtype=int),
+        draws=(draw(search, start, every[:, one_each]), *(one for one in near if one is not None)),
+    )
+
+
+def errors_at(wide: PlanModel, draw: PlanDraw, rows: np.ndarray) -> tuple[Array, Array]:
+    """Own variances (n,) of some rows at a draw, and what calibration and shared errors, those of the grid among them,
+    can do there (n, q).
+    """
+    of_grid, correlation = wide.grid_error[rows], constants().grid_error_correlation
+    shared = np.column_stack([np.sqrt(correlation) * of_grid, draw.shared[rows]])
+    variance, patterns = own_and_shared(wide.error[rows] ** 2 + (1.0 - correlation) * of_grid**2, shared)
+    return variance, np.hstack([draw.slope[rows], patterns])
+
+
+def relative_lengths(wide: PlanModel) -> Array:
+    """Length of the trace of each candidate around the middle of the priors over that in the middle, on the coarsest
+    cells (draws, candidates) [-]; ones if no flow is found there.
+    """
+    rows = np.concatenate([wide.known, wide.surveyed])
+
+    def lengths(draw: PlanDraw) -> Array:
+        variance, nuisances = errors_at(wide, draw, rows)
+        return information(variance, nuisances, draw.values[rows], np.arange(rows.size)).lengths()
+
+    if len(wide.draws) < 3:
+        return np.ones((1, len(wide.candidates)))
+    middle, *around = in_threads(lengths, [(draw,) for draw in wide.draws[1:]])
+    ratio = np.array(around) / np.maximum(middle, 1e-300)
+    # What leaves next to no trace has no ratio.
+    return np.where(middle > 1e-9, np.clip(ratio, 1.0 / LARGEST_RATIO, LARGEST_RATIO), 1.0)
+
+
+def places_of_draws(parameters: int) -> Array:
+    """The middle of the prior, and corners around it, z (DRAWS_AROUND + 1, p): of every pair of parameters, up to seven
+    of them, both are high, low or opposed equally often (Plackett and Burman 1946; not checked against it).
+    """
+    number = np.arange(parameters)
+    corners = hadamard(DRAWS_AROUND)[:, 1 + number % (DRAWS_AROUND - 1)] * (-1.0) ** (number // (DRAWS_AROUND - 1))
+    return START_SPREAD * np.vstack([np.zeros(parameters), corners])
+
+
+def _between(one: Candidate, seed: tuple[int, int]) -> dict[str, float]:
+    random = np.random.default_rng(seed)
+    return {
+        shape.name: float(random.uniform(min(shape.grid), max(shape.grid))) if shape.grid else shape.default
+        for shape in one.effect.shapes
+    } | dict(one.fixed)
+
+
+def _causes(model: Model, wanted: Sequence[tuple[Candidate, dict[str, float]]]) -> list[Cause]:
+    return [cause_of(model.case, one, shapes) for one, shapes in wanted]
+
+
+def _with_rows(values: Array, count: int) -> Array:
+    """With as many rows of bed levels, which no flow changes."""
+    return np.vstack([values, np.zeros((count, values.shape[1]))])
+
+
+def with_chosen(wide: PlanModel, chosen: Sequence[int]) -> PlanModel:
+    """With some of its pieces in the plan, and with the effects that act in sections which these bring."""
+    pieces = [wide.pieces[j] for j in chosen]
+    lines = [rows for one, rows in zip(pieces, (wide.rows[j] for j in chosen), strict=True)
+             if one.work is Work.SURVEY_LINE]  # fmt: skip
+    others = [wide.rows[j] for j, one in zip(chosen, pieces, strict=True) if one.work is not Work.SURVEY_LINE]
+    known = np.concatenate([wide.known, *others])
+    used = np.zeros(len(wide.model.station), dtype=bool)
+    used[known] = True
+    station = wide.model.station.assign(used=used)
+    candidates = candidates_of(wide.case, station[used])
+    before = {one.name: j for j, one in enumerate(wide.candidates)}
+    new = [one for one in candidates if one.name not in before]
+    order = np.argsort([before.get(one.name, len(before)) for one in candidates], kind="stable")
+    candidates = [candidates[j] for j in order]
+    kept = [before[one.name] for one in candidates if one.name in before]
+    settings = [(one, shapes) for one in new for shapes in one.settings()]
+    count = wide.error.size - len(station)
+
+    def with_new(draw: PlanDraw) -> PlanDraw:
+        first = [(one, one.settings()[0]) for one in new]
+        model = replace(draw.model, station=station)
+        values = _with_rows(responses(model, draw.point, _causes(model, first)), count)
+        return replace(draw, model=model, values=np.hstack([draw.values[:, kept], values]))
+
+    draws = tuple(in_threads(with_new, [(one,) for one in wide.draws]))
+    values = _with_rows(responses(draws[0].model, draws[0].point, _causes(wide.model, settings)), count)
+    columns = np.concatenate([np.zeros(0, dtype=int), *(wide.columns[j] for j in kept)])
+    taken = {one.place for one in pieces}
+    left = [j for j, one in enumerate(wide.pieces) if one.place not in taken]
+    return replace(
+        wide,
+        known=known,
+        surveyed=np.concatenate([wide.surveyed, *lines]).astype(int),
+        pieces=tuple(wide.pieces[j] for j in left),
+        rows=tuple(wide.rows[j] for j in left),
+        candidates=tuple(candidates),
+        values=np.hstack([wide.values[:, columns], values]),
+        between_of=np.array([kept.index(j) for j in wide.between_of], dtype=int),
+        draws=draws,
     )
 
 

@@ -4,18 +4,18 @@
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.detection import (
+    PLANNED_POWER,
     Information,
     chance_over_prior,
     chance_to_separate,
     detection_chance,
     information,
-    own_and_shared,
     single_threshold,
     trace_distances,
 )
@@ -23,8 +23,7 @@ from vegglue.calibration.residual_screening import GROUPS
 from vegglue.case.schema import (
     Planned,
 )
-from vegglue.decision_constants import constants
-from vegglue.diagnosis.plan_model import PlanModel, place_along
+from vegglue.diagnosis.plan_model import DRAWS_AROUND, PlanModel, errors_at, place_along
 from vegglue.effects.definition import Amplitude
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.measurements.observations import section_places
@@ -42,6 +41,8 @@ from vegglue.results.plan import (
 OF_A_KIND, ADDITIONS_SHOWN, ADDITIONS_WEIGHED, ADDING_ROUNDS = 2, 8, 12, 2
 # Rise of the answer to a question below which a piece adds nothing [-].
 LEAST_PLAN_GAIN = 1e-3
+# Places of the prior over which the answer is averaged: the middle, and others around it. Chosen: each costs a third.
+DRAWS_SEARCHED = 3
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,9 @@ class PlanAnswer:
 @dataclass(frozen=True)
 class PlanSearch:
     """What the search for pieces to add knows: the information of the plan and of each piece at each draw, and of the
-    traces that the question is about their effects by number, names, amplitudes and ln priors; present: flows that are
-    measured in anyhow; another: hours of another one; level: of the alarm.
+    effects that the question is about their names and amplitudes; present: flows that are measured in anyhow; another:
+    hours of another one; level: of the alarm; beyond: by how much the score of each has to be above that of the alarm
+    to be named [standard errors].
     """
 
     wide: PlanModel
@@ -66,9 +68,7 @@ class PlanSearch:
     another: float
     names: tuple[str, ...]
     amplitudes: tuple[Amplitude, ...]
-    owner: np.ndarray
-    signs: np.ndarray
-    log_prior: Array
+    beyond: Array
     base: tuple[Information, ...]
     of_pieces: tuple[tuple[Information, ...], ...]
 
@@ -80,7 +80,7 @@ class PlanSearch:
     @cached_property
     def sections(self) -> frozenset[float]:
         """Where velocities are measured or planned along the reach, see `place_along`."""
-        known = self.wide.model.station.iloc[: self.wide.count]
+        known = self.wide.model.station.iloc[self.wide.known]
         velocity = known[known["kind"] == STREAMWISE]
         return frozenset(place_along(self.wide.model.case, x) for x in section_places(velocity).unique())
 
@@ -91,19 +91,37 @@ class PlanSearch:
 
     def _answer(self, known: Information) -> float:
         if isinstance(self.question, TwoEffects):
-            visible = known.visible()
-            distance = trace_distances(visible)
-            first, second = (np.flatnonzero(self.owner == self.names.index(name)) for name in
-                             (self.question.first, self.question.second))  # fmt: skip
-            return float(chance_to_separate(np.minimum(distance, distance.T)[np.ix_(first, second)].min()))
+            distance = trace_distances(known.visible())
+            return float(chance_to_separate(min(distance[0, 1], distance[1, 0])))
         size = known.lengths()
-        threshold = single_threshold(size, self.log_prior, self.level)
+        threshold = self._threshold(size)
         if isinstance(self.question, OneEffect):
             amplitude = self.amplitudes[0]
             relative = abs(amplitude.gain(self.question.size)) / amplitude.plausible_gain
-            return float(detection_chance(relative * size, threshold, self.signs).mean())
-        chance = chance_over_prior(size, threshold)
-        return float((np.bincount(self.owner, chance) / np.bincount(self.owner)).sum())
+            return float(detection_chance(relative * size, threshold, amplitude.only_sign)[0])
+        return float(chance_over_prior(size, threshold).sum())
+
+    def _threshold(self, size: Array) -> Array:
+        prior = np.full(size.size, -np.log(GROUPS * len(self.wide.candidates)))
+        return single_threshold(size, prior, self.level) + self.beyond
+
+    @cached_property
+    def _twice(self) -> Array:
+        """Gain at twice a plausible size, or at the furthest, over that at a plausible one (k,)."""
+        sizes = [min(2.0 * one.scale, one.furthest) / one.scale for one in self.amplitudes]
+        return np.array([size**one.power for size, one in zip(sizes, self.amplitudes, strict=True)])
+
+    def worth(self, known: Sequence[Information]) -> float:
+        """What is maximised: the answer, and of all effects also the expected number that is named at twice a plausible
+        size, each up to PLANNED_POWER, from which it counts as testable.
+        """
+        answer = self.answer(known).mean
+        if not isinstance(self.question, EffectsInGeneral):
+            return answer
+        chances = [
+            detection_chance(self._twice * size, self._threshold(size)) for size in (one.lengths() for one in known)
+        ]
+        return answer + float(np.minimum(np.mean(chances, axis=0), PLANNED_POWER).sum())
 
     def with_pieces(self, known: Sequence[Information], pieces: Sequence[int]) -> list[Information]:
         """The information with some pieces more, at each draw."""
@@ -171,7 +189,7 @@ class PlanSearch:
         """
 
         def worth(pieces: Sequence[int]) -> float:
-            return self.answer(self.with_pieces(self.base, pieces)).mean
+            return self.worth(self.with_pieces(self.base, pieces))
 
         flows = [one for one in self.wide.model.case.experiments if one not in self.present]
         starts = [None, *({*self.present, one} for one in flows if len(flows) > 1)]
@@ -190,7 +208,7 @@ class PlanSearch:
     def _greedy(self, budget: float, chosen: list[int], flows: Set[str] | None = None) -> list[int]:
         """flows: in which alone work is done, beside that which is of no flow; None for all."""
         known = self.with_pieces(self.base, chosen)
-        now = self.answer(known).mean
+        now = self.worth(known)
         promised: dict[tuple[int, ...], float] = {}
         while True:
             spent = self.hours(chosen, self.present)
@@ -207,53 +225,45 @@ class PlanSearch:
             for looked, move in enumerate(order):
                 if move in promised and (promised[move] / possible[move] <= best_rate or looked >= ADDITIONS_WEIGHED):
                     break
-                promised[move] = self.answer(self.with_pieces(known, move)).mean - now
+                promised[move] = self.worth(self.with_pieces(known, move)) - now
                 if promised[move] / possible[move] > best_rate:
                     best, best_rate = move, promised[move] / possible[move]
             if best is None:
                 return chosen
             chosen = [*chosen, *best]
             known = self.with_pieces(known, best)
-            now = self.answer(known).mean
+            now = self.worth(known)
 
 
 def plan_search(
-    wide: PlanModel, question: PlanQuestion, planned: Planned, level: float, present: frozenset[str]
+    wide: PlanModel, question: PlanQuestion, planned: Planned, level: float, present: frozenset[str], beyond: Array
 ) -> PlanSearch:
-    """The search for pieces to add to the stations of the plan."""
+    """The search for pieces to add to the stations of the plan; beyond: of each candidate, see `PlanSearch`."""
     match question:
         case OneEffect():
-            kept = [j for j, one in enumerate(wide.candidates) if one.name == question.name]
+            names = [question.name]
         case TwoEffects():
-            kept = [j for j, one in enumerate(wide.candidates) if one.name in (question.first, question.second)]
+            names = [question.first, question.second]
         case EffectsInGeneral():  # those of a section or a device are others with each piece
-            kept = [j for j, one in enumerate(wide.candidates) if not (one.sections or one.devices)]
-    candidates = [wide.candidates[j] for j in kept]
-    ends = np.cumsum([0, *(len(one.settings()) for one in wide.candidates)])
-    counts = [len(one.settings()) for one in candidates]
-    columns = np.concatenate([np.arange(ends[j], ends[j + 1]) for j in kept])
-    gains = np.repeat([one.amplitude.plausible_gain for one in candidates], counts)
-    of_pieces = np.concatenate([np.zeros(0, dtype=int), *wide.rows])
-    own = np.setdiff1d(np.arange(wide.error.size), of_pieces)
-    correlation = constants().grid_error_correlation
+            names = [one.name for one in wide.candidates if not (one.sections or one.devices)]
+    kept = [j for j, one in enumerate(wide.candidates) if one.name in names]
+    amplitudes = tuple(wide.candidates[j].amplitude for j in kept)
+    gains = np.array([one.plausible_gain for one in amplitudes])
     base, pieces = [], []
-    for draw in wide.draws:
-        shared = np.column_stack([np.sqrt(correlation) * wide.grid_error, draw.shared])
-        variance, patterns = own_and_shared(wide.error**2 + (1.0 - correlation) * wide.grid_error**2, shared)
-        nuisances, traces = np.hstack([draw.slope, patterns]), draw.values[:, columns] * gains
-        base.append(information(variance, nuisances, traces, own))
-        pieces.append(tuple(information(variance, nuisances, traces, rows) for rows in wide.rows))
+    for draw in wide.draws[:: DRAWS_AROUND // 2][:DRAWS_SEARCHED]:
+        variance, nuisances = errors_at(wide, draw, np.arange(wide.error.size))
+        of_rows = partial(information, variance, nuisances, draw.values[:, kept] * gains)
+        base.append(of_rows(np.concatenate([wide.known, wide.surveyed])))
+        pieces.append(tuple(of_rows(rows) for rows in wide.rows))
     return PlanSearch(
         wide=wide,
         question=question,
         level=level,
         present=present,
         another=planned.costs.discharge,
-        names=tuple(one.name for one in candidates),
-        amplitudes=tuple(one.amplitude for one in candidates),
-        owner=np.repeat(np.arange(len(candidates)), counts),
-        signs=np.repeat([one.amplitude.only_sign for one in candidates], counts),
-        log_prior=np.full(columns.size, -np.log(GROUPS * len(wide.candidates))),
+        names=tuple(wide.candidates[j].name for j in kept),
+        amplitudes=amplitudes,
+        beyond=beyond[kept],
         base=tuple(base),
         of_pieces=tuple(pieces),
     )
