@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from vegglue.arrays import Array, Mask, Single
-from vegglue.calibration.score_test import HypothesisKind, Projected, prior_shrinkage, with_rows_of_prior
+from vegglue.calibration.score_test import HypothesisKind, Projected, prior_shrinkage, with_more_rows
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import tempering
 from vegglue.parallel import in_threads
@@ -82,7 +82,8 @@ class FirstCompetition:
 
     def _named(self, evidence: Array, effect: int) -> float:
         """Share of the draws in which an effect is named, of ln evidence (draws, hypotheses)."""
-        chance = tempered(evidence)
+        chance = np.exp((evidence - evidence.max(axis=1)[:, None]) / tempering(evidence))
+        chance /= chance.sum(axis=1)[:, None]
         listed, others = chance[:, : self.effects], evidence[:, self.effects :]
         best = evidence[:, : self.effects].max(axis=1)
         of_places = others[:, self.places].max(axis=1, initial=-np.inf)
@@ -95,12 +96,6 @@ class FirstCompetition:
         inside = (listed * likelier).sum(axis=1) < constants().set_chance * listed.sum(axis=1)
         inside &= listed[:, effect] >= constants().rival_share * chance.max(axis=1)
         return float(np.mean(taken & inside))
-
-
-def tempered(evidence: Array) -> Array:
-    """`tempered_probabilities` of many draws (draws, hypotheses)."""
-    weight = np.exp((evidence - evidence.max(axis=1)[:, None]) / tempering(evidence))
-    return np.asarray(weight / weight.sum(axis=1)[:, None])
 
 
 def _add_by_owner(sums: Array, values: Single, owner: np.ndarray) -> None:
@@ -148,7 +143,7 @@ def first_competition(
         constant=np.concatenate([one.of_scores(np.zeros(one.size.size)) for one in kinds]).astype(np.float32),
         factor=(0.5 * prior_shrinkage(size)).astype(np.float32),
         units=units,
-        scores=with_rows_of_prior(errors[:NAMED_DRAWS], kinds[0].projected, 2) @ units,
+        scores=with_more_rows(errors[:NAMED_DRAWS], len(units), 2) @ units,
     )
 
 

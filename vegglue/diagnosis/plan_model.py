@@ -53,7 +53,7 @@ from vegglue.results.plan_files import KIND_OF_WORK
 # seven parameters each is varied by itself. Chosen: each costs the flows and a fingerprint of each effect.
 DRAWS_AROUND = 8
 # Ratio of lengths above which it is not the trace that is longer, but the coarsest cells that are too coarse [-].
-LARGEST_RATIO = 10.0
+LARGEST_LENGTH_RATIO = 10.0
 # Shapes between its settings at which an effect is thought to be, for each that has any.
 SETTINGS_BETWEEN = 3
 # Other discharges that are thought of, relative to the lowest one of the case; above the highest one HIGHER.
@@ -115,10 +115,10 @@ class PlanModel:
     @property
     def columns(self) -> list[np.ndarray]:
         """Columns of `values` of each candidate."""
-        return columns_of(self.candidates)
+        return setting_columns(self.candidates)
 
 
-def columns_of(candidates: Sequence[Candidate]) -> list[np.ndarray]:
+def setting_columns(candidates: Sequence[Candidate]) -> list[np.ndarray]:
     """Columns of all settings of each candidate, side by side."""
     return [np.arange(*ends) for ends in pairwise(accumulate((len(one.settings()) for one in candidates), initial=0))]
 
@@ -381,7 +381,7 @@ def _plan_model(
     between = [(j, _between(candidates[j], (j, k))) for j in shaped for k in range(SETTINGS_BETWEEN)]
     wanted = [*settings, *((candidates[j], shapes) for j, shapes in between)]
     every = _with_rows(responses(search, start, _causes(search, wanted)), len(places))
-    one_each = np.array([columns[columns.size // 2] for columns in columns_of(candidates)], dtype=int)
+    one_each = np.array([columns[columns.size // 2] for columns in setting_columns(candidates)], dtype=int)
 
     def draw(of: Model, point: Point, values: Array | None = None) -> PlanDraw:
         shared = model_error_columns(of, point, of.case.model_error)
@@ -437,7 +437,7 @@ def relative_lengths(wide: PlanModel) -> Array:
     middle, *around = in_threads(lengths, [(draw,) for draw in wide.draws[1:]])
     ratio = np.array(around) / np.maximum(middle, 1e-300)
     # What leaves next to no trace has no ratio.
-    return np.where(middle > 1e-9, np.clip(ratio, 1.0 / LARGEST_RATIO, LARGEST_RATIO), 1.0)
+    return np.where(middle > 1e-9, np.clip(ratio, 1.0 / LARGEST_LENGTH_RATIO, LARGEST_LENGTH_RATIO), 1.0)
 
 
 def places_of_draws(parameters: int) -> Array:

@@ -15,7 +15,7 @@ from vegglue.pages.page import write_page
 from vegglue.pages.style import COLOUR, inline, palette_css
 from vegglue.pages.svg import Scale, linear_scale, round_ticks, svg_document, svg_element, svg_words, tick_labels
 from vegglue.results.plan import FieldPlan, PlaceChances, PlannedEffect, Work
-from vegglue.results.plan_files import FieldFiles, FieldPlace, field_places
+from vegglue.results.plan_files import LETTERS, FieldFiles, FieldPlace, field_places
 from vegglue.wording.sentences import page_document, phrase
 
 # The map [px]: its width, letters, and room beside it; its height over its width is between these.
@@ -29,12 +29,12 @@ DAY = 8.0
 
 @dataclass(frozen=True)
 class WorkInFlow:
-    """A piece of work in the order of a day: place, when it begins and ends after the start [h], and its stations."""
+    """A piece of work in the order of a day: place, when it begins and ends after the start [h]; y of stations [m]."""
 
     place: FieldPlace
     begins: float
     ends: float
-    stations: int
+    y: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,7 @@ def render_plan(case: Case, site: Site, plan: FieldPlan, files: FieldFiles) -> s
         places=places,
         days=days_of_work(case, plan, places),
         hours_of_day=DAY,
+        letters=[(letter, work) for work, letter in LETTERS.items() if work in {one.work for one in places}],
         seen=[one for one in plan.effects if one.seen],
         larger=[one for one in plan.effects if not one.seen and one.testable],
         rest=[one for one in plan.effects if not one.testable],
@@ -106,7 +107,7 @@ def days_of_work(case: Case, plan: FieldPlan, places: Sequence[FieldPlace]) -> l
             if work and begins + piece.hours > DAY + 1e-9:
                 found.append(_day(case, len(found) + 1, flow, work))
                 work, begins = [], 0.0
-            work.append(WorkInFlow(place, begins, begins + piece.hours, max(len(piece.y), 1)))
+            work.append(WorkInFlow(place, begins, begins + piece.hours, piece.y))
             begins += piece.hours
         if work:
             found.append(_day(case, len(found) + 1, flow, work))
