@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,11 +13,14 @@ from small_case import SMALL
 
 import vegglue
 from vegglue.case.config import load_case
+from vegglue.case.parameter_space import theta_at
+from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.pages.plan import confusions, days_of_work
 from vegglue.results.plan import FieldPlan
 from vegglue.results.plan_files import field_places, field_stations
+from vegglue.workflow.case_run import CaseRun
 
 # Of UTM zone 32: the central meridian of 9 degrees east has the easting 500,000 m, the equator the northing 0.
 FRAME = """
@@ -80,27 +84,47 @@ def test_without_a_system_there_are_no_waypoints(made: Made) -> None:
     )
 
 
-def test_the_sheet_filled_in_is_imported_without_an_edit(made: Made, tmp_path: Path) -> None:
-    folder, plan = made
-    sheet = folder / "runs/small/plan/sheet"
-    for name, column in (("velocities.csv", "u"), ("levels.csv", "level")):
+def filled(sheet: Path, values: dict[str, list[float]]) -> None:
+    """Write measured values into the tables of a sheet, row by row; NaN leaves a row empty."""
+    for name, of_rows in values.items():
         rows = rows_of(sheet / name)
-        for number, row in enumerate(rows):
-            row[column] = "" if number == 2 else f"{0.5 + 0.01 * number:.2f}" if column == "u" else "0.93"
+        column = {"velocities.csv": "u", "levels.csv": "level"}[name]
+        for row, value in zip(rows, of_rows, strict=True):
+            row[column] = "" if np.isnan(value) else f"{value:.4f}"
         with (sheet / name).open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, list(rows[0]))
             writer.writeheader()
             writer.writerows(rows)
+
+
+def test_the_sheet_filled_in_is_imported_and_diagnosed_without_an_edit(made: Made, tmp_path: Path) -> None:
+    folder, plan = made
+    sheet = folder / "runs/small/plan/sheet"
+    count = sum(len(one.y) for one in plan.pieces if one.work.value != "gauge")
+    filled(sheet, {"velocities.csv": [0.5 + 0.01 * k for k in range(count)], "levels.csv": [0.93]})
+    table = read_observations(vegglue.import_folder(sheet, tmp_path / "first.yaml")).table
+    # What the model shows with what nobody guessed: a roughness off the middle of its prior.
+    model = CaseRun(load_case(folder / "small.yaml")).model
+    point = linearise(replace(model, station=table), np.array([0.6, -0.4]))
+    assert point is not None
+    error = table["standard_error"].to_numpy(float) * np.random.default_rng(5).standard_normal(len(table))
+    value, velocity = point.prediction + error, (table["kind"] == "velocity").to_numpy()
+    value[2] = np.nan  # a vertical that was not measured
+    filled(sheet, {"velocities.csv": list(value[velocity]), "levels.csv": list(value[~velocity])})
     case = vegglue.import_folder(sheet, tmp_path / "measured.yaml")
     assert case.planned is None
     assert list(case.parameters) == ["n_b", "phi"]
     table = read_observations(case).table
-    velocities = table[table["kind"] == "velocity"]
-    assert len(velocities) == sum(len(one.y) for one in plan.pieces if one.work.value != "gauge") - 1
-    assert sorted(velocities["x"].unique()) == [9.0, 12.0, 16.0]
-    assert velocities["value"].iloc[3] == pytest.approx(0.54)
+    assert (table["kind"] == "velocity").sum() == count - 1
+    assert sorted(table.loc[table["kind"] == "velocity", "x"].unique()) == [9.0, 12.0, 16.0]
+    assert table["value"].iloc[3] == pytest.approx(value[4], abs=1e-4)
     assert (table["standard_error"] > 0).all()
     assert table["used"].all()
+    found = vegglue.diagnose(case, runs=tmp_path / "runs")
+    assert found.verdict.kind in ("nothing-missing", "cannot-tell")
+    low, high = found.parameters.last["n_b"][1:]
+    true = theta_at(case, np.array([0.6, -0.4]))["n_b"][0]
+    assert low < true < high
 
 
 def test_an_empty_sheet_is_refused(tmp_path: Path) -> None:
