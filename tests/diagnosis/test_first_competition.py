@@ -7,7 +7,7 @@ from scipy.special import logsumexp
 from vegglue.arrays import Array
 from vegglue.calibration.score_test import HypothesisKind, alarm_level, cosines, kind_of_hypotheses, project
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import chosen_hypothesis, tempered_probabilities
+from vegglue.diagnosis.competition import What, chosen_hypothesis, tempered_probabilities
 from vegglue.diagnosis.first_competition import NAMED_AT, chances_named, first_competition
 from vegglue.diagnosis.search_state import rivals_among
 
@@ -42,7 +42,8 @@ def named_in_full(kinds: list[HypothesisKind], level: float) -> list[int]:
     listed = kinds[0]
     evidence = np.array([*(logsumexp(listed.log_evidence[own]) for own in COLUMNS), *(one.total for one in kinds[1:])])
     chance = tempered_probabilities(evidence)
-    chosen = chosen_hypothesis(["effect"] * 4 + ["place", "instrument"], evidence, float(chance[4]))
+    what: list[What] = ["effect", "effect", "effect", "effect", "place", "instrument"]
+    chosen = chosen_hypothesis(what, evidence, float(chance[4]))
     if chosen is None or chosen > 3:
         return []
     first = [own[np.argmax(listed.size[own])] for own in COLUMNS]

@@ -148,8 +148,9 @@ def test_days_are_eight_hours_at_most_and_hold_all_work(made: Made) -> None:
 def test_the_page_and_the_object_hold_the_plan(made: Made) -> None:
     folder, plan = made
     page = (folder / "runs/small/plan/plan.html").read_text(encoding="utf-8")
-    for one in (*plan.effects, *field_stations(load_case(folder / "small.yaml"), plan)[0]):
-        assert one.name in page
+    stations = field_stations(load_case(folder / "small.yaml"), plan)[0]
+    for name in [*(one.name for one in plan.effects), *(one.name for one in stations)]:
+        assert name in page
     assert page.count("<circle") >= sum(len(one.y) for one in plan.pieces if one.work.value != "gauge")
     tree = json.loads((folder / "runs/small/plan/plan.json").read_text(encoding="utf-8"))
     assert tree["hours"] == pytest.approx(plan.hours)
