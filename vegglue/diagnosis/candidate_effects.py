@@ -159,7 +159,11 @@ def candidate_laws(
         against = [kind.total for kind in last.kinds]
     evidence = np.where(same_as_accepted(screening, found.effects), -np.inf, screening.kind.log_evidence)
     of_laws, strengths = screening.of_each(evidence), {}
-    if np.isfinite(of_laws).any() and _within_strong_odds(of_laws, against):
+
+    def chances_of_laws() -> Array:
+        return chances_in_set(np.append(of_laws, against))[: of_laws.size]
+
+    if may_be_laws(float(chances_of_laws().sum())):
         alone = [] if found.places else found.effects
         calibrated, kept, own = refitted(screening, alone, found.log_prior, max(against))
         against = [own] if found.accepted else against
@@ -167,7 +171,7 @@ def candidate_laws(
         strengths = {one.name: one.what.amplitude for one in calibrated if isinstance(one.what, Refit)}
     if not np.isfinite(of_laws).any():
         return None
-    chances = chances_in_set(np.append(of_laws, against))[: of_laws.size]
+    chances = chances_of_laws()
     order = np.argsort(-chances)
     count = int(np.searchsorted(np.cumsum(chances[order]), LAWS_HELD * chances.sum())) + 1
     laws = []
@@ -187,14 +191,7 @@ def candidate_laws(
             )
         )
     suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), tuple(laws), bool(strengths))
-    return suspected if not found.steps or not clearly_listed(suspected) else None
-
-
-def _within_strong_odds(of_laws: Array, against: Sequence[float]) -> bool:
-    """Whether all laws together are within strong_odds of all else, either way."""
-    chance = float(chances_in_set(np.append(of_laws, against))[: of_laws.size].sum())
-    least = 1.0 / (1.0 + constants().strong_odds)
-    return least <= chance
+    return suspected if not found.steps or may_be_laws(suspected.chance) else None
 
 
 def same_as_accepted(screening: LawScreening, accepted: Sequence[str]) -> NDArray[np.bool_]:
@@ -207,6 +204,6 @@ def same_as_accepted(screening: LawScreening, accepted: Sequence[str]) -> NDArra
     return np.asarray(cosine.max(axis=0) > constants().alike_cosine)
 
 
-def clearly_listed(laws: CandidateLaws) -> bool:
-    """Whether all else together is strong_odds times as likely as laws."""
-    return constants().strong_odds * laws.chance < 1.0 - laws.chance
+def may_be_laws(chance: float) -> bool:
+    """Whether all else together is less than strong_odds times as likely as laws of this probability [-]."""
+    return constants().strong_odds * chance >= 1.0 - chance
