@@ -25,7 +25,7 @@ from vegglue.calibration.candidates import (
 )
 from vegglue.case.schema import Case, EffectEntry, Observation, Parameter
 from vegglue.case.site_schema import FrictionClass, Plants, Value
-from vegglue.diagnosis.child_config import candidate_named
+from vegglue.diagnosis.child_config import candidate_named, child_tree
 from vegglue.effects.library import SHIPPED, library
 from vegglue.errors import InputError
 
@@ -62,16 +62,18 @@ def test_shapes_that_are_left_alone_or_calibrated_stop_no_search(
 STATION = stations_of(CASE, ("A",), 3)
 
 
-def test_shapes_that_are_calibrated_with_the_amplitude_are_parameters_of_a_case_and_numbers_of_a_cause() -> None:
+def test_shapes_calibrated_with_the_amplitude_are_parameters_of_a_case_and_numbers_of_a_cause(tmp_path: Path) -> None:
+    others = ("first_other", "second_other", "third_other")
     one = Candidate(library()["inflow_distribution"])
     assert one.settings() == [{"mode": float(mode)} for mode in range(1, 5)]
     added = set(with_effect(CASE, one, {"mode": 2.0}).parameters) - set(CASE.parameters)
-    assert added == {f"inflow_distribution_{name}" for name in ("excess", "second", "third", "fourth")}
+    assert added == {f"inflow_distribution_{name}" for name in ("excess", *others)}
     cause = cause_of(CASE, one, {"mode": 2.0})
     assert set(cause.case.parameters) - set(CASE.parameters) == {cause.parameter}
     assert cause.case.effects[one.key].values == {
-        "excess": cause.parameter, "mode": 2.0, "second": 0.0, "third": 0.0, "fourth": 0.0,
+        "excess": cause.parameter, "mode": 2.0, **dict.fromkeys(others, 0.0),
     }  # fmt: skip
+    assert set(child_tree(CASE, tmp_path / "child.yaml", [(one, {"mode": 2.0})])["parameters"]) == added
 
 
 def test_an_excluded_effect_is_no_candidate() -> None:

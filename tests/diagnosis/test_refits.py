@@ -169,7 +169,7 @@ def test_an_inflow_that_is_not_developed_is_calibrated_in_all_its_modes() -> Non
     """Four modes, of which the first is the amplitude of the hypothesis."""
     model, point = coarse_twin()
     one, skew = (Candidate(library(None)[name]) for name in ("inflow_distribution", "inflow_skew"))
-    modes = {"excess": 0.5, "second": -0.3, "third": 0.0, "fourth": 0.6}
+    modes = {"excess": 0.5, "first_other": -0.3, "second_other": 0.0, "third_other": 0.6}
     case = with_effect(model.case, one, {"mode": 1.0})
     z = np.append(point.z, [z_of(case.parameters[f"{one.key}_{name}"], value) for name, value in modes.items()])
     there = linearise(replace(model, case=case), z, point)
@@ -187,4 +187,4 @@ def test_an_inflow_that_is_not_developed_is_calibrated_in_all_its_modes() -> Non
     assert refit.log_factor > of_skew.log_factor + 10.0
     case = with_effect(search.model.case, one, {"mode": 1.0})
     found = theta_at(case, refit.fitted.point.z)
-    assert float(found["inflow_distribution_fourth"][0]) == pytest.approx(0.6, abs=0.15)
+    assert float(found["inflow_distribution_third_other"][0]) == pytest.approx(0.6, abs=0.15)

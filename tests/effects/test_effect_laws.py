@@ -104,7 +104,7 @@ ROWS = {
     ),
     "inflow_distribution": (
         boundary(),
-        {"excess": 0.4, "mode": 2.0, "second": 0.2, "third": 0.6, "fourth": -0.4},
+        {"excess": 0.4, "mode": 2.0, "first_other": 0.2, "second_other": 0.6, "third_other": -0.4},
         {
             "spread": [[
                 [exp(0.2 * cos(0.25 * k1) + 0.2 * cos(0.5 * k1) + 0.2 * cos(0.75 * k1) - 0.1 * cos(k1))]

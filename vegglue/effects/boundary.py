@@ -87,7 +87,7 @@ MODES = 4
 
 
 def inflow_distribution(
-    boundary: BoundaryValues, excess: Array, mode: Array, second: Array, third: Array, fourth: Array
+    boundary: BoundaryValues, excess: Array, mode: Array, first_other: Array, second_other: Array, third_other: Array
 ) -> dict[str, Array]:
     """q -> q exp(sum_k a_k cos(k pi (1 + s)/2) / k), k = 1 .. 4, s = -1 .. 1 across each inflow.
 
@@ -98,7 +98,7 @@ def inflow_distribution(
         a_k of the mode k.
     mode : (m,) [-]
         that k, 1 to 4.
-    second, third, fourth : (m,) [-]
+    first_other, second_other, third_other : (m,) [-]
         a_k of the other modes, in their order.
 
     Returns
@@ -106,7 +106,7 @@ def inflow_distribution(
     dict
         `spread` (inflow, cell, m) [-].
     """
-    others, log, mode = (second, third, fourth), np.zeros((1, 1, 1)), np.rint(mode)
+    others, log, mode = (first_other, second_other, third_other), np.zeros((1, 1, 1)), np.rint(mode)
     for k in range(1, MODES + 1):
         of_others = np.where(mode > k, others[min(k, MODES - 1) - 1], others[max(k - 2, 0)])
         size = np.where(mode == k, excess, of_others)
@@ -226,8 +226,8 @@ EFFECTS = (
         shapes=(
             Shape("mode", "-", "that k", 1.0, 1.0, 4.0, (1.0, 2.0, 3.0, 4.0)),
             *(
-                Shape(name, "-", f"a_k of the {name} mode, k left out", 0.0, -3.0, 3.0, sd=OF_INFLOW)
-                for name in ("second", "third", "fourth")
+                Shape(f"{name}_other", "-", f"a_k of the {name} of the other modes", 0.0, -3.0, 3.0, sd=OF_INFLOW)
+                for name in ("first", "second", "third")
             ),
         ),
         source="definition",
