@@ -35,7 +35,7 @@ from vegglue.workflow.command_model import with_command
 
 # Effective draws of both posteriors: with 1,000 of them their own errors are as large as what is looked for.
 EFFECTIVE = 4000
-TRUE, ASLEEP = {"n_b": 0.05, "phi": 8.0}, 0.02
+TRUE, ASLEEP = {"n_b": 0.05, "phi": 8.0, "k_s": 0.8, "h_d": 0.7, "nu": 0.02}, 0.02
 # What the command has other than the built-in solver: text of the case, error of a velocity [m/s], and whether its
 # parameters are others: n = n_b (phi / 8)^0.3 and phi^1.5, which no line along the parameters follows.
 OTHER: dict[str, tuple[list[tuple[str, str]], float, bool]] = {
@@ -48,7 +48,20 @@ OTHER: dict[str, tuple[list[tuple[str, str]], float, bool]] = {
     "plants": ([("canopy_height: 0.7}", "canopy_height: 0.5, law: yang-choi}")], 0.03, False),
     "parameters": ([], 0.01, True),
     "few data": ([], 0.04, True),
+    "five parameters": (
+        [("cell: [1.0, 0.5]", "cell: [1.5, 0.75]"),
+         ("parameters: ", "numerics: {shear_depth: smallest, emergent: proportional}\nparameters: ")],
+        0.02, False,
+    ),
 }  # fmt: skip
+# Of the brook with five parameters, in both solvers.
+FIVE = [
+    ("k_s: 0.8}", "k_s: k_s}"), ("canopy_height: 0.7}", "canopy_height: h_d}"),
+    ("parameters: ", "eddy_viscosity: nu\nparameters: "),
+    ("observations:\n", "  k_s: {distribution: loguniform, low: 0.2, high: 3, unit: m}\n"
+                        "  h_d: {distribution: normal, mean: 0.7, sd: 0.08, low: 0.3, high: 1.2, unit: m}\n"
+                        "  nu: {distribution: lognormal, median: 0.02, log_sd: 0.69, unit: m2/s}\nobservations:\n"),
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -93,12 +106,14 @@ def brook_by_command(folder: Path, kind: str, seed: int, fails_above: float = np
     settings = [
         ("experiment: June}", f"experiment: June, standard_error: {error}}}"),
         ("members: 1024, seed: 7}", f"members: 64, seed: {seed}}}\ninfer: {{sigma: known}}"),
+        *(FIVE if kind == "five parameters" else []),
     ]
     (folder / "other").mkdir(parents=True)
     wider = [("low: 0.02, high: 0.10", "low: 0.005, high: 0.4"), ("low: 1, high: 100", "low: 0.1, high: 1000")]
     other_case = vegglue.load_case(write_reach(folder / "other", *settings, *wider, *changes))
     other = model_of(other_case, read_observations(other_case))
-    middle = linearise(other, z_at(other_case, {name: np.array([value]) for name, value in TRUE.items()})[0])
+    truth = {name: TRUE[name] for name in other_case.parameters}
+    middle = linearise(other, z_at(other_case, {name: np.array([value]) for name, value in truth.items()})[0])
     assert middle is not None
 
     def solved(theta: dict[str, np.ndarray]) -> np.ndarray:
@@ -121,7 +136,7 @@ def brook_by_command(folder: Path, kind: str, seed: int, fails_above: float = np
     # Without two in a section no correlation is estimated: at its limit it is 0 or 0.4, by where a search started.
     table = pd.read_csv(folder / "velocities.csv")
     table["section"] = [f"s{row}" for row in range(len(table))]
-    table["u"] = one(TRUE) + error * np.random.default_rng(seed).standard_normal(len(table))
+    table["u"] = one(truth) + error * np.random.default_rng(seed).standard_normal(len(table))
     table.to_csv(folder / "velocities.csv", index=False)
     with served(one) as port:
         brook.case, brook.runs = by_server(config, port), 0
