@@ -22,11 +22,12 @@ does, its force, water or volume A, shape_error may act in the n basis functions
 
 so that in all of them together it has a standard deviation of shape_error A. What of that would look like another size
 of the spot is left out, since the size is calibrated: water that enters at a place was all error of shape before.
+Plants that are not on the map have no such error: their outline is fitted, and beside them responses to first order lead
+far off.
 Source: a model has its own error in weak-constraint data assimilation (Tremolet 2006, doi:10.1256/qj.05.224; not
 checked against it); the fields are a definition of this project, and which errors are meant is chosen (see DECISIONS).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,27 +37,24 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array, Mask
 from vegglue.case.bed_error import bed_error_columns, beds_of
 from vegglue.case.case_effects import effect_of, value_of
-from vegglue.case.channel_geometry import channel_geometry, half_width, patches_present
+from vegglue.case.channel_geometry import half_width, patches_present
 from vegglue.case.grid import Grid
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
 from vegglue.decision_constants import constants
-from vegglue.effects.unlisted import rectangle
 from vegglue.engine.interface import Cause, Model, Point, responses, responses_to_cells
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.parallel import in_threads
 
-# The effect of the library that is a spot of a term, and the term that each unlisted effect changes at its place.
+# The effect of the library that is a spot of a term.
 EFFECT_AT_PLACE: dict[Term, str] = {
     "drag": "unlisted_object",
     "bed": "unlisted_bed",
     "inflow": "unlisted_inflow",
     "viscosity": "unlisted_viscosity",
 }
-# Plants that are not on the map, and the shapes that are fitted to them.
-PATCH, OF_OUTLINE = "unlisted_patch", ("x", "y", "length", "width", "angle")
-TERM_OF: dict[str, Term] = {PATCH: "drag", **{effect: term for term, effect in EFFECT_AT_PLACE.items()}}
+TERM_OF: dict[str, Term] = {effect: term for term, effect in EFFECT_AT_PLACE.items()}
 # Radius of a basis function over the half width of the floor [-]: friction differs from one stone, tuft or stem count
 # to the next, a survey from one line of points to the next. Chosen, not measured.
 FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
@@ -218,33 +216,21 @@ def _columns_of_shape(model: Model, point: Point, cells: CellResponses, key: str
     size = value(effect.amplitude.name, effect.amplitude.off)
     half, grid = FRICTION_RADIUS * half_width(model.site), model.site.grid
     basis = gaussian_basis(grid, half, half)
-    if effect.name == PATCH:
-        share = share_within(model, place)
-    else:
-        x, y = (np.array([place[name]]) for name in ("x", "y"))
-        spot = gaussian_basis_at(grid, x, y, place["length"], place["width"])
-        share = spot.along.T @ spot.across
+    spot = gaussian_basis_at(grid, np.array([place["x"]]), np.array([place["y"]]), place["length"], place["width"])
     along = ((basis.x - place["x"]) / (place["length"] + basis.length)) ** 2
     across = ((basis.y - place["y"]) / (place["width"] + basis.width)) ** 2
     near = along[:, None] + across[None] < AROUND**2
-    whole = size if term == "inflow" else size * float(share.sum()) * grid.dx * grid.dy
+    whole = size if term == "inflow" else size * float(spot.areas(grid)[0, 0])
     in_each = constants().shape_error * whole / np.sqrt(max(int(near.sum()), 1))
-    own = np.asarray(cells.of[term].reshape(len(cells.of[term]), -1) @ share.ravel(), dtype=float)
-    others = responses_to_basis(cells, term, basis)[:, near]
+    own, others = responses_to_basis(cells, term, spot)[:, 0, 0], responses_to_basis(cells, term, basis)[:, near]
     acts = np.ones(len(own)) if entry.experiments is None else model.station["experiment"].isin(entry.experiments)
     # Without their part along the spot's own trace, weighted by 1 / s^2; 0 if no standard error s is stated.
     error = model.station["standard_error"].where(model.station["used"])
     weight = np.nan_to_num(error.to_numpy(float) ** -2.0) * acts
     squared = float(weight @ own**2)
-    along_own = (weight * own) @ others / squared if squared > 0.0 else np.zeros(others.shape[1])
-    columns = np.asarray(others - np.outer(own, along_own))
+    share = (weight * own) @ others / squared if squared > 0.0 else np.zeros(others.shape[1])
+    columns = np.asarray(others - np.outer(own, share))
     return np.asarray(in_each / basis.areas(grid)[near] * columns * np.asarray(acts)[:, None])
-
-
-def share_within(model: Model, outline: Mapping[str, float]) -> Array:
-    """Share of each cell (nx, ny) [-] that lies within the outline of plants that are not on the map."""
-    geometry = channel_geometry(model.case, model.site, next(iter(model.case.experiments)))
-    return rectangle(geometry, **{name: np.array([outline[name]]) for name in OF_OUTLINE})[..., 0]
 
 
 def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: CellResponses) -> Array:

@@ -40,14 +40,15 @@ from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Instrument, InstrumentKind, place_candidate, start_with, with_effect
 from vegglue.calibration.fingerprints import Places, digits_of_place, places_around
 from vegglue.calibration.fit import interval95
-from vegglue.calibration.model_error import EFFECT_AT_PLACE, PATCH, share_within
+from vegglue.calibration.model_error import EFFECT_AT_PLACE
 from vegglue.calibration.residual_screening import Screening, conditional_screenings, refit_start
 from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors
 from vegglue.case.case_effects import effect_named
-from vegglue.case.channel_geometry import patches_present, site_scales
+from vegglue.case.channel_geometry import channel_geometry, patches_present, site_scales
 from vegglue.case.schema import Parameter
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.refits import Refit, RefitTrial, Relevelled, refits_of, relevelled
+from vegglue.effects.unlisted import rectangle
 from vegglue.engine.newton import problem_at
 from vegglue.flow.closures import bed_drag, drag
 from vegglue.normal_range import NORMAL95
@@ -156,6 +157,7 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
 # [-], and of the inclination [deg], with its largest; share of the outline that may lie on the plants of the map [-],
 # beyond which a side of a patch lies off. Chosen before any patch was fitted, and not changed since.
 LOG_SIZE, TURNED, LARGEST_TURN, MOST_COVERED = 0.7, 15.0, 60.0, 0.5
+PATCH = "unlisted_patch"
 
 
 def drag_of_patches(search: SearchModel, height: float) -> dict[str, float]:
@@ -222,7 +224,8 @@ def found_patch(
     errors = {name: (high - low) / (2.0 * NORMAL95) for name, (_, low, high) in ends.items()}
     digits = digits_of_place(ends["width"][0])
     shapes = {**best.shapes} | {name: round(middle, digits) for name, (middle, _, _) in ends.items()}
-    share = share_within(search.model, shapes)
+    geometry = channel_geometry(case, search.model.site, next(iter(case.experiments)))
+    share = rectangle(geometry, **{name: np.array([shapes[name]]) for name in names})[..., 0]
     covered = float((share * search.model.site.cover).sum() / share.sum())
     candidate = place_candidate(effect, shapes, plausible)
     if shapes["length"] <= places.length.min() or covered > MOST_COVERED or candidate.key in case.effects:
