@@ -22,8 +22,8 @@ does, its force, water or volume A, shape_error may act in the n basis functions
 
 so that in all of them together it has a standard deviation of shape_error A. What of that would look like another size
 of the spot is left out, since the size is calibrated: water that enters at a place was all error of shape before.
-Plants that are not on the map have no such error: their outline is fitted, and beside them responses to first order lead
-far off.
+Plants that are not on the map have no such error: their outline is fitted, and beside them responses to first order
+lead far off.
 Source: a model has its own error in weak-constraint data assimilation (Tremolet 2006, doi:10.1256/qj.05.224; not
 checked against it); the fields are a definition of this project, and which errors are meant is chosen (see DECISIONS).
 """
