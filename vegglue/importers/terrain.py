@@ -20,7 +20,7 @@ from vegglue.case.size_limits import MOST_CELLS
 from vegglue.case.survey_error import (
     BedSurvey,
     bed_survey_text,
-    fitted_covariances,
+    covariances_beside_wrong_line,
     lines_left_out,
     mean_level,
 )
@@ -385,7 +385,7 @@ def _between_points(terrain: Terrain, survey: BedSurvey, without: Callable[[NDAr
     if not np.isfinite(straight).any():
         return terrain
     try:
-        covariances = tuple(fitted_covariances(survey))
+        covariances = tuple(covariances_beside_wrong_line(survey))
         if max(one.sd for one in covariances) < LEAST_BED_ERROR:
             return terrain
         left_out = lines_left_out(survey, covariances, straight)
