@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from diagnoses import a_diagnosis
 from drawings import off_the_sheet, points, texts
-from matplotlib.patches import Ellipse
+from matplotlib.patches import Ellipse, Polygon
 
 from vegglue.pages.flow_maps import Outline
 from vegglue.pages.place_maps import (
@@ -32,6 +32,14 @@ def test_every_place_is_marked_with_its_size_and_words() -> None:
     assert [(one.get_center(), one.width, one.height) for one in outlined] == [
         ((33.0, -0.6), 3.6, 0.9), ((30.0, 0.6), 1.8, 1.8),
     ]  # fmt: skip
+
+
+def test_plants_that_are_not_on_the_map_are_drawn_as_a_turned_rectangle() -> None:
+    marks = PlanMarks([], NOWHERE, NOWHERE, [MarkedSpot(33.0, -0.6, 3.0, 1.0, "plants", 90.0)])
+    (axes,) = draw_places(MAP.x, MAP.y, MAP.score, "drag", marks).axes
+    (outline,) = [one for one in axes.patches if isinstance(one, Polygon)]
+    low, high = outline.get_xy().min(axis=0), outline.get_xy().max(axis=0)
+    assert (*low, *high) == pytest.approx((32.0, -3.6, 34.0, 2.4))
 
 
 def test_stations_set_aside_are_crossed() -> None:
