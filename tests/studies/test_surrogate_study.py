@@ -16,13 +16,15 @@ MOST_RUNS, MEDIANS, SPREADS = 60, 0.1, 0.15
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "seed"), [("plants", 1), ("parameters", 2), ("few data", 3)])
+@pytest.mark.parametrize(("kind", "seed"), [("cells", 1), ("parameters", 2), ("few data", 3)])
 def test_few_runs_give_the_posterior_of_all(tmp_path: Path, kind: str, seed: int) -> None:
     """`python tests/studies/surrogate.py` has more seeds, and more draws."""
     both = compare(tmp_path, kind, seed)
     assert both.surrogate.surrogate is not None
     assert both.surrogate.surrogate.settled
     assert both.surrogate.surrogate.runs <= MOST_RUNS
+    kept = set((tmp_path / "runs" / "own" / "engine").glob("*.json"))
+    assert len(kept) == both.surrogate.surrogate.runs + 1, "each is a place of its own; one file is that of the best"
     assert np.abs(both.medians).max() < MEDIANS
     assert np.abs(both.spreads).max() < SPREADS
 

@@ -29,7 +29,7 @@ import pandas as pd
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.spatial.distance import cdist
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.calibration.fit import fit_from
 from vegglue.calibration.noise import Noise, with_more_error
 from vegglue.case.parameter_space import middle_value, theta_at
@@ -63,6 +63,8 @@ MEDIAN_WITHIN, SD_WITHIN = 0.05, 0.075
 # Times that runs are added after that: what none of the runs shows is found by more of them only. Chosen after the
 # brook with errors of 0.04 m/s: with one, standard deviations were off by up to 11 %, with two by 5 %.
 SETTLED_FOR = 2
+# Distance in u of two places that are one [-].
+ALREADY_RUN = 1e-6
 # Share of the variance that is added to its diagonal, so that it can be factored.
 JITTER = 1e-9
 
@@ -285,7 +287,9 @@ def learn(command: CommandToLearn, base: ModesAndErrors, start: Mixture, watch: 
         both = np.concatenate([drawn.z, theta], axis=1)
         away = (both - weights @ both) / np.sqrt(weights @ (both - weights @ both) ** 2)
         influence = weights * (1.0 + np.sum(away**2, axis=1))
-        chosen = drawn.z[_best_places(shared, influence, difference.nugget, min(RUNS_IN_A_SET, room))][:, own]
+        run = cdist(u, difference.u).min(axis=1) < ALREADY_RUN
+        best_rows = _best_places(shared, influence, run, difference.nugget, min(RUNS_IN_A_SET, room))
+        chosen = drawn.z[best_rows][:, own]
         new = difference_at(chosen)
         there = np.isfinite(new).all(axis=1)
         failed, lost = failed + int((~there).sum()), np.concatenate([lost, chosen[~there]])
@@ -330,15 +334,18 @@ def _apart(
     return tuple(np.sqrt(np.mean(off**2, axis=0)).max(axis=1, initial=0.0).tolist())
 
 
-def _best_places(shared: Array, influence: Array, nugget: float, count: int) -> list[int]:
+def _best_places(shared: Array, influence: Array, run: Mask, nugget: float, count: int) -> list[int]:
     """Rows of draws after whose runs the sum of v times their influence is least, chosen one after the other.
 
-    shared (k, k): covariance of d at the draws and, behind them, where the command failed: nothing is run there again.
+    shared (k, k): covariance of d at the draws and, behind them, where the command failed: little is learned near them.
+    run: draws that have been run, which would give the same again.
     """
     draws, chosen = influence.size, list[int]()
     for row in [*range(draws, len(shared)), *[-1] * count]:
         if row < 0:
             gain = influence @ shared[:draws, :draws] ** 2 / (np.diag(shared)[:draws] + nugget)
+            gain[run] = -1.0
+            gain[chosen] = -1.0
             row = int(np.argmax(gain))
             chosen.append(row)
         shared = shared - np.outer(shared[:, row], shared[row]) / (shared[row, row] + nugget)
