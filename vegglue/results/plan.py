@@ -56,12 +56,13 @@ class Confusion:
 class PlannedEffect:
     """An effect as the planned measurements would show it.
 
-    smallest: distance of its amplitude from off that is detected with 90 %, averaged over all draws of the priors [unit
-    of the amplitude], infinite if no size is; best, worst: the same in the draws where it is least and largest.
-    plausible: a plausible distance; furthest: the largest possible one. chance_plausible: that the plausible size is
-    detected; chance: that a size drawn from the prior of the amplitude is. visibility: share of the trace that
-    calibration cannot mimic. confused: other effects with a similar trace, the most similar first; place: the term at a
-    place that is; parameter, cosine: the parameter whose change is most like it.
+    Named means that the first step of a diagnosis has it, alone or as one of a few. smallest: distance of its amplitude
+    from off that is named with 90 %, averaged over all draws of the priors [unit of the amplitude], infinite if no size
+    is; best, worst: the same in the draws where it is least and largest. plausible: a plausible distance; furthest: the
+    largest possible one. chance_plausible: that the plausible size is named; chance: that a size drawn from the prior
+    of the amplitude is. visibility: share of the trace that calibration cannot mimic. confused: other effects with a
+    similar trace, the most similar first; place: the term at a place that is; parameter, cosine: the parameter whose
+    change is most like it.
     """
 
     name: str
@@ -82,17 +83,17 @@ class PlannedEffect:
 
     @property
     def testable(self) -> bool:
-        """Whether twice a plausible size is possible and is detected with 90 %; a diagnosis requires 95 %."""
+        """Whether twice a plausible size is possible and is named with 90 %; a diagnosis requires an alarm in 95 %."""
         return self.smallest < min(2.0 * self.plausible, self.furthest)
 
     @property
     def seen(self) -> bool:
-        """Whether a plausible size is detected with 90 %."""
+        """Whether a plausible size is named with 90 %."""
         return self.smallest <= min(self.plausible, self.furthest)
 
     @property
     def hidden(self) -> bool:
-        """Whether a plausible size is detected with 10 % at most."""
+        """Whether a plausible size is named with 10 % at most."""
         return self.chance_plausible <= 0.1
 
 
@@ -151,14 +152,14 @@ class PlannedParameter:
 
 @dataclass(frozen=True)
 class EffectsInGeneral:
-    """The question of all effects: how many are expected to be detected, of sizes drawn from their priors."""
+    """The question of all effects: how many are expected to be named, of sizes drawn from their priors."""
 
     count: int
 
 
 @dataclass(frozen=True)
 class OneEffect:
-    """The question of one effect of a size [unit of its amplitude]: the chance that it is detected."""
+    """The question of one effect of a size [unit of its amplitude]: the chance that it is named."""
 
     name: str
     size: float
@@ -226,7 +227,7 @@ class FieldPlan:
 
     @property
     def testable(self) -> tuple[PlannedEffect, ...]:
-        """Effects that are detected at twice a plausible size."""
+        """Effects that are named at twice a plausible size."""
         return tuple(one for one in self.effects if one.testable)
 
 
@@ -242,7 +243,7 @@ def hours_of(pieces: Sequence[PlannedPiece], another_flow: float, present: froze
 def plan_json(plan: FieldPlan) -> dict[str, Any]:
     """A plan as the object that `vegglue plan --json` prints and plan.json keeps: docs/plan.md lists its keys.
 
-    A size that is never detected is null.
+    A size that is never named is null.
     """
 
     def piece(one: PlannedPiece) -> dict[str, Any]:
