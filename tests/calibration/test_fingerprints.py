@@ -10,7 +10,6 @@ from coarse_twin import CASE, coarse_twin
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Candidate, cause_of, place_candidate
 from vegglue.calibration.fingerprints import (
-    EFFECT_AT_PLACE,
     SPOT_LENGTHS,
     Fingerprints,
     Places,
@@ -20,7 +19,7 @@ from vegglue.calibration.fingerprints import (
     plausible_size,
 )
 from vegglue.calibration.laws_in_case import law_traces
-from vegglue.calibration.model_error import model_error_columns
+from vegglue.calibration.model_error import EFFECT_AT_PLACE, model_error_columns
 from vegglue.calibration.noise import noise_of
 from vegglue.case.channel_geometry import half_width, site_scales
 from vegglue.case.config import load_case
