@@ -7,7 +7,7 @@ another one, whatever is missing in it is found in the wrong place.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -46,6 +46,8 @@ CHANGE_DISCHARGE = ("discharge_error", "lateral_inflow", "unlisted_inflow")
 # may be half of the true one. Chosen, with the open cases and drawn sites at hand: where no more water really passed,
 # their 244 sections lie within 1.2.
 SURELY_OTHERWISE = 3.0
+# y [m], velocity and its standard error [m/s] of verticals (verticals,) each.
+Verticals = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True)
@@ -385,18 +387,20 @@ def _carried(
         error = rise + NORMAL95 * float(gauges["standard_error"].fillna(0.0).max())
         around = level - error, level + error
     grid, bed = site.grid, site.bed[column]
-    whole = _velocity_area(grid, bed, rows, level)
+    mean = rows.groupby("y", as_index=False)[["value", "standard_error"]].mean()
+    measured = (mean["y"].to_numpy(float), mean["value"].to_numpy(float), mean["standard_error"].fillna(0.0).to_numpy())
+    whole = _velocity_area(grid, bed, measured, level)
     if whole is None or whole[0] <= 0.0:
         return None
     value, error, share, verticals = whole
     # s_bed = |sum_j dQ/dz_j B_j|, B the columns of the error of the surveyed bed of each cell j across.
-    of_bed = bed_error_columns(case, grid, experiment).reshape(*site.bed.shape, -1)[column]
+    of_bed = bed_error_columns(case, replace(grid, x=grid.x[[column]]), experiment)
     if of_bed.any():
-        lower = (_velocity_area(grid, bed + BED_STEP * unit, rows, level) for unit in np.eye(bed.size))
-        slope = np.array([0.0 if one is None else (one[0] - value) / BED_STEP for one in lower])
+        lower = (_passing(grid, bed + BED_STEP * unit, measured, level)[2].sum() for unit in np.eye(bed.size))
+        slope = np.nan_to_num([(one - value) / BED_STEP for one in lower])
         error = float(np.hypot(error, np.linalg.norm(slope @ of_bed)))
-    others = (_velocity_area(grid, bed, rows, one) for one in around)
-    low, high = (float(np.hypot(NORMAL95 * error, 0.0 if one is None else abs(one[0] - value))) for one in others)
+    ends = (float(_passing(grid, bed, measured, one)[2].sum()) for one in around)
+    low, high = (float(np.hypot(NORMAL95 * error, np.nan_to_num(abs(one - value)))) for one in ends)
     given = discharges_upstream_of(case, setting, x)
     parts = [prior_range(case, one) for one in given or ()]
     return CarriedDischarge(
@@ -412,28 +416,39 @@ def _carried(
     )
 
 
-def _velocity_area(grid: Grid, bed: Array, rows: pd.DataFrame, level: float) -> tuple[float, float, float, int] | None:
-    """Q = sum_i w_i u_i, see `conveyance_weights`, and s^2 = max(sampling, spacing)^2 + few^2 + banks^2 + shared^2.
-
-    Q and s but for the errors of level and bed [m3/s]; share of the wet width between the outermost
-    verticals [-]; how many. bed: that of a column of cells (ny,) [m].
+def _passing(grid: Grid, bed: Array, measured: Verticals, level: float) -> tuple[CrossSection, Array, Array]:
+    """The section of a column of cells with this bed (ny,) [m], depths [m] at the verticals, and the discharge of each
+    strip of the section [m3/s], see `conveyance_weights`; NaN below FEWEST_VERTICALS in the water.
     """
     step = grid.dy / STRIPS
     y = grid.y[0] - 0.5 * grid.dy + step * (np.arange(STRIPS * grid.y.size) + 0.5)
     cross = CrossSection(y, np.interp(y, grid.y, bed), level)
-    measured = rows.groupby("y", as_index=False)[["value", "standard_error"]].mean()
-    depth = np.interp(measured["y"], cross.y, cross.depth)
-    wet, depth = measured[depth > SHALLOWEST], depth[depth > SHALLOWEST]
-    if len(wet) < FEWEST_VERTICALS:
+    depth = np.interp(measured[0], cross.y, cross.depth)
+    wet = depth > SHALLOWEST
+    if wet.sum() < FEWEST_VERTICALS:
+        return cross, depth, np.full(y.size, np.nan)
+    rate = np.interp(y, measured[0][wet], measured[1][wet] / np.sqrt(depth[wet]))
+    return cross, depth, rate * cross.depth**1.5 * cross.width
+
+
+def _velocity_area(
+    grid: Grid, bed: Array, measured: Verticals, level: float
+) -> tuple[float, float, float, int] | None:
+    """Q = sum_i w_i u_i, see `conveyance_weights`, and s^2 = max(sampling, spacing)^2 + few^2 + banks^2 + shared^2.
+
+    Q and s but for the errors of level and bed [m3/s]; share of the wet width between the outermost verticals [-]; how
+    many; None below FEWEST_VERTICALS.
+    """
+    cross, depth, through = _passing(grid, bed, measured, level)
+    wet = depth > SHALLOWEST
+    y, u, own = (values[wet] for values in measured)
+    if y.size < FEWEST_VERTICALS:
         return None
-    y, u = wet["y"].to_numpy(float), wet["value"].to_numpy(float)
-    weights = conveyance_weights(cross, y, depth)
-    value = float(weights @ u)
-    sampling = float(np.linalg.norm(weights * wet["standard_error"].fillna(0.0)))
+    value, weights = float(through.sum()), conveyance_weights(cross, y, depth[wet])
+    sampling = float(np.linalg.norm(weights * own))
     spacing = neighbour_error(y, u) * float(np.linalg.norm(weights))
     within = (cross.y >= y[0]) & (cross.y <= y[-1])
-    through = np.interp(cross.y, y, u / np.sqrt(depth)) * cross.depth**1.5 * cross.width
     banks = OF_BANKS * float(np.abs(through[~within]).sum())
-    own = abs(value) * float(np.hypot(OF_FEW_VERTICALS / len(wet), SHARED_ERROR))
-    error = float(np.linalg.norm([np.fmax(sampling, spacing), banks, own]))
-    return value, error, float((cross.depth[within] > 0.0).sum() / (cross.depth > 0.0).sum()), len(wet)
+    few = abs(value) * float(np.hypot(OF_FEW_VERTICALS / y.size, SHARED_ERROR))
+    error = float(np.linalg.norm([np.fmax(sampling, spacing), banks, few]))
+    return value, error, float((cross.depth[within] > 0.0).sum() / (cross.depth > 0.0).sum()), y.size
