@@ -17,7 +17,7 @@ from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.case.resolved_config import dumped, plain_tree
 from vegglue.engine.interface import Model, Point, linearise, linearise_from, relinearised
 from vegglue.engine.model import coarser
-from vegglue.engine.newton import NEWTON
+from vegglue.engine.newton import NEWTON, on_half_as_many_cells
 from vegglue.errors import InputError
 from vegglue.parallel import in_threads
 
@@ -118,7 +118,15 @@ def _found(model: Model, start: Point | None) -> Point:
 
 
 def _best_from_prior(model: Model, noise: Noise) -> Point:
-    """The point of the best fit among those that start from the FITTED_POINTS with the least objective."""
+    """The point of the best fit among those that start from the FITTED_POINTS with the least objective; on a wide grid
+    searched on half as many cells each way, and fitted again here.
+    """
+    rough = on_half_as_many_cells(model)
+    if rough is not None:
+        there = _best_from_prior(rough, noise)
+        start = linearise_from(model, there.z, there)
+        if start is not None:
+            return fit(model, noise, start).point
     middle, *others = places_of_prior(len(model.names))
     first = linearise(model, middle)
     tried = [first, *in_threads(linearise_from, [(model, z, first) for z in others])]

@@ -155,7 +155,7 @@ def any_error(case: Case, allowed: ModelError) -> bool:
     return any(allowed.model_dump().values()) or any(layer.survey is not None for layer in beds_of(case))
 
 
-def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Array:
+def model_error_columns(model: Model, point: Point, allowed: ModelError, cells: CellResponses | None = None) -> Array:
     """M = columns columns', the covariance of the model's own error, see the head of this file.
 
     Parameters
@@ -166,6 +166,8 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Arra
         The flow and parameters at which predictions are linearised.
     allowed : ModelError
         s_f [-] and s_b [m], and s_e [m], s_y [m], s_q [-], s_n [-] of the site.
+    cells : CellResponses, optional
+        To the terms of `terms_that_err`, if they are known.
 
     Returns
     -------
@@ -174,11 +176,9 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Arra
     """
     if not any_error(model.case, allowed):
         return np.zeros((len(model.station), 0))
-    objects = [key for key in model.case.effects if effect_of(model.case, key).name in TERM_OF]
-    of_objects = [TERM_OF[effect_of(model.case, key).name] for key in objects]
-    of_sides: tuple[Term, ...] = ("drag",) if allowed.edges else ()
-    terms = dict.fromkeys(("friction", *of_sides, "bed", *of_objects))
-    cells, half, grid = cell_responses(model, point, tuple(terms)), half_width(model.site), model.site.grid
+    cells = cells or cell_responses(model, point, terms_that_err(model.case, allowed))
+    objects = _objects(model.case)
+    half, grid = half_width(model.site), model.site.grid
     friction = gaussian_basis(grid, FRICTION_RADIUS * half, FRICTION_RADIUS * half)
     bed = gaussian_basis(grid, BED_RADIUS * half, BED_RADIUS * half)
     return np.hstack(
@@ -186,10 +186,23 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError) -> Arra
             allowed.friction * field_columns(cells, "friction", friction),
             allowed.bed * field_columns(cells, "bed", bed),
             survey_error_columns(model, cells),
-            *(_columns_of_shape(model, point, cells, key, term) for key, term in zip(objects, of_objects, strict=True)),
+            *(_columns_of_shape(model, point, cells, key, TERM_OF[effect]) for key, effect in objects),
             site_error_columns(model, point, allowed, cells),
         ]
     )
+
+
+def terms_that_err(case: Case, allowed: ModelError) -> tuple[Term, ...]:
+    """Those of which `model_error_columns` needs responses."""
+    of_sides: tuple[Term, ...] = ("drag",) if allowed.edges else ()
+    of_objects = (TERM_OF[effect] for _, effect in _objects(case))
+    return tuple(dict.fromkeys(("friction", *of_sides, "bed", *of_objects)))
+
+
+def _objects(case: Case) -> list[tuple[str, str]]:
+    """Key and effect of what the case has at places in no list."""
+    of = [(key, effect_of(case, key).name) for key in case.effects]
+    return [(key, effect) for key, effect in of if effect in TERM_OF]
 
 
 def survey_error_columns(model: Model, cells: CellResponses) -> Array:

@@ -16,8 +16,8 @@ from vegglue.case.site_schema import BedLayer, CovarianceOfBed
 from vegglue.case.survey_error import BedSurvey, conditional, evidence_of_lines, line_weights
 
 Found = TypeVar("Found")
-# Beds whose errors and lines are kept in memory.
-MOST_BEDS_KEPT = 16
+# Beds whose errors and lines are kept in memory, most of them of one column of cells.
+MOST_BEDS_KEPT = 48
 _kept: dict[bytes, Any] = {}
 
 

@@ -32,7 +32,14 @@ from scipy.special import chdtri
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs, with_error_there
-from vegglue.calibration.model_error import CellResponses, any_error, model_error_columns, site_error_columns
+from vegglue.calibration.model_error import (
+    CellResponses,
+    any_error,
+    cell_responses,
+    model_error_columns,
+    site_error_columns,
+    terms_that_err,
+)
 from vegglue.case.bed_error import without_surveys
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import ModelError
@@ -156,9 +163,11 @@ def largest_error_between(base: Baseline) -> float:
     # A probe beside its place reads another place, and is no error of the model there.
     allowed = model.case.model_error.model_copy(update={"probes": 0.0, "edges": 0.0})
     plain = replace(wide, case=without_surveys(model.case))
-    columns = np.hstack([point.slope, model_error_columns(plain, point, allowed)])
     site = ModelError(edges=model.case.model_error.edges)
-    of_site = model_error_columns(wide, point, site)[count:] if any_error(model.case, site) else np.zeros((1, 0))
+    errs = any_error(model.case, model.case.model_error)
+    cells = cell_responses(wide, point, terms_that_err(model.case, site)) if errs else None
+    columns = np.hstack([point.slope, model_error_columns(plain, point, allowed, cells)])
+    of_site = model_error_columns(wide, point, site, cells)[count:]
     mean, covariance = _given_residual(where, columns[:count][noise.rows], columns[count:], point)
     random = np.random.default_rng(1)
     drawn = random.multivariate_normal(mean, covariance, DRAWN_ERRORS, check_valid="ignore", method="eigh")

@@ -184,23 +184,27 @@ def _from_coarser_cells(model: Model, experiment: str, z: Array, problem: Proble
     if problem.shape[1] < WIDE_FROM:
         return None
     south, north = wet_band(problem, backwater(problem))
-    site = _site_on_coarser_cells(model) if north - south >= WIDE_FROM else None
-    if site is None:
+    coarse = on_half_as_many_cells(model) if north - south >= WIDE_FROM else None
+    if coarse is None:
         return None
-    coarse = replace(model, case=on_cells(model.case, (site.grid.dx, site.grid.dy)), site=site)
     there = problem_at(coarse, experiment, z)
     solution, own, band = settled(there, _from_coarser_cells(coarse, experiment, z, there), ROUGH)
     return None if own is None else between_cells(widen(solution.state, there.shape[1], band), problem.shape)
 
 
-def _site_on_coarser_cells(model: Model) -> Site | None:
-    """The site on half as many cells along and across, to whole numbers; None if an inflow or the outlet has none."""
+def on_half_as_many_cells(model: Model) -> Model | None:
+    """A model of a wide grid on half as many cells along and across, to whole numbers; None if the grid is narrow, or
+    an inflow or the outlet has none of these cells.
+    """
+    (nx, ny), of = model.site.bed.shape, model.case.grid
+    if ny < WIDE_FROM:
+        return None
+    case = on_cells(model.case, (float(np.ptp(of.x)) / (nx // 2), float(np.ptp(of.y)) / (ny // 2)))
     if model.site not in _ON_COARSER_CELLS:
-        (nx, ny), of = model.site.bed.shape, model.case.grid
-        case = on_cells(model.case, (float(np.ptp(of.x)) / (nx // 2), float(np.ptp(of.y)) / (ny // 2)))
         site = build_site(case)
         _ON_COARSER_CELLS[model.site] = None if any(ranges_without_cells(case, site.grid)) else site
-    return _ON_COARSER_CELLS[model.site]
+    found = _ON_COARSER_CELLS[model.site]
+    return None if found is None else replace(model, case=case, site=found)
 
 
 def _step_of_known(known: Array, z: Array) -> Array:

@@ -14,7 +14,6 @@ import numpy as np
 
 from vegglue.arrays import Array, Single
 from vegglue.compilation import compiled_exactly
-from vegglue.flow.block_elimination import put
 
 # Steps kept [-]: six as in a sketch of the solver, in which all members of five clusters then took 3 to 8 steps. More
 # need more memory, by which a step is bound.
@@ -68,23 +67,15 @@ def mix(state, step, sums, weights):
     return moved
 
 
-@compiled_exactly
-def minimise(gram, right):
+def minimise(gram: Array, right: Array) -> Array:
     """g (depth, m) with gram g = right, gram (depth, depth, m): the least squares of Anderson's mixing; 0 in a slot
-    whose member has run away to numbers that are not finite.
+    whose member has run away to numbers that are not finite. In NumPy, as compiling `solve` takes 5 s.
     """
-    depth, _, m = gram.shape
-    weights = np.empty((depth, m))
-    for k in range(m):
-        matrix = np.empty((depth, depth))
-        for a in range(depth):
-            for b in range(depth):
-                matrix[a, b] = gram[a, b, k]
-            matrix[a, a] = matrix[a, a] * (1.0 + 1e-10) + 1e-300
-        if not (np.isfinite(matrix).all() and np.isfinite(right[:, k]).all()):
-            weights[:, k] = 0.0
-            continue
-        put(weights[:, k : k + 1], np.linalg.solve(matrix, np.ascontiguousarray(right[:, k : k + 1])))
+    matrix, each = np.moveaxis(gram, 2, 0).copy(), np.arange(len(gram))
+    matrix[:, each, each] = matrix[:, each, each] * (1.0 + 1e-10) + 1e-300
+    weights = np.zeros(right.shape)
+    finite = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=0)
+    weights[:, finite] = np.linalg.solve(matrix[finite], right.T[finite, :, None])[..., 0].T
     return weights
 
 

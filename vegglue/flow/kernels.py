@@ -291,7 +291,8 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
         if f == nx:
             for j in range(ny):
                 if not outlet[j]:
-                    out[offset + a - first, 2, j * m : j * m + m] = u[f, j * m : j * m + m]
+                    for t in range(j * m, j * m + m):
+                        out[offset + a - first, 2, t] = u[f, t]
 
 
 @compiled
@@ -530,5 +531,7 @@ def rates(
         continuity(out, first, lo, hi, m, flux_x, flux_y, dx, dy, here)
         momentum_y(out, first, lo, hi, m, *flow, wet, *law, film, dx, dy, here)
         momentum_x(out, first, lo, hi, *flow, wet, *law, outlet, outlet_level, film, dx, dy, here)
-        out[first:stop, 1, :m] = state[first:stop, 1, 0]
+        for i in range(first, stop):  # not by slices: to assign arrays takes seconds to compile, see `put`
+            for k in range(m):
+                out[i, 1, k] = state[i, 1, 0, k]
     return out.reshape((nx, 3, ny, m))

@@ -58,10 +58,13 @@ def backwater(problem: Problem) -> Array:
 
 
 def on_grid(state: Array, shape: tuple[int, int]) -> Array:
-    """A state (nx, 3, ny, m) on a grid of `shape` (nx, ny), along each axis its own or twice as many cells.
+    """A state (nx, 3, ny, m) on a grid of `shape` (nx, ny) of the same reach.
 
-    Levels are those of the cell around; velocities on new faces are the mean of both neighbours.
+    Along an axis with twice as many cells levels are those of the cell around, and velocities on new faces the mean of
+    both neighbours; else see `between_cells`.
     """
+    if any(fine not in (own, 2 * own) for fine, own in zip(shape, (state.shape[0], state.shape[2]), strict=True)):
+        return between_cells(state, shape)
     if shape[0] == 2 * state.shape[0]:
         state = np.repeat(state, 2, axis=0)
         state[2::2, ALONG] = 0.5 * (state[1:-1:2, ALONG] + state[3::2, ALONG])

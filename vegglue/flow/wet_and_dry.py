@@ -43,9 +43,13 @@ def depths(level, bed, rise, half_range, film, smallest, outlet_level):
     half_range (nx, ny): half the range of the bed within a cell [m]; rise (nx, ny, m): by how much members' beds lie
     higher [m], or empty.
     """
-    if rise.size:
-        level = level - rise
     nx, ny, m = level.shape
+    if rise.size:
+        level = level.copy()
+        for i in range(nx):
+            for j in range(ny):
+                for k in range(m):
+                    level[i, j, k] -= rise[i, j, k]
     cell = np.empty((nx, ny, m))
     face_x = np.empty((nx + 1, ny, m))
     face_y = np.empty((nx, ny + 1, m))

@@ -431,9 +431,7 @@ def _passing(grid: Grid, bed: Array, measured: Verticals, level: float) -> tuple
     return cross, depth, rate * cross.depth**1.5 * cross.width
 
 
-def _velocity_area(
-    grid: Grid, bed: Array, measured: Verticals, level: float
-) -> tuple[float, float, float, int] | None:
+def _velocity_area(grid: Grid, bed: Array, measured: Verticals, level: float) -> tuple[float, float, float, int] | None:
     """Q = sum_i w_i u_i, see `conveyance_weights`, and s^2 = max(sampling, spacing)^2 + few^2 + banks^2 + shared^2.
 
     Q and s but for the errors of level and bed [m3/s]; share of the wet width between the outermost verticals [-]; how
