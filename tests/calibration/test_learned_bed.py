@@ -43,6 +43,11 @@ def test_the_survey_adds_its_error_and_a_case_without_one_has_none(surveyed: tup
     stated = np.linalg.norm(columns, axis=1).reshape(model.site.bed.shape)
     middle = stated[:, stated.shape[1] // 2]
     assert middle[np.linspace(0, middle.size - 1, 5).astype(int)].max() < 0.5 * middle.max() <= 0.5 * 1.5 * OF_BED.sd
+    # A column of cells by itself has the error that it has among all.
+    grid, column = model.site.grid, stated.shape[0] // 8
+    alone = bed_error_columns(model.case, replace(grid, x=grid.x[[column]]))
+    among = columns.reshape(*stated.shape, -1)[column]
+    assert np.linalg.norm(alone.sum(axis=0)) == pytest.approx(np.linalg.norm(among.sum(axis=0)), rel=0.02)
 
 
 def test_the_flow_finds_a_bed_that_was_drawn(surveyed: tuple[Model, Point]) -> None:

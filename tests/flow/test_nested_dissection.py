@@ -9,7 +9,7 @@ from vegglue.flow import jacobian as of_jacobian
 from vegglue.flow.jacobian import Factors, SharedFactors, SparseJacobian, factors, jacobian
 from vegglue.flow.nested_dissection import dissection, sparse_factors
 from vegglue.flow.problem import ACROSS, InflowSegment, Problem
-from vegglue.flow.starts import backwater, between_cells
+from vegglue.flow.starts import backwater, between_cells, on_grid
 from vegglue.flow.tangent import adjoints, tangents
 
 
@@ -98,8 +98,9 @@ def test_a_state_between_cells_keeps_what_is_linear() -> None:
         state = np.stack([x + 2 * y + 0.5 / nx + 1.0 / ny, y + 0 * x, 3 * x + 3.0 / nx + 0 * y], axis=1)
         return state[..., None]
 
-    found, wanted = between_cells(linear(20, 15), (41, 32)), linear(41, 32)
-    assert found[2:-2, :, 3:-3] == pytest.approx(wanted[2:-2, :, 3:-3], abs=1e-12)
+    for of in (between_cells, on_grid):
+        found, wanted = of(linear(20, 15), (41, 32)), linear(41, 32)
+        assert found[2:-2, :, 3:-3] == pytest.approx(wanted[2:-2, :, 3:-3], abs=1e-12)
 
 
 def joined() -> Problem:
