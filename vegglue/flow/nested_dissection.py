@@ -35,13 +35,10 @@ from vegglue.flow.block_elimination import ACROSS_PERIOD, ALONG_PERIOD, ROWS_REA
 Indices = NDArray[np.int64]
 # Cells of a part that is not cut further [-].
 LEAF = 16
-# Adjoints are corrected until the next correction is below so much of the largest entry [-] if these go on to shrink as
-# they do, in so many rounds at most: after three rounds a score was off by 0.16 %, which moved odds of 5.02 below the 5
-# that decide. Chord steps and tangents correct themselves, in 40 steps of a cold flow on 180 x 75 cells without a round
-# of their own and in 45 with one.
+# Adjoints are corrected until a correction is below so much of the largest entry [-], in so many rounds at most: after
+# three rounds a score was off by 0.16 %, which moved odds of 5.02 below the 5 that decide. Chord steps and tangents
+# correct themselves, in 40 steps of a cold flow on 180 x 75 cells without a round of their own and in 45 with one.
 ADJOINT_TOLERANCE, MOST_ADJOINT_ROUNDS = 1e-4, 12
-# What no correction is divided by [-].
-SMALLEST = 1e-30
 # Blocks [bytes] up to which they take the place of parts that do not lead to the inverse: chosen.
 LARGEST_BLOCKS = 1_000_000_000
 # Factors of all flows [bytes] unless a command allows more or less: a diagnosis holds up to a hundred flows, of which
@@ -350,14 +347,11 @@ class SparseFactors:
             (block_elimination.solve_transposed if transposed else block_elimination.solve)(*memory, right)
             return
         found = self._by_parts(memory, right, transposed)
-        before = np.ones(right.shape[2])
         for _ in range(MOST_ADJOINT_ROUNDS if transposed else 0):
             step = self._by_parts(memory, self._left(right, found, transposed), transposed)
             found += step
-            size = np.abs(step).max(axis=(0, 1)) / np.maximum(np.abs(found).max(axis=(0, 1)), SMALLEST)
-            if (size * size <= ADJOINT_TOLERANCE * before).all():
+            if (np.abs(step).max(axis=(0, 1)) <= ADJOINT_TOLERANCE * np.abs(found).max(axis=(0, 1))).all():
                 break
-            before = np.maximum(size, SMALLEST)
         right[...] = found
 
     def contracts(self) -> bool:
