@@ -171,6 +171,12 @@ def test_what_is_vaguer_has_to_be_clearly_better(with_b: Errors, spread: float, 
     assert refused == ("b" if kept == A else "a")
 
 
+@pytest.mark.parametrize(("off", "kept"), [(0.0, (PARENT,)), (np.nan, (PARENT, A))])
+def test_one_of_several_amplitudes_near_off_shows_nothing(off: float, kept: tuple[Names, ...]) -> None:
+    models = {PARENT: a_model_score((3.0, 3.0), {}, 6.0), A: a_model_score((1.0, 1.0), {"a": 0.5}, 1.0)}
+    assert chosen([Nominee("a", "a", off)], lambda names: models[names]).stages == kept
+
+
 @pytest.mark.parametrize(("by", "group"), [("experiments", "high"), ("sections", "D0")])
 def test_what_acts_in_one_group_is_not_judged_there(by: By, group: str) -> None:
     """There it is not known, and errors rise; where it is, they fall."""

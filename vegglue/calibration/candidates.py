@@ -88,6 +88,11 @@ class Candidate:
         return {name: f"{self.key}_{name}" for name in names}
 
     @property
+    def has_further_amplitudes(self) -> bool:
+        """Whether others share what its amplitude explains: each may then be compatible with off, and not all."""
+        return any(one.sd for one in self.effect.shapes)
+
+    @property
     def priors(self) -> dict[str, Parameter]:
         """Of the amplitude and of the shapes that are calibrated with it, by the parameter: normal around off, or the
         default, its standard deviation the plausible size, within the support.

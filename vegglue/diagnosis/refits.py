@@ -181,7 +181,8 @@ def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, 
     unneeded: list[str] = []
     for name in earlier:
         one = candidate_in_case(base.model.case, name)
-        if not is_near_off(interval95(base.model, base.fitted, one.parameter), one.effect.amplitude.off):
+        interval = interval95(base.model, base.fitted, one.parameter)
+        if one.has_further_amplitudes or not is_near_off(interval, one.effect.amplitude.off):
             continue
         watch(Progress(f"{name} is no longer needed"))
         fewer = without_effect(base, one)

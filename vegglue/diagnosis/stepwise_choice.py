@@ -29,8 +29,9 @@ WAYS: tuple[By, ...] = ("sections", "experiments")
 
 @dataclass(frozen=True)
 class Nominee:
-    """An effect that was named: its parameter, and the value of it that does nothing; instead_of: what is known, where
-    this is something vaguer that may be it instead; only_in: the one experiment or section in which it acts.
+    """An effect that was named: its parameter, and the value of it that does nothing, NaN if that alone shows nothing;
+    instead_of: what is known, where this is something vaguer that may be it instead; only_in: the one experiment or
+    section in which it acts.
     """
 
     name: str
@@ -331,7 +332,8 @@ def nominees(case: Case, found: Diagnosis) -> list[Nominee]:
     for one, _ in tried_additions(case, found):
         groups: dict[By, tuple[str, ...]] = {"experiments": one.experiments, "sections": one.sections}
         only_in = {by: names[0] for by, names in groups.items() if len(names) == 1}
-        named.append(Nominee(one.name, one.parameter, one.amplitude.off, known.get(one.name, ""), only_in))
+        off = float("nan") if one.has_further_amplitudes else one.amplitude.off
+        named.append(Nominee(one.name, one.parameter, off, known.get(one.name, ""), only_in))
     return named
 
 
