@@ -148,6 +148,12 @@ def _hiding(site: Site, case: Case, experiment: str, hidden: Mapping[str, Number
             spread |= numbers
         elif name == "inflow_peak":
             spread |= {f"peak_{key}": number for key, number in numbers.items()}
+        elif name == "inflow_distribution":
+            first = round(numbers.get("mode", 1.0))
+            others = [k for k in range(1, 5) if k != first]
+            spread[f"mode_{first}"] = numbers["excess"]
+            for key, k in zip(("first_other", "second_other", "third_other"), others, strict=True):
+                spread[f"mode_{k}"] = numbers.get(key, 0.0)
         elif name == "lateral_inflow":
             half = truth.channel.half
             settings["lateral"] = (0.0, truth.channel.length, -half, half, numbers["share"] * discharge)

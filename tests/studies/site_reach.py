@@ -216,6 +216,8 @@ def _problem(truth: Truth, discharge: float, level: float, cells: tuple[float, f
     share = share * (1.0 + truth.spread.get("excess", 0.0) * (1.0 - 3.0 * s**2) / 2.0)
     off_peak = (s - truth.spread.get("peak_middle", 0.0)) / truth.spread.get("peak_width", 1.0)
     share = share * (1.0 + truth.spread.get("peak_excess", 0.0) * np.exp(-(off_peak**2)))
+    for k in range(1, 5):
+        share = share * np.exp(truth.spread.get(f"mode_{k}", 0.0) * np.cos(0.5 * np.pi * k * (1.0 + s)) / k)
     return reach_of(truth, cells, level), Ends(discharge, level, share)
 
 

@@ -56,7 +56,7 @@ def test_every_name_is_there_and_the_same_for_editors() -> None:
 def test_what_no_verb_can_do_is_said_in_its_words(tmp_path: Path) -> None:
     """An unknown method was weighed as `refine`; nothing to add was told as a config that extends itself."""
     case = vegglue.load_case(write_reach(tmp_path, COARSE, SMALL, WITH_ERROR))
-    with pytest.raises(vegglue.InputError, match="--method: expected refine or glue, got 'gleu'"):
+    with pytest.raises(vegglue.InputError, match="--method: expected refine or surrogate or glue, got 'gleu'"):
         vegglue.infer(case, runs=tmp_path / "runs", method="gleu")  # type: ignore[arg-type]
     with pytest.raises(vegglue.InputError, match="--add: expected the name of an effect or more, got none"):
         vegglue.extend(case, [])

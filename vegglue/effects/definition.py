@@ -28,9 +28,11 @@ Stage = Literal["site", "boundary", "plants", "resistance", "exchange", "force",
 Each = Literal["case", "experiment", "section", "device", "patch"]
 EACH: tuple[Each, ...] = ("case", "experiment", "section", "device", "patch")
 # What a site has to have for an effect to act there: wind, and water that seeps in, need a channel without walls of a
-# laboratory; partial sampling needs verticals that were sampled at too few heights.
-Need = Literal["open air", "open ground", "banks", "plants", "gauges", "few heights", "one surface"]
-NEEDS: tuple[Need, ...] = ("open air", "open ground", "banks", "plants", "gauges", "few heights", "one surface")
+# laboratory; partial sampling needs verticals that were sampled at too few heights; a layer that grows from the inflow
+# needs an inflow of two speeds, which an effect that distributes it gives.
+Need = Literal[
+    "open air", "open ground", "banks", "plants", "gauges", "few heights", "one surface", "distributed inflow"
+]
 STAGES: tuple[Stage, ...] = ("site", "boundary", "plants", "resistance", "exchange", "force", "sensor")
 # What each stage hands on, and whether an effect adds to it or takes its place.
 ADDED = {"site": ("bed", "inflow"), "exchange": ("viscosity", "xx", "xy", "yy"), "force": ("x", "y")}

@@ -368,6 +368,7 @@ EFFECTS = (
         ),
         source="after van Prooijen and Uijttewaal (2002)",
         doi="10.1063/1.1514660",
+        needs=("distributed inflow",),
     ),
     Effect(
         name="wake_mixing",
