@@ -386,7 +386,7 @@ def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypoth
     assert isinstance(best, Refit)
     starts = [(float(places.x[spot]), float(places.y[spot])), (best.shapes["x"], best.shapes["y"])]
     apart = np.subtract(*starts) / (places.length[spot], places.width[spot])
-    patch = found_patch(screening.search, places, kind, starts if np.hypot(*apart) > 1.0 else starts[:1])
+    patch = found_patch(screening.search, places, kind, starts if np.linalg.norm(apart) > 1.0 else starts[:1])
     spots = [one.log_evidence for one in at_places if one.kind == "drag"]
     against = max(spots, default=kind.total)
     if patch is None or tempered_odds(patch.log_evidence, against) < constants().strong_odds:
