@@ -385,7 +385,7 @@ def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypoth
     best = max(at_places, key=lambda one: one.log_evidence).what
     assert isinstance(best, Refit)
     starts = [(float(places.x[spot]), float(places.y[spot])), (best.shapes["x"], best.shapes["y"])]
-    apart = np.subtract(*starts) / (places.length[spot], places.width[spot])
+    apart = np.diff(starts, axis=0) / (places.length[spot], places.width[spot])
     patch = found_patch(screening.search, places, kind, starts if np.linalg.norm(apart) > 1.0 else starts[:1])
     spots = [one.log_evidence for one in at_places if one.kind == "drag"]
     against = max(spots, default=kind.total)
