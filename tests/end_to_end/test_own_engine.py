@@ -89,8 +89,10 @@ def test_the_page_is_true(pair: Pair, tmp_path: Path, monkeypatch: pytest.Monkey
     """Its config and its script, in a few members from the shell; without --trust nothing runs."""
     monkeypatch.chdir(tmp_path)
     write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)
-    text = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[0]
-    (tmp_path / "brook_by_command.yaml").write_text(text, encoding="utf-8")
+    pattern = r"^```yaml\n(# brook_by_command\.yaml\n.*?)^```"
+    shown = re.search(pattern, PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert shown
+    (tmp_path / "brook_by_command.yaml").write_text(shown[1], encoding="utf-8")
     shutil.copy(PAGE.parent / "examples" / "solver_as_command.py", tmp_path)
     refused = shell(tmp_path, "check", "brook_by_command.yaml", succeed=False)
     assert refused.returncode == 2
