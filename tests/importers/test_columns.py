@@ -207,6 +207,15 @@ def test_an_error_without_a_unit_has_that_of_its_values(tmp_path: Path, table: s
     assert rows_of(tmp_path, table).numbers[role].tolist() == pytest.approx([error])
 
 
+def test_a_column_over_a_length_or_a_speed_has_that_as_its_unit(tmp_path: Path) -> None:
+    columns = {"x": "Downstream", "y": "y*", "u": "u*"}
+    units = {"x": "0.7 m", "y": "70 cm", "u": "0.8 m/s"}
+    taken = rows_of(tmp_path, "u*\ty*\tDownstream\n1.25\t-1.7\t10\n1\t0\t2\n", columns=columns, units=units)
+    assert taken.numbers["x"].tolist() == pytest.approx([7.0, 1.4])
+    assert taken.numbers["y"].tolist() == pytest.approx([-1.19, 0.0])
+    assert taken.numbers["u"].tolist() == pytest.approx([1.0, 0.8])
+
+
 def test_an_error_follows_the_unit_of_the_site_file(tmp_path: Path) -> None:
     taken = rows_of(tmp_path, "x,y,u,u_se\n1,2,40,0.3\n", units={"u": "cm/s"})
     assert (taken.numbers["u_se"].tolist(), taken.units["u_se"]) == (pytest.approx([0.003]), "cm/s")

@@ -79,6 +79,19 @@ def si_factor(word: str, quantity: str, where: str) -> float:
     return UNITS[quantity][unit]
 
 
+def scale_of_column(word: str, quantity: str, where: str) -> float:
+    """SI value of 1 in a column [SI unit]: of a unit, or of a scale such as `0.7 m`, a diameter that lengths are given
+    in. InputError, which begins with `where`, for an unknown word.
+    """
+    scale = re.fullmatch(r"\s*([\d.]+(?:e[-+]?\d+)?)\s*(\S.*)", word.lower())
+    if scale is None:
+        return si_factor(word, quantity, where)
+    size = in_si(word, quantity, where)
+    if not 0.0 < size < math.inf:
+        raise InputError(f"{where} expected a unit of {quantity}, or a scale above 0 such as 0.7 m, got {word!r}.")
+    return size
+
+
 def in_si(value: object, quantity: str, where: str) -> float:
     """A number in SI, or a text such as `42 l/s` as one. InputError, which begins with `where`."""
     if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):

@@ -18,7 +18,7 @@ from vegglue.importers.column_names import (
     known_name,
     names_without_unit,
     role_of,
-    si_factor,
+    scale_of_column,
     unit_named,
     unit_stated,
     words_of,
@@ -239,7 +239,7 @@ def numbers_of_column(
     missing: numbers that are marks beside those of any column.
     """
     quantity, heading = ROLES[role].quantity, table.headings[place]
-    factor = si_factor(unit, quantity, shown_path(path))
+    factor = scale_of_column(unit, quantity, shown_path(path))
     largest = LARGEST_OF.get(role, LARGEST_OF.get(quantity, math.inf))
     marks = [sign * mark for mark in MARKS_OR_VALUES if mark * factor > largest for sign in (1.0, -1.0)]
     values = table.numbers(path, place)

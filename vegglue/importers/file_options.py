@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from vegglue.case.messages import nearest
 from vegglue.errors import InputError
-from vegglue.importers.column_names import ROLES, UNITS, in_si, si_factor
+from vegglue.importers.column_names import ROLES, UNITS, in_si, scale_of_column
 
 # Keys of one length or angle each.
 LENGTHS_AND_ANGLES = {"x": "length", "floor": "length", "surface": "length", "draft": "length", "declination": "angle"}
@@ -100,7 +100,7 @@ def read_file_options(given: Any, where: str) -> FileOptions:
                 raise InputError(f"{where}.{key} does not know `{name}`: {nearest(str(name), ROLES)}")
         found[key] = {str(name): str(value) for name, value in entries.items()}
     for role, unit in found["units"].items():
-        si_factor(unit, ROLES[role].quantity or "length", f"{where}.units.{role}")
+        scale_of_column(unit, ROLES[role].quantity or "length", f"{where}.units.{role}")
     for key, quantity in LENGTHS_AND_ANGLES.items():
         if key in given:
             found[key] = in_si(given[key], quantity, f"{where}.{key}")
