@@ -10,7 +10,8 @@ from reach import write_reach
 from vegglue.case.bed import read_raster
 from vegglue.case.channel_geometry import channel_geometry
 from vegglue.case.config import load_case
-from vegglue.case.gridded_site import build_site, cells_at, in_experiment
+from vegglue.case.grid import Grid
+from vegglue.case.gridded_site import Site, build_site, cells_at, in_experiment, rims
 from vegglue.case.resolved_config import dumped
 from vegglue.errors import InputError
 from vegglue.flow.problem_setup import build_problem
@@ -251,3 +252,22 @@ def test_plants_stand_inside_their_own_patch_whatever_is_beside_it(tmp_path: Pat
     planted = geometry.planted[..., 0] > 0
     assert planted.any()
     assert geometry.edge[..., 0][planted].max() < 0.0
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        # the bank falls to the stream: no hollow, nor for a sill downstream that all of the stream has
+        ([[0.9, 0.5, 0.1, 0.6], [0.9, 0.7, 0.4, 0.6], [0.9, 0.5, 0.0, 0.6]], [0.0, 0.0, 0.0, 0.0]),
+        # a hollow on the bank, closed by a rim at 0.9 beside it and at 0.8 in the next column, over 0.7
+        ([[0.3, 0.9, 0.1, 0.6], [0.5, 0.8, 0.1, 0.6], [0.9, 0.9, 0.0, 0.6]], [0.5, 0.0, 0.0, 0.0]),
+        # an arm of its own to the outlet, past an island
+        ([[0.3, 0.9, 0.1, 0.6], [0.2, 0.9, 0.1, 0.6], [0.1, 0.9, 0.0, 0.6]], [0.0, 0.0, 0.0, 0.0]),
+    ],
+    ids=["bank", "hollow", "arm"],
+)
+def test_the_rim_of_a_hollow_beside_the_inflow(rows: list[list[float]], expected: list[float]) -> None:
+    bed = np.array(rows)
+    nowhere = np.full(bed.shape, -1)
+    site = Site(Grid(np.arange(3.0), np.arange(4.0), 1.0, 1.0), bed, nowhere + 1, ("bed",), nowhere, 0.0 * bed)
+    assert rims(site, "west", 0, 4)[:, 0] == pytest.approx(expected)

@@ -1,12 +1,14 @@
 """Flow that speeds up or slows down right at the inflow and the outlet, against Bernoulli's equation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from channels import GRAVITY, centres, changed, filled, make_problem, order, shown, solved, trapezoid
 from scipy.optimize import brentq
 
 from vegglue.effects import bed_laws
-from vegglue.flow.equations import residual
+from vegglue.flow.equations import residual, side_fluxes
 from vegglue.flow.problem import ACROSS, ALONG, LEVEL, InflowSegment
 
 LENGTH, FLUX, OUTLET = 24.0, 0.6, 0.9  # m, m2/s, m
@@ -93,3 +95,17 @@ def test_a_waterline_may_cross_the_first_column():
         bed, (20.0 / 30, 0.5), 1.0, 0.6, (bed_laws.CHEZY, 40.0), viscosity=np.full(1, 0.01), film=2e-3
     )
     assert np.abs(solved(problem)[0, ALONG]).max() < 0.6
+
+
+@pytest.mark.parametrize(("level", "share"), [(1.0, 0.0), (1.25, 0.5), (1.4, 1.0)], ids=["below", "over", "far over"])
+def test_a_hollow_takes_water_by_what_stands_over_its_rim(level, share):
+    """0.3 m deep at 0.8 m: the inflow filled it until it ran over its rim, on which Newton and the march ran away."""
+    bed = np.zeros((6, 4))
+    bed[:, :2] = [0.8, 1.1]
+    problem = make_problem(bed, (1.0, 1.0), 1.0, level, SMOOTH, film=1e-6)
+    rim = np.array([[0.3], [0.0], [0.0], [0.0]])
+    hollow = changed(problem, inflows=tuple(replace(one, rim=rim) for one in problem.boundaries.inflows))
+    depth = np.maximum(level - bed[:1, :, None], 0.0)
+    (west, _, _), (plain, _, _) = side_fluxes(hollow, depth), side_fluxes(problem, depth)
+    assert west.sum() == pytest.approx(plain.sum())
+    assert west[0, 0] / west[2, 0] == pytest.approx(share * plain[0, 0] / plain[2, 0], abs=1e-9)

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,8 @@ from vegglue.case.zones import friction_classes, share_in_patch
 
 # Nearer to an edge of its cell than this share of it [-], a place is on that edge: rounding errors are far smaller.
 ON_AN_EDGE = 1e-6
+# Inflows whose rims are kept: those of the experiments of a model and of its coarser ones.
+RIMS_KEPT = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +52,52 @@ class Site:
     def main_patch(self) -> NDArray[np.int64]:
         """The patch (nx, ny) of cells that plants cover half of or more, -1 elsewhere."""
         return np.where(self.cover >= 0.5, self.patch, -1)
+
+
+@lru_cache(RIMS_KEPT)
+def rims(site: Site, side: Literal["west", "south", "north"], start: int, stop: int) -> Array:
+    """How high the rim of the hollow that each cell of an inflow lies in stands over its bed, 0 outside of one.
+
+        W = max(z, min over the neighbours of W),    r = W - z,    W = z in the deepest of these cells and at the outlet
+
+    A hollow is filled up to W before water flows on to the deepest of the cells or, past it, to the outlet.
+
+    Parameters
+    ----------
+    site : Site
+        With the bed z [m].
+    side
+        By which the water enters.
+    start, stop : int
+        It enters by the cells start .. stop - 1 of that side.
+
+    Returns
+    -------
+    array (cell, 1)
+        r [m], not to be written to.
+
+    References
+    ----------
+    Planchon and Darboux (2002), doi:10.1016/S0341-8162(01)00164-3.
+    """
+    bed, cells = site.bed, np.arange(start, stop)
+    sides: dict[str, tuple[Any, Any]] = {"west": (0, cells), "south": (cells, 0), "north": (cells, -1)}
+    at = sides[side]
+    deepest = int(np.argmin(bed[at]))
+    entering, filled = np.full(cells.size, np.inf), np.full(bed.shape, np.inf)
+    entering[deepest] = bed[at][deepest]
+    filled[at], filled[-1] = entering, bed[-1]
+    highest = np.maximum.accumulate
+    along = np.concatenate([highest(bed[at][: deepest + 1][::-1])[::-1], highest(bed[at][deepest:])[1:]])
+    while (along > bed[at]).any():  # else the bed falls to the deepest cell along the inflow itself
+        beside = np.pad(filled, 1, constant_values=np.inf)
+        lowest = np.minimum.reduce([beside[:-2, 1:-1], beside[2:, 1:-1], beside[1:-1, :-2], beside[1:-1, 2:]])
+        lower = np.minimum(filled, np.maximum(bed, lowest))
+        if np.array_equal(lower, filled):
+            along = filled[at]
+            break
+        filled = lower
+    return np.asarray(along - bed[at])[:, None]
 
 
 def in_experiment(site: Site, experiment: str) -> Site:

@@ -147,7 +147,7 @@ def linearised(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Po
 
 def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tuple[SteadyFlow, Array] | None:
     """The flow of one experiment without its slopes, with the factors of a point nearby, else with its own, and its
-    predictions (stations of it,).
+    predictions (stations of it,); None if no start leads to one.
     """
     problem, tolerance, warm, flow = problem_at(model, experiment, z), model.case.numerics.tolerance, None, None
     hopeful = False  # whether the start is better than one from coarser cells at z
@@ -166,8 +166,9 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
         else:
             hopeful = True
     if flow is None:
-        coarse = None if hopeful else _from_coarser_cells(model, experiment, z, problem)
-        for beginning in [warm] if coarse is None else [coarse, warm]:
+        starts = [warm] if hopeful else [_from_coarser_cells(model, experiment, z, problem), warm]
+        # None, a cold start, comes last: a start nearby may lead nowhere where a cold one leads to the flow.
+        for beginning in [*(one for one in starts if one is not None), None]:
             solution, own, band = settled(problem, beginning, tolerance)
             if own is not None:
                 break

@@ -114,7 +114,8 @@ def storage(problem: Problem, level: Array) -> Array:
 
 def side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
     """q = Q w / (sum w * width) [m2/s] into the west (ny, m), south and north (nx, m) side; w = h^(5/3) or 1, times the
-    spread that an effect gives the inflow; widths along a bend are those of its cells.
+    spread that an effect gives the inflow; widths along a bend are those of its cells. In a hollow whose rim stands r
+    over its bed, w = h^(5/3) min(1, max(h/r - 1, 0)): what stands below the rim flows nowhere.
     """
     (nx, ny), m = problem.shape, problem.members
     fluxes = {"west": np.zeros((ny, m)), "south": np.zeros((nx, m)), "north": np.zeros((nx, m))}
@@ -151,7 +152,13 @@ def inflow_parts(problem: Problem, inflow: InflowSegment, depth: Array) -> Array
 
 def _inflow_weight(inflow: InflowSegment, depth: Array) -> Array:
     """w (cell, m), see `side_fluxes`."""
-    return np.asarray((depth ** (5.0 / 3.0) if inflow.by_conveyance else np.ones_like(depth)) * inflow.spread)
+    if not inflow.by_conveyance:
+        return np.asarray(np.ones_like(depth) * inflow.spread)
+    weight = depth ** (5.0 / 3.0) * inflow.spread
+    if inflow.rim.any():
+        rim = np.where(inflow.rim > 0.0, inflow.rim, np.inf)
+        weight = weight * np.where(inflow.rim > 0.0, np.clip(depth / rim - 1.0, 0.0, 1.0), 1.0)
+    return np.asarray(weight)
 
 
 def _stretch_of(problem: Problem, inflow: InflowSegment, rows: float) -> Array:

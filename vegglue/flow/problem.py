@@ -95,6 +95,8 @@ class InflowSegment:
         Factor on the share of each cell (cell, m) or (cell, 1) [-].
     along
         Through a side: velocity along x over that through the side, the cotangent of the angle of the confluence [-].
+    rim
+        How high the rim of the hollow that a cell lies in stands over its bed (cell, 1), 0 outside of one [m].
     """
 
     side: str
@@ -104,6 +106,7 @@ class InflowSegment:
     by_conveyance: bool = True
     spread: Array = field(default_factory=lambda: np.ones((1, 1)))
     along: float = 0.0
+    rim: Array = field(default_factory=lambda: np.zeros((1, 1)))
 
 
 @dataclass(frozen=True)
@@ -259,7 +262,8 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
             return inflow
         start, stop = max(inflow.start, south), min(inflow.stop, north)
         spread = inflow.spread[start - inflow.start : stop - inflow.start] if len(inflow.spread) > 1 else inflow.spread
-        return replace(inflow, start=start - south, stop=stop - south, spread=spread)
+        rim = inflow.rim[start - inflow.start : stop - inflow.start] if len(inflow.rim) > 1 else inflow.rim
+        return replace(inflow, start=start - south, stop=stop - south, spread=spread, rim=rim)
 
     plants, boundaries, walls = problem.plants, problem.boundaries, problem.walls
     inside = (plants.row >= south) & (plants.row < north)

@@ -11,7 +11,7 @@ from vegglue.arrays import Array
 from vegglue.case.case_effects import Theta, active_effects, value_of
 from vegglue.case.channel_geometry import channel_geometry, expected_depth, patches_present
 from vegglue.case.grid import Grid, cell_stretch, curvature_of
-from vegglue.case.gridded_site import Site, in_experiment
+from vegglue.case.gridded_site import Site, in_experiment, rims
 from vegglue.case.schema import Case, Experiment
 from vegglue.case.zones import centres_within, inflow_cells, refuse_ranges_without_cells
 from vegglue.effects import bed_laws, plant_laws
@@ -129,6 +129,7 @@ def _under_effects(case: Case, site: Site, experiment: str, theta: Theta) -> dic
             by_conveyance=inflow.spread == "conveyance",
             spread=spread[: some.size],
             along=0.0 if inflow.angle is None else 1.0 / float(np.tan(np.radians(inflow.angle))),
+            rim=rims(site, inflow.side, int(some[0]), int(some[-1]) + 1),
         )
         for inflow, some, discharge, spread in zip(
             case.inflows.values(), cells, values.discharge, values.spread, strict=True
