@@ -230,9 +230,9 @@ The tests make each of these faults happen, and then give the same command once 
 ## Faults and their outcome
 
 [Exit codes](commands.md#what-is-kept-and-how-a-command-ends) other than 0 come with one sentence on standard error: the
-file, what is wrong, and the command that mends it. Wherever a command can go on, its numbers have the bits of a run
-that nothing disturbed. The ensemble here has four chunks of members; the last column counts those that the command and
-the next `simulate` solve together.
+file, what is wrong, and the command that mends it. If a command can go on, its numbers have the bits of an undisturbed
+run. The ensemble here has four chunks of members; the last column counts those that the command and the next `simulate`
+solve together.
 
 {rows}
 
@@ -247,44 +247,41 @@ kept.
 
 ## How it is done
 
-- A file appears under its name only when it is whole and on the disk. It grows beside that place, with `.new` at its
-  end.
-- Whole results end with a line with the SHA-256 of all bytes before it, which other readers of HDF5 ignore.
-- Every result is read by a separate process first, and compared with the shapes and types that it must have: the HDF5
-  library reads some damaged files without end.
-- An ensemble is written by one process at a time, by a lock of the operating system. Diagnosis, posterior and page are
-  put in place whole: of two writers the later one stays. Locks of some network disks reach one machine only; the first
-  of two runs then stops with a message, and the second is whole.
-- Members are kept chunk by chunk in `ensemble.h5.part`, each chunk with a checksum. The next run takes over the chunks
+- A file appears under its name only when it is whole and on the disk; it grows beside that place, with `.new` at its end.
+- Whole results end with the SHA-256 of all bytes before it, which other readers of HDF5 ignore. A separate process reads
+  every result first and compares shapes and types, as the HDF5 library reads some damaged files without end.
+- Members are kept chunk by chunk in `ensemble.h5.part`, each chunk with a checksum; the next run takes over the chunks
   whose checksum is right.
-- Results hold no links and no data in other files; a file with any is refused, and a link in the folder of a run is
-  replaced, not followed.
-- Configs that `import`, `extend` and `twin` write end with checksums of what was written: files that you edited are
-  replaced with `--force` only.
+- An ensemble is written by one process at a time, by a lock of the operating system. Of two writers of a diagnosis, a
+  posterior or a page the later one stays. Locks of some network disks reach one machine only; the first of two runs then
+  stops with a message, and the second is whole.
+- A file with links or with data in other files is refused; a link in the folder of a run is replaced, not followed.
+- Configs that `import`, `extend` and `twin` write end with checksums: files that you edited are replaced with `--force`
+  only.
 
 ## What other people's files hold
 
 Such a file is read, and `import` counts what it leaves out; or it is refused with exit code 2, and nothing is written.
-Tests are in `tests/importers/` if no folder is given.
+Tests are in `tests/importers/`, `tests/inference/test_command_doubts.py` and `tests/workflow/test_export.py`.
 
-| kind | what is done | test |
-|---|---|---|
-| any field marked as missing, in every format | read as without its row or cell, or refused | `test_any_field_missing.py` |
-| lost bottom track, ranges or ensembles of a boat | the ensemble has no place and is left out; a leap of the boat is refused | `test_marks_of_no_value.py` |
-| raw ensembles with a wrong check sum or size, or cut short; cells of two sizes; a lost beam of four | the ensemble alone is left out; each cell keeps its place; three beams do if the file allows it | `test_any_field_missing.py` |
-| velocities against the boat (reference NONE) | refused | `test_marks_of_no_value.py` |
-| edges of gaugings; verticals without method, samples or time | left out | `test_marks_of_no_value.py` |
-| a velocity of 0 between moving neighbours | refused until `missing` decides | `test_marks_of_no_value.py` |
-| -999, zeros or constants as predictions of a command | failed members; refused if none is left, or if no parameter has an effect | `tests/inference/test_command_doubts.py` |
-| another system, datum or unit of a map; scale and offset of a raster | refused; applied | `test_maps.py` |
-| undeclared fill values in a raster | no level there | `test_maps.py`, `test_any_field_missing.py` |
-| rows of means and totals, flagged or hidden rows, a second copy | left out; a copy is refused | `test_marks_of_no_value.py` |
-| words of gauging offices (Ice, Eqp), a row of types, -999999, 3.7D-01 | no value; read | `test_marks_of_no_value.py` |
-| marks in flows of the site file, stems and corners | refused | `test_any_field_missing.py` |
-| damaged MATLAB files, and files that unpack to more than 100 MB | read by a process of its own; refused | `test_files_of_strangers.py` |
-| a mesh for map programs | vectors, system and numbers as GDAL, xugrid and QGIS read them | `tests/workflow/test_export.py` |
-| results beside ArviZ 0.x and 1.x | both open them | `tests/workflow/` |
-| no worker of a cluster lives for 30 s | code 3; finished chunks are kept | `tests/test_cluster.py` |
+| kind | what is done |
+|---|---|
+| any field marked as missing, in every format | read as without its row or cell, or refused |
+| lost bottom track, ranges or ensembles of a boat | the ensemble has no place and is left out; a leap of the boat is refused |
+| raw ensembles with a wrong check sum or size, or cut short; cells of two sizes; a lost beam of four | the ensemble alone is left out; each cell keeps its place; three beams do if the file allows it |
+| velocities against the boat (reference NONE) | refused |
+| edges of gaugings; verticals without method, samples or time | left out |
+| a velocity of 0 between moving neighbours | refused until `missing` decides |
+| -999, zeros or constants as predictions of a command | failed members; refused if none is left, or if no parameter has an effect |
+| another system, datum or unit of a map; scale and offset of a raster | refused; applied |
+| undeclared fill values in a raster | no level there |
+| rows of means and totals, flagged or hidden rows, a second copy | left out; a copy is refused |
+| words of gauging offices (Ice, Eqp), a row of types, -999999, 3.7D-01 | no value; read |
+| marks in flows of the site file, stems and corners | refused |
+| damaged MATLAB files, and files that unpack to more than 100 MB | read by a process of its own; refused |
+| a mesh for map programs | vectors, system and numbers as GDAL, xugrid and QGIS read them |
+| results beside ArviZ 0.x and 1.x | both open them |
+| no worker of a cluster lives for 30 s | code 3; finished chunks are kept |
 
 ## Following a run
 
