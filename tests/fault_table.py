@@ -281,7 +281,7 @@ Tests are in `tests/importers/`, `tests/inference/test_command_doubts.py` and `t
 | damaged MATLAB files, and files that unpack to more than 100 MB | read by a process of its own; refused |
 | a mesh for map programs | vectors, system and numbers as GDAL, xugrid and QGIS read them |
 | results beside ArviZ 0.x and 1.x | both open them |
-| no worker of a cluster lives for 30 s | code 3; finished chunks are kept |
+| no worker of a cluster lives for 30 s | code 2; finished chunks are kept |
 
 ## Following a run
 
