@@ -19,7 +19,7 @@ from vegglue.compilation import compiled_exactly
 # need more memory, by which a step is bound.
 MEMORY_DEPTH = 6
 # One of so many columns [-] counts in the least squares. With one of four it takes 1 to 4 % more steps
-# than with all, each of which reads a third less memory (DECISIONS).
+# than with all, each of which reads a third less memory.
 SPARSE = 4
 
 

@@ -38,7 +38,7 @@ from vegglue.flow.wet_band import overflows, rows_inside, walled
 CLUSTER_SIZE = 64
 # Members solved side by side: 3 to 5 % more of them a second than with 16; with 32 no more.
 MEMBER_SLOTS = 24
-# Steps after which a member waits for a nearer reference: of an ensemble of 5,000 members 42 take more (DECISIONS).
+# Steps after which a member waits for a nearer reference: of an ensemble of 5,000 members 42 take more.
 MOST_CHORD_STEPS = 30
 # How far tangents reach, in coordinates [-]: on the way to four chunks Newton had to help twice with 0.3, once with
 # 0.2, and not with 0.14, which takes more strides.

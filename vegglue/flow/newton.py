@@ -17,7 +17,7 @@ from vegglue.flow.problem import LEVEL, Problem
 from vegglue.flow.thin_water import eased, slope_of_friction
 
 # Near enough [m, m/s] for chord steps to do the rest, and for neighbours to use factors made there: chosen, not
-# measured. Factors made 0.3 m/s away from the root led 60 of 63 members of one cluster astray (DECISIONS).
+# measured. Factors made 0.3 m/s away from the root led 60 of 63 members of one cluster astray.
 CLOSE = 2e-2
 # By how much the pseudo-time step grows after a correction below so much [m, m/s], the nearest first, and its longest
 # [s]. Chosen, not measured: faster growth saves factorisations where the root is near, and throws a member off where it

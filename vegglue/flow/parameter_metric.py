@@ -51,7 +51,7 @@ def principal_axes(slopes: Sequence[tuple[Array, ...]], parameters: int) -> Arra
     """A (d, d), the principal axes of G = sum S'S, S the tangents d state/ds of one flow or more; each as long as the
     square root of the change along it, the longest one.
 
-    Along axes as long as the change itself members take more steps (DECISIONS). Rounded, so that clusters cut with them
+    Along axes as long as the change itself members take more steps. Rounded, so that clusters cut with them
     are the same on another machine. The unit cube without tangents.
     """
     gram = np.zeros((parameters, parameters))

@@ -45,7 +45,7 @@ from vegglue.wording.sentences import sentence
 # fewer first members from afar. No key of a config: with other chunks members have other neighbours, and last digits.
 LARGEST_CHUNK, FEWEST_CHUNKS = 256, 4
 # Members [-] up to which each is solved on coarser cells first. Of 256 on 9,600 cells that takes 70 % of the time that
-# neighbours alone take (DECISIONS); more were not tried. Chunks then hold half of the members, and at most
+# neighbours alone take; more were not tried. Chunks then hold half of the members, and at most
 # SPARSE_CHUNK, or twice as many if several experiments share the cores: larger ones share more, or leave cores idle.
 SPARSE_MEMBERS, SPARSE_CHUNK = 256, 64
 # Members read by the sensors at once [-], so that their fields stay small. No number depends on it.
