@@ -176,8 +176,8 @@ rates below hold under the conditions below and under no others.
 
 ## Protocol
 
-- **The truth** is computed by a second solver (`tests/studies/second_solver.py`): explicit finite volumes with their own
-  grid, waterline and closures, coded from the same formulas, without any code of vegglue.
+- **The truth** is computed by a second solver (`tests/studies/second_solver.py`): explicit finite volumes with a
+  grid, a waterline and closures of their own, coded from the same formulas, without any code of vegglue.
 - **Two cases.** The small channel: 32 m, two patches, 93 stations (`configs/twin.yaml`), {twin} sets. The field
   campaign: 100 m, seven patches, 270 stations (`configs/campaign.yaml`), {campaign} sets. Standard errors are 1 cm/s
   for velocities and 3 mm for levels. Cells of the truth are 0.25 m x 0.125 m, those of the model 0.5 m x 0.1875 m.
@@ -218,14 +218,14 @@ Clopper and Pearson), in at least 20 sets. All {sets} sets:
   of these sets. Only the lines "not inspected" are free of that, and only for objects.
 - **Several states of the code.** Sets that a later change could affect were diagnosed again, as far as time allowed;
   what `extend --auto` keeps is counted by an earlier rule in all but 170 sets. `make blind` computes what is missing.
-- **Dependent sets.** True parameters lie at eight places of the prior. `own equations` in the figures ({own} sets) take
-  the model's own equations as truth, on an exact site, and are an easier test.
+- **Dependent sets.** True parameters lie at eight places of the prior. `own equations` in the figures ({own} sets) have
+  the model's own equations as truth: an easier test.
 - **Few sets** of a campaign with something hidden, of pairs and of bad readings; none with water that enters at a
   place, none with the side of a patch within a cell. Laws have [their own study](discover.md#how-often-it-is-right).
 {kept}
 {data_limits}
 {left_out}
-- **Natural reaches have no rates yet** but eight [single sets](diagnosis.md#how-it-does-on-other-data) and 17 blind ones of
-  six reaches (`tests/studies/natural.py`, seeds 201 to 209, 6 s.e.): nothing hidden, four of six silent, two name a
-  discharge stated 1 % off or more; listed, five of six named, all named or listed; unlisted, five of five; one wrong name.
+- **Natural reaches** have no rates yet, only eight [single sets](diagnosis.md#how-it-does-on-other-data) and 17 blind
+  ones of six reaches (`tests/studies/natural.py`, 6 s.e.): nothing hidden, four of six silent, two name a discharge
+  stated 1 % off or more; listed, five of six named, all named or listed; unlisted, five of five; one wrong name.
 """
