@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from small_case import SMALL
 
+from vegglue.calibration.candidates import effect_entry
+from vegglue.calibration.detection import information
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Planned
@@ -15,6 +17,8 @@ from vegglue.diagnosis.first_competition import NAMED_AT
 from vegglue.diagnosis.plan import USUAL_ALARM, _after_survey, plan_measurements, shown_by
 from vegglue.diagnosis.plan_model import (
     PlanModel,
+    bending_of,
+    errors_at,
     plan_model,
     planned_pieces,
     possible_pieces,
@@ -23,7 +27,7 @@ from vegglue.diagnosis.plan_model import (
     with_chosen,
 )
 from vegglue.diagnosis.plan_search import plan_search
-from vegglue.engine.interface import Model
+from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError
 from vegglue.plain_json import plain
 from vegglue.results.plan import EffectsInGeneral, FieldPlan, PlannedPiece, Work, hours_of, plan_json
@@ -165,6 +169,30 @@ def test_sections_beside_a_decimetre_are_measured_together_in_another_flow(model
     search = plan_search(wide, EffectsInGeneral(1), planned, USUAL_ALARM, frozenset(table["experiment"]), none)
     together = [[wide.pieces[j].x for j in move] for move in search.moves(()) if len(move) > 1]
     assert [9.0, 12.0, 16.0] in together
+
+
+def test_a_trace_of_half_a_size_is_as_long_as_the_flow_with_it_says(wide: PlanModel) -> None:
+    """Twice the viscosity does not change a flow twice as much: it is predicted at half a plausible size, where it was
+    not computed. Effects on the bed are predicted to first order.
+    """
+    bending, draw = bending_of(wide), wide.draws[1]
+    names = [one.name for one in wide.candidates]
+    assert bending[names.index("floor_level_error")] == 0.0
+    assert (bending >= 0.0).all()
+    rows = np.arange(len(wide.known))
+    variance, nuisances = errors_at(wide, draw, wide.known)
+    for name in ("mixing_length", "elder", "bank_vegetation"):
+        one = wide.candidates[j := names.index(name)]
+        value = one.amplitude.off + 0.5 * one.amplitude.scale
+        entry = effect_entry(one, value, one.settings()[len(one.settings()) // 2])
+        case = draw.model.case.model_copy(update={"effects": {**draw.model.case.effects, one.key: entry}})
+        point = linearise(replace(draw.model, case=case), draw.point.z, draw.point)
+        assert point is not None
+        first_order = draw.values[wide.known, j] * one.amplitude.gain(value)
+        change = (point.prediction - draw.point.prediction)[wide.known]
+        linear, length = information(variance, nuisances, np.column_stack([first_order, change]), rows).lengths()
+        assert length < 0.97 * linear
+        assert linear / (1.0 + bending[j] * 0.5**one.amplitude.power) == pytest.approx(length, rel=0.12)
 
 
 def test_a_line_of_bed_levels_makes_errors_smaller_as_conditioning_does(wide: PlanModel) -> None:

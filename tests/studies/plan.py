@@ -251,6 +251,7 @@ def main() -> None:
     parser.add_argument("site", help="channel, reach, flume, or a config")
     parser.add_argument("--solver", choices=("own", "second"), default="own")
     parser.add_argument("--sets", type=int, default=60)
+    parser.add_argument("--first", type=int, default=0, help="number of the first set")
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--folder", type=Path, default=ROOT / "data/plan")
     parser.add_argument("--runs", type=Path, default=ROOT / "runs/plan")
@@ -264,7 +265,8 @@ def main() -> None:
     path = given.folder / f"{Path(given.site).stem}-{given.solver}.jsonl"
     path.parent.mkdir(parents=True, exist_ok=True)
     records = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    left = [number for number in range(given.sets) if number not in {one["set"] for one in records}]
+    wanted, made = range(given.first, given.first + given.sets), {one["set"] for one in records}
+    left = [number for number in wanted if number not in made]
     if left and not given.figures:
         given.runs.mkdir(parents=True, exist_ok=True)
         model, truth, possible = site_of(given.site, given.runs)

@@ -49,6 +49,7 @@ from vegglue.decision_constants import constants
 from vegglue.diagnosis.first_competition import NAMED_AT, chances_named, first_competition
 from vegglue.diagnosis.plan_model import (
     PlanModel,
+    bending_of,
     plan_model,
     planned_pieces,
     possible_pieces,
@@ -283,6 +284,7 @@ def _effects(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedEffect, ...]:
     kind, prints = shown.kinds[0], shown.fingerprints
     cosines = np.abs(kind.projected.units.T @ kind.projected.units)
     best = [int(own[np.argmax(kind.size[own])]) for own in prints.columns]
+    bending = bending_of(wide)
     quantiles = ndtri((np.arange(SIZES_OF_PRIOR) + 0.5) / SIZES_OF_PRIOR / 2.0 + 0.5)
 
     def effect(j: int) -> PlannedEffect:
@@ -291,7 +293,9 @@ def _effects(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedEffect, ...]:
 
         def chances(size: float) -> Array:
             """That a size is named, of each draw."""
-            length = size**amplitude.power * shown.lengths[j][:, None] * relative
+            gain = size**amplitude.power
+            bent = 1.0 + bending[j] * gain / amplitude.plausible_gain
+            length = gain / bent * shown.lengths[j][:, None] * relative
             return np.asarray(np.interp(length, NAMED_AT, shown.named[j]).mean(axis=0))
 
         sizes = amplitude.furthest * np.geomspace(1e-4, 1.0, SIZES_TRIED)

@@ -16,6 +16,7 @@ from vegglue.calibration.candidates import (
     Candidate,
     candidates_of,
     cause_of,
+    effect_entry,
 )
 from vegglue.calibration.detection import information, own_and_shared
 from vegglue.calibration.model_error import (
@@ -54,6 +55,9 @@ from vegglue.results.plan_files import KIND_OF_WORK
 DRAWS_AROUND = 8
 # Ratio of lengths above which it is not the trace that is longer, but the coarsest cells that are too coarse [-].
 LARGEST_LENGTH_RATIO = 10.0
+# Stages whose effects leave shorter traces than to first order: 0.2 to 0.95 of them at a plausible size in the channel
+# and the reach of docs/plan.md; at the others both signs together leave 0.97 to 1.08 of them.
+BENDING_STAGES = ("plants", "resistance", "exchange", "force")
 # Shapes between its settings at which an effect is thought to be, for each that has any.
 SETTINGS_BETWEEN = 3
 # Other discharges that are thought of, relative to the lowest one of the case; above the highest one HIGHER.
@@ -91,7 +95,7 @@ class PlanModel:
     fingerprints of every setting of the candidates, by column: `columns`; between: more of each candidate with shapes,
     drawn between its settings as nature does (N, b), and the candidate of each (b,). draws: the middle of the priors on
     the cells of the search, with every flow that is or could be measured; then the middle and places around it on the
-    coarsest cells.
+    coarsest cells. at_plausible_size (N, c, 2), see `bending_of`.
     """
 
     case: Case
@@ -106,6 +110,7 @@ class PlanModel:
     between: Array
     between_of: np.ndarray
     draws: tuple[PlanDraw, ...]
+    at_plausible_size: Array
 
     @property
     def model(self) -> Model:
@@ -360,15 +365,9 @@ def _plan_model(
     # Flows that the case does not have have the usual grid error.
     difference = np.zeros(len(here.station))
     if other is not None:
-        kept = list[Array]()
-
-        def without_slopes(prediction: Array) -> bool:
-            kept.append(prediction)
-            return False
-
-        linearise(in_own_flows(other), middle, start if search is on_coarse else None, without_slopes)
-        if kept:
-            difference = kept[0] - start.prediction  # its sign is of no matter
+        there = _prediction(in_own_flows(other), middle, start if search is on_coarse else None)
+        if there is not None:
+            difference = there - start.prediction  # its sign is of no matter
             kind = here.station["kind"].to_numpy()
             for name in np.unique(kind):
                 known_there = difference[(kind == name) & np.isfinite(difference)]
@@ -396,6 +395,8 @@ def _plan_model(
         return None if point is None else draw(coarsest, point)
 
     near = [] if below is None else in_threads(drawn, [(z,) for z in (middle, *around)])
+    drawn_there = [one for one in near if one is not None]
+    unknown = np.full((error.size, len(candidates), 2), np.nan)
     return PlanModel(
         case=model.case,
         known=np.arange(len(stations)),
@@ -408,7 +409,8 @@ def _plan_model(
         values=every[:, : len(settings)],
         between=every[:, len(settings) :],
         between_of=np.array([j for j, _ in between], dtype=int),
-        draws=(draw(search, start, every[:, one_each]), *(one for one in near if one is not None)),
+        draws=(draw(search, start, every[:, one_each]), *drawn_there),
+        at_plausible_size=_at_plausible_size(drawn_there[0], candidates) if drawn_there else unknown,
     )
 
 
@@ -438,6 +440,67 @@ def relative_lengths(wide: PlanModel) -> Array:
     ratio = np.array(around) / np.maximum(middle, 1e-300)
     # What leaves next to no trace has no ratio.
     return np.where(middle > 1e-9, np.clip(ratio, 1.0 / LARGEST_LENGTH_RATIO, LARGEST_LENGTH_RATIO), 1.0)
+
+
+def _prediction(model: Model, z: Array, near: Point | None) -> Array | None:
+    """f(z) without slopes; None if no flow is found."""
+    kept = list[Array]()
+
+    def without_slopes(prediction: Array) -> bool:
+        kept.append(prediction)
+        return False
+
+    linearise(model, z, near, without_slopes)
+    return kept[0] if kept else None
+
+
+def _at_plausible_size(draw: PlanDraw, candidates: Sequence[Candidate]) -> Array:
+    """Changes of all rows by each candidate at a plausible size, up and down (N, c, 2), NaN where there is no flow, the
+    size is not possible, or the stage is none of BENDING_STAGES.
+    """
+    case = draw.model.case
+
+    def change(one: Candidate, sign: float) -> Array | None:
+        amplitude = one.amplitude
+        value = amplitude.off + sign * min(amplitude.scale, amplitude.furthest)
+        if one.effect.stage not in BENDING_STAGES or not amplitude.low <= value <= amplitude.high:
+            return None
+        entry = effect_entry(one, value, one.settings()[len(one.settings()) // 2])
+        there = case.model_copy(update={"effects": {**case.effects, one.key: entry}})
+        found = _prediction(replace(draw.model, case=there), draw.point.z, draw.point)
+        return None if found is None else np.nan_to_num(found - draw.point.prediction)
+
+    found = np.full((len(draw.values), len(candidates), 2), np.nan)
+    wanted = [(one, sign) for one in candidates for sign in (1.0, -1.0)]
+    for k, values in enumerate(in_threads(change, wanted)):
+        if values is not None:
+            found[:, k // 2, k % 2] = np.concatenate([values, np.zeros(len(found) - values.size)])
+    return found
+
+
+def bending_of(wide: PlanModel) -> Array:
+    """b >= 0 of each candidate (c,): how much shorter its trace is than to first order, the longer it is.
+
+        |S(g)| = |S'| |g| / (1 + b |g| / g_p)
+
+    g_p is the gain of a plausible size, S' the fingerprint. b is that of the flow with the effect at that size, the
+    mean of both signs, on the coarsest cells in the middle of the priors, at the stations of the plan, or at all that
+    are possible if it has none; 0 where no flow is known, or where the trace is longer.
+    """
+    if len(wide.draws) < 2:
+        return np.zeros(len(wide.candidates))
+    draw, rows = wide.draws[1], np.concatenate([wide.known, wide.surveyed])
+    if not rows.size:
+        rows = np.unique(np.concatenate(wide.rows))
+    variance, nuisances = errors_at(wide, draw, rows)
+    amplitudes = [one.amplitude for one in wide.candidates]
+    gains = np.array([min(one.scale, one.furthest) ** one.power for one in amplitudes])
+    traces = np.hstack([draw.values * gains, *np.moveaxis(np.nan_to_num(wide.at_plausible_size), 2, 0)])
+    lengths = information(variance, nuisances, traces[rows], np.arange(rows.size)).lengths()
+    first_order, *whole = lengths.reshape(3, -1)
+    known = np.isfinite(wide.at_plausible_size[0])
+    mean = np.sum(whole, axis=0) / np.maximum(known.sum(axis=1), 1)
+    return np.where(mean > 0.0, np.maximum(first_order / np.maximum(mean, 1e-300) - 1.0, 0.0), 0.0)
 
 
 def places_of_draws(parameters: int) -> Array:
@@ -484,6 +547,7 @@ def with_chosen(wide: PlanModel, chosen: Sequence[int]) -> PlanModel:
     kept = [before[one.name] for one in candidates if one.name in before]
     settings = [(one, shapes) for one in new for shapes in one.settings()]
     count = wide.error.size - len(station)
+    unknown = np.full((wide.error.size, len(new), 2), np.nan)  # effects of sections change readings alone
 
     def with_new(draw: PlanDraw) -> PlanDraw:
         first = [(one, one.settings()[0]) for one in new]
@@ -506,6 +570,7 @@ def with_chosen(wide: PlanModel, chosen: Sequence[int]) -> PlanModel:
         values=np.hstack([wide.values[:, columns], values]),
         between_of=np.array([kept.index(j) for j in wide.between_of], dtype=int),
         draws=draws,
+        at_plausible_size=np.concatenate([wide.at_plausible_size[:, kept], unknown], axis=1),
     )
 
 

@@ -23,7 +23,7 @@ from vegglue.calibration.residual_screening import GROUPS
 from vegglue.case.schema import (
     Planned,
 )
-from vegglue.diagnosis.plan_model import DRAWS_AROUND, PlanModel, errors_at, place_along
+from vegglue.diagnosis.plan_model import DRAWS_AROUND, PlanModel, bending_of, errors_at, place_along
 from vegglue.effects.definition import Amplitude
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.measurements.observations import section_places
@@ -58,7 +58,7 @@ class PlanSearch:
     """What the search for pieces to add knows: the information of the plan and of each piece at each draw, and of the
     effects that the question is about their names and amplitudes; present: flows that are measured in anyhow; another:
     hours of another one; level: of the alarm; beyond: by how much the score of each has to be above that of the alarm
-    to be named [standard errors].
+    to be named [standard errors]; bending (k,), see `bending_of`.
     """
 
     wide: PlanModel
@@ -69,6 +69,7 @@ class PlanSearch:
     names: tuple[str, ...]
     amplitudes: tuple[Amplitude, ...]
     beyond: Array
+    bending: Array
     base: tuple[Information, ...]
     of_pieces: tuple[tuple[Information, ...], ...]
 
@@ -97,7 +98,7 @@ class PlanSearch:
         threshold = self._threshold(size)
         if isinstance(self.question, OneEffect):
             amplitude = self.amplitudes[0]
-            relative = abs(amplitude.gain(self.question.size)) / amplitude.plausible_gain
+            relative = self._bent(np.array([abs(amplitude.gain(self.question.size)) / amplitude.plausible_gain]))
             return float(detection_chance(relative * size, threshold, amplitude.only_sign)[0])
         return float(chance_over_prior(size, threshold).sum())
 
@@ -105,11 +106,15 @@ class PlanSearch:
         prior = np.full(size.size, -np.log(GROUPS * len(self.wide.candidates)))
         return single_threshold(size, prior, self.level) + self.beyond
 
+    def _bent(self, relative: Array) -> Array:
+        """Length of a trace over that at a plausible size, of gains over those of plausible sizes (k,)."""
+        return np.asarray(relative * (1.0 + self.bending) / (1.0 + self.bending * relative))
+
     @cached_property
     def _twice(self) -> Array:
-        """Gain at twice a plausible size, or at the furthest, over that at a plausible one (k,)."""
+        """Length of a trace at twice a plausible size, or at the furthest, over that at a plausible one (k,)."""
         sizes = [min(2.0 * one.scale, one.furthest) / one.scale for one in self.amplitudes]
-        return np.array([size**one.power for size, one in zip(sizes, self.amplitudes, strict=True)])
+        return self._bent(np.array([size**one.power for size, one in zip(sizes, self.amplitudes, strict=True)]))
 
     def worth(self, known: Sequence[Information]) -> float:
         """What is maximised: the answer, and of all effects also the expected number that is named at twice a plausible
@@ -248,7 +253,8 @@ def plan_search(
             names = [one.name for one in wide.candidates if not (one.sections or one.devices)]
     kept = [j for j, one in enumerate(wide.candidates) if one.name in names]
     amplitudes = tuple(wide.candidates[j].amplitude for j in kept)
-    gains = np.array([one.plausible_gain for one in amplitudes])
+    bending = bending_of(wide)[kept]
+    gains = np.array([one.plausible_gain for one in amplitudes]) / (1.0 + bending)
     base, pieces = [], []
     for draw in wide.draws[:: DRAWS_AROUND // 2][:DRAWS_SEARCHED]:
         variance, nuisances = errors_at(wide, draw, np.arange(wide.error.size))
@@ -264,6 +270,7 @@ def plan_search(
         names=tuple(wide.candidates[j].name for j in kept),
         amplitudes=amplitudes,
         beyond=beyond[kept],
+        bending=bending,
         base=tuple(base),
         of_pieces=tuple(pieces),
     )
