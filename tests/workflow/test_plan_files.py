@@ -18,7 +18,7 @@ from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.pages.plan import confusions, days_of_work
-from vegglue.results.plan import FieldPlan
+from vegglue.results.plan import FieldPlan, PlannedPiece, Work
 from vegglue.results.plan_files import field_places, field_stations
 from vegglue.workflow.case_run import CaseRun
 
@@ -136,13 +136,26 @@ def test_an_empty_sheet_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "measured.yaml").exists()
 
 
-def test_days_are_eight_hours_at_most_and_hold_all_work(made: Made) -> None:
+def test_days_are_eight_hours_and_a_half_at_most_and_hold_all_work(made: Made) -> None:
     folder, plan = made
     days = days_of_work(load_case(folder / "small.yaml"), plan, field_places(plan))
     assert len(days) == 2
     assert sum(len(day.work) for day in days) == len(plan.pieces)
-    assert all(day.work[-1].ends <= 8.0 + 1e-9 or len(day.work) == 1 for day in days)
+    assert all(day.work[-1].ends <= 8.5 + 1e-9 or len(day.work) == 1 for day in days)
+    for day in days:
+        x = [one.place.x for one in day.work if one.place.work is not Work.GAUGE]
+        assert x == sorted(x, reverse=True)
     assert days[0].work[0].place.name == "G1"
+
+
+def test_what_a_day_has_no_time_for_does_not_end_it(made: Made) -> None:
+    """Of 3, 3.4, 3.4 and 1 h from downstream the last one is done on the first day: two days instead of three."""
+    folder, plan = made
+    hours = {20.0: 3.0, 15.0: 3.4, 10.0: 3.4, 5.0: 1.0, 2.0: 3.5}
+    pieces = tuple(PlannedPiece(Work.TRANSECT, "low", x, (0.0,), one) for x, one in hours.items())
+    other = replace(plan, pieces=pieces)
+    days = days_of_work(load_case(folder / "small.yaml"), other, field_places(other))
+    assert [[one.place.x for one in day.work] for day in days] == [[20.0, 15.0, 5.0], [10.0, 2.0]]
 
 
 def test_the_page_and_the_object_hold_the_plan(made: Made) -> None:
@@ -171,8 +184,13 @@ def test_the_page_fits_a_phone_and_a_desktop(made: Made, width: int) -> None:
       wide: document.documentElement.scrollWidth,
       rows: document.querySelectorAll("#order ~ div tbody tr").length,
       stations: document.querySelectorAll("#stations ~ details tbody tr").length,
+      maps: [...document.querySelectorAll(".drawing")].map((one) => one.clientWidth > 0),
+      sideways: [...document.querySelectorAll(".drawing, #order ~ .scroll")].some(
+        (one) => one.scrollWidth > one.clientWidth),
     })"""
     found = found_in_page(folder / "runs/small/plan/plan.html", width, script)
     assert found["wide"] <= width
     assert found["rows"] == len(plan.pieces)
+    assert found["maps"] == [width > 640, width <= 640]
+    assert not found["sideways"]
     assert found["stations"] == sum(len(one.y) for one in plan.pieces)

@@ -1,6 +1,6 @@
 """The page of a plan, to take along: the map, the order of the work, stations, and what they would show."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,18 +13,20 @@ from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of
 from vegglue.pages.page import write_page
 from vegglue.pages.style import COLOUR, inline, palette_css
-from vegglue.pages.svg import Scale, linear_scale, round_ticks, svg_document, svg_element, svg_words, tick_labels
+from vegglue.pages.svg import linear_scale, round_ticks, svg_document, svg_element, svg_words, tick_labels
 from vegglue.results.plan import FieldPlan, PlaceChances, PlannedEffect, Work
 from vegglue.results.plan_files import LETTERS, FieldFiles, FieldPlace, field_places
 from vegglue.wording.sentences import page_document, phrase
 
-# The map [px]: its width, letters, and room beside it; its height over its width is between these.
+# The map [px]: its width, letters, and room beside it; its height over its width is between these. Upright, for a
+# phone: its width, its height over its width, and room on the right for names of transects.
 MAP_WIDTH, PLAN_LETTERS, BESIDE, MAP_MARGIN, MAP_FOOT, MAP_HEAD = 960.0, 13.0, 44.0, 18.0, 34.0, 22.0
 FLATTEST, STEEPEST_LABEL = 0.22, 0.5
+UPRIGHT_WIDTH, UPRIGHT_HEIGHT, UPRIGHT_MARGIN = 350.0, 2.0, 34.0
 # Chances are drawn for so many cells along and across at most, in steps of a third.
 MAP_CELLS_ALONG, MAP_CELLS_ACROSS, BED_SHADES = 80, 24, 3
-# Hours of a day in the field, after which the next one begins [h].
-DAY = 8.0
+# Hours of a day in the field, and by how many it may end later rather than leave a piece for a further day [h].
+DAY, LATER = 8.0, 0.5
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ def render_plan(case: Case, site: Site, plan: FieldPlan, files: FieldFiles) -> s
         plan=plan,
         files=files,
         map=inline(draw_plan_map(case, site, places, plan.chances_of_places, title), "plan-map", title),
+        upright=inline(draw_plan_map(case, site, places, plan.chances_of_places, title, True), "upright-map", title),
         places=places,
         days=days_of_work(case, plan, places),
         hours_of_day=DAY,
@@ -91,26 +94,26 @@ def confusions(effects: Sequence[PlannedEffect]) -> list[list[str]]:
 
 
 def days_of_work(case: Case, plan: FieldPlan, places: Sequence[FieldPlace]) -> list[DayOfWork]:
-    """The order of the work: flow by flow, gauges first, then from downstream, so that wading disturbs nothing."""
+    """The order of the work: flow by flow, each piece on the first day that has time for it; on a day gauges first,
+    then from downstream, so that wading disturbs nothing.
+    """
     found: list[DayOfWork] = []
     flows = [name for name in dict.fromkeys(one.experiment for one in plan.pieces) if name]
     for flow in [*flows, ""]:
         of_flow = [one for one in plan.pieces if one.experiment == flow]
         order = {Work.GAUGE: 0, Work.DISCHARGE: 1}
-        work: list[WorkInFlow] = []
-        begins = 0.0
+        days: list[list[WorkInFlow]] = []
         for piece in sorted(of_flow, key=lambda one: (order.get(one.work, 2), -one.x)):
             place = next(
                 one for one in places
                 if one.work is piece.work and one.x == piece.x and set(piece.y) <= set(one.y)
             )  # fmt: skip
-            if work and begins + piece.hours > DAY + 1e-9:
-                found.append(_day(case, len(found) + 1, flow, work))
-                work, begins = [], 0.0
+            work = next((one for one in days if one[-1].ends + piece.hours <= DAY + LATER), None)
+            if work is None:
+                days.append(work := [])
+            begins = work[-1].ends if work else 0.0
             work.append(WorkInFlow(place, begins, begins + piece.hours, piece.y))
-            begins += piece.hours
-        if work:
-            found.append(_day(case, len(found) + 1, flow, work))
+        found += [_day(case, len(found) + k, flow, work) for k, work in enumerate(days, 1)]
     return found
 
 
@@ -124,23 +127,39 @@ def _day(case: Case, number: int, flow: str, work: Sequence[WorkInFlow]) -> DayO
 
 
 def draw_plan_map(
-    case: Case, site: Site, places: Sequence[FieldPlace], chances: PlaceChances | None, title: str
+    case: Case,
+    site: Site,
+    places: Sequence[FieldPlace],
+    chances: PlaceChances | None,
+    title: str,
+    upright: bool = False,
 ) -> str:
-    """SVG text: water and plants, where an object would be detected, and all stations; y stretched."""
+    """SVG text: water and plants, where an object would be detected, and all stations; y stretched.
+
+    upright: the flow downwards, for a phone; else to the right.
+    """
     (west, east), (south, north) = case.grid.x, case.grid.y
     depths = [expected_depth(case, in_experiment(site, name), one) for name, one in case.experiments.items()]
     water = np.max(depths, axis=0) > 0.0
     wet = site.grid.y[water.any(axis=0)]
     if wet.size:
         south, north = max(south, float(wet[0]) - site.grid.dy), min(north, float(wet[-1]) + site.grid.dy)
-    inner = MAP_WIDTH - BESIDE - MAP_MARGIN
-    height = float(np.clip((north - south) / (east - west), FLATTEST, STEEPEST_LABEL)) * inner
-    along = linear_scale(west, east, BESIDE, MAP_WIDTH - MAP_MARGIN)
-    across = linear_scale(south, north, MAP_HEAD + height, MAP_HEAD)
+    if upright:
+        foot = MAP_HEAD + UPRIGHT_HEIGHT * UPRIGHT_WIDTH
+        width, along = UPRIGHT_WIDTH, linear_scale(west, east, MAP_HEAD, foot)
+        across = linear_scale(south, north, BESIDE, UPRIGHT_WIDTH - UPRIGHT_MARGIN)
+    else:
+        inner = MAP_WIDTH - BESIDE - MAP_MARGIN
+        foot = MAP_HEAD + float(np.clip((north - south) / (east - west), FLATTEST, STEEPEST_LABEL)) * inner
+        width, along = MAP_WIDTH, linear_scale(west, east, BESIDE, MAP_WIDTH - MAP_MARGIN)
+        across = linear_scale(south, north, foot, MAP_HEAD)
+
+    def at(x: float, y: float) -> tuple[float, float]:
+        a, b = float(along(x)), float(across(y))
+        return (b, a) if upright else (a, b)
 
     def path(x: Iterable[float], y: Iterable[float]) -> str:
-        points = [f"{float(along(a)):.1f},{float(across(b)):.1f}" for a, b in zip(x, y, strict=True)]
-        return f"M{'L'.join(points)}"
+        return "M" + "L".join("{:.1f},{:.1f}".format(*at(a, b)) for a, b in zip(x, y, strict=True))
 
     columns = [k for k in range(site.grid.x.size) if water[k].any()]
     step = max(len(columns) // 200, 1)
@@ -150,41 +169,55 @@ def draw_plan_map(
     x = [float(site.grid.x[k]) for k in columns]
     parts = [svg_element("path", d=path([*x, *x[::-1]], [*low, *high[::-1]]) + "Z", fill=COLOUR["water"])] if x else []
     if chances is not None:
-        parts += _shading(chances, along, across)
+        parts += _shading(chances, path)
     for patch in case.plants.patches:
         corners = corners_of(case, patch)
         outline = path(corners[:, 0], corners[:, 1]) + "Z"
         parts.append(svg_element("path", d=outline, fill=COLOUR["plants"], stroke=COLOUR["stems"]))
+    names = list[str]()
+    halo = {"stroke": COLOUR["paper"], "stroke_width": "3", "paint_order": "stroke", "stroke_linejoin": "round"}
     for place in places:
-        at = float(along(place.x))
-        ends = [float(across(y)) for y in place.y] or [float(across(0.5 * (south + north)))]
-        ink, measured = COLOUR["ink"], COLOUR["measured"]
+        y = place.y or (0.5 * (south + north),)
+        ink, first = COLOUR["ink"], at(place.x, y[0])
         if place.work in (Work.TRANSECT, Work.SURVEY_LINE):
             dashes = {"stroke_dasharray": "4 3"} if place.work is Work.SURVEY_LINE else {}
-            line = f"M{at:.1f},{max(ends):.1f}V{min(ends):.1f}"
+            line = path([place.x, place.x], [y[0], y[-1]])
             parts.append(svg_element("path", d=line, stroke=ink, stroke_width=1, **dashes))
         if place.work in (Work.TRANSECT, Work.POINT):
-            parts += [svg_element("circle", cx=at, cy=y, r=2.4 if len(ends) > 1 else 4, fill=measured) for y in ends]
+            for px, py in (at(place.x, one) for one in y):
+                parts.append(svg_element("circle", cx=px, cy=py, r=2.4 if len(y) > 1 else 4, fill=COLOUR["measured"]))
         elif place.work is Work.GAUGE:
-            parts.append(svg_element("path", d=f"M{at - 6:.1f},{ends[0] - 5:.1f}h12l-6,10z", fill=COLOUR["model"]))
+            d = f"M{first[0] - 6:.1f},{first[1] - 5:.1f}h12l-6,10z"
+            parts.append(svg_element("path", d=d, fill=COLOUR["model"]))
         elif place.work is Work.DISCHARGE:
-            parts.append(svg_element("path", d=f"M{at - 5:.1f},{ends[0] - 5:.1f}h10v10h-10z", fill=COLOUR["model"]))
-        if place.work in (Work.TRANSECT, Work.SURVEY_LINE):
-            parts.append(svg_words(at, MAP_HEAD - 6.0, place.name, text_anchor="middle", font_weight="bold"))
+            d = f"M{first[0] - 5:.1f},{first[1] - 5:.1f}h10v10h-10z"
+            parts.append(svg_element("path", d=d, fill=COLOUR["model"]))
+        if place.work not in (Work.TRANSECT, Work.SURVEY_LINE):
+            names.append(svg_words(first[0] + 7.0, first[1] - 6.0, place.name, "ink", text_anchor="start", **halo))
+        elif upright:
+            right = UPRIGHT_WIDTH - UPRIGHT_MARGIN + 6.0
+            names.append(svg_words(right, first[1] + 4.0, place.name, text_anchor="start", font_weight="bold"))
         else:
-            parts.append(svg_words(at + 7.0, ends[0] - 6.0, place.name, text_anchor="start"))
-    foot = MAP_HEAD + height
-    for tick, words in zip(ticks := round_ticks(west, east, 9), tick_labels(ticks), strict=True):
-        parts.append(svg_element("path", d=f"M{float(along(tick)):.1f},{foot:.1f}v5", stroke=COLOUR["muted"]))
-        parts.append(svg_words(float(along(tick)), foot + 18.0, words, "muted", text_anchor="middle"))
-    for tick, words in zip(ticks := round_ticks(south, north, 5), tick_labels(ticks), strict=True):
-        parts.append(svg_words(BESIDE - 8.0, float(across(tick)) + 4.0, words, "muted", text_anchor="end"))
-    parts.append(svg_words(MAP_WIDTH - MAP_MARGIN, foot + 32.0, phrase("label", "along"), "muted", text_anchor="end"))
-    parts.append(svg_words(0.0, MAP_HEAD - 6.0, phrase("label", "y_in_metres"), "muted"))
-    return svg_document(MAP_WIDTH, foot + MAP_FOOT + 4.0, parts, title, PLAN_LETTERS)
+            above = MAP_HEAD - 6.0
+            names.append(svg_words(first[0], above, place.name, text_anchor="middle", font_weight="bold"))
+    parts += names
+    ticks_along, ticks_across = round_ticks(west, east, 9), round_ticks(south, north, 5)
+    if upright:
+        below, to_the_right, beside, downwards = ticks_across, across, ticks_along, along
+    else:
+        below, to_the_right, beside, downwards = ticks_along, along, ticks_across, across
+    for value, words in zip(below, tick_labels(below), strict=True):
+        parts.append(svg_element("path", d=f"M{float(to_the_right(value)):.1f},{foot:.1f}v5", stroke=COLOUR["muted"]))
+        parts.append(svg_words(float(to_the_right(value)), foot + 18.0, words, "muted", text_anchor="middle"))
+    for value, words in zip(beside, tick_labels(beside), strict=True):
+        parts.append(svg_words(BESIDE - 8.0, float(downwards(value)) + 4.0, words, "muted", text_anchor="end"))
+    foot_words, head_words = ("y_in_metres", "down") if upright else ("along", "y_in_metres")
+    parts.append(svg_words(width - MAP_MARGIN, foot + 32.0, phrase("label", foot_words), "muted", text_anchor="end"))
+    parts.append(svg_words(0.0, MAP_HEAD - 10.0, phrase("label", head_words), "muted"))
+    return svg_document(width, foot + MAP_FOOT + 4.0, parts, title, PLAN_LETTERS)
 
 
-def _shading(chances: PlaceChances, along: Scale, across: Scale) -> list[str]:
+def _shading(chances: PlaceChances, path: Callable[[Iterable[float], Iterable[float]], str]) -> list[str]:
     """Rectangles where an object is likely to be detected, in BED_SHADES steps; bins of equal size."""
     x, y, chance = (np.array(part) for part in (chances.x, chances.y, chances.chance))
     counts = min(np.unique(x).size, MAP_CELLS_ALONG), min(np.unique(y).size, MAP_CELLS_ACROSS)
@@ -197,11 +230,9 @@ def _shading(chances: PlaceChances, along: Scale, across: Scale) -> list[str]:
     mean = sums / np.maximum(number, 1)
     found = []
     for i, j in zip(*np.nonzero(mean >= 1.0 / BED_SHADES), strict=True):
-        left, right = (float(along(edges[0][k])) for k in (i, i + 1))
-        below, above = (float(across(edges[1][k])) for k in (j, j + 1))
+        (left, right), (below, above) = edges[0][[i, i + 1]], edges[1][[j, j + 1]]
         shade = min(int(mean[i, j] * BED_SHADES), BED_SHADES - 1)
-        found.append(
-            svg_element("path", d=f"M{left:.1f},{above:.1f}H{right:.1f}V{below:.1f}H{left:.1f}z",
-                        fill=COLOUR["narrow"], fill_opacity=0.28 * shade + 0.1)
-        )  # fmt: skip
+        corners = path([left, right, right, left], [below, below, above, above]) + "z"
+        opacity = 0.28 * shade + 0.1
+        found.append(svg_element("path", d=corners, fill=COLOUR["narrow"], fill_opacity=opacity))
     return found
