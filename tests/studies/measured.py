@@ -17,6 +17,7 @@ import pandas as pd
 from vegglue.case.config import load_case
 from vegglue.diagnosis.comparison import excluded_by, held_out_rmse, model_score
 from vegglue.importers.terrain import read_geotiff
+from vegglue.results.verdict import Verdict
 from vegglue.workflow.case_run import CaseRun, calibrated
 from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.extend import extend_stepwise
@@ -265,6 +266,69 @@ def jam(stated: bool) -> Callable[[Path, Path], Path]:
     return folder
 
 
+# E. Three sections of the Lower Yuba, a gravel river, waded at 797 cfs: bed and edge of the water by level, velocity
+# and depth by rod. Places are in feet of the state plane; x runs west from E = 2057595 m.
+YUBA, YUBA_SHEET = "examples/yuba/lyr-h20-dpd/measurement-data/LYR-XS-vs-Model.xlsx", "LYR_XS"
+YUBA_SECTIONS, WATERS_EDGE = ("X15", "X16", "X17"), "X"
+
+
+def waded_river(data: Path, to: Path) -> Path:
+    """The folder of the gravel river: rows of three sections, as they stand in the workbook."""
+    shutil.rmtree(to, ignore_errors=True)
+    to.mkdir(parents=True)
+    table = pd.read_excel(data / YUBA, sheet_name=YUBA_SHEET, header=None)
+    place = "section,E [ft],N [ft]"
+    velocity, bed, level, section = [f"{place},V [ft/s]"], [f"{place},Z [ft]"], [f"{place},WSE [ft]"], ""
+    for row in table.iloc[1:].to_numpy().tolist():
+        name, north, east, height, speed = str(row[0]), row[1], row[2], row[7], row[10]
+        section = name.split("_")[0] if name.startswith(WATERS_EDGE) else section
+        if section not in YUBA_SECTIONS:
+            continue
+        bed.append(f"{section},{east},{north},{height}")
+        if name.startswith(WATERS_EDGE):
+            level.append(bed[-1])
+        else:
+            velocity.append(f"{section},{east},{north},{speed}")
+    for name, lines in (("velocities", velocity), ("bed", bed), ("levels", level)):
+        (to / f"{name}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (to / "site.yaml").write_text(
+        "frame: {origin: [2057595, 672690], angle: 180 degrees}\nbed: {file: bed.csv, sections: true}\n"
+        "experiments: {December: {discharge: 797 cfs, level: 195.99 ft}}\n"
+        'files:\n  velocities.csv: {standard_error: 3 cm/s, columns: {x: "E [ft]", y: "N [ft]", u: "V [ft/s]"}}\n'
+        '  levels.csv: {standard_error: 2 cm, columns: {x: "E [ft]", y: "N [ft]", level: "WSE [ft]"}}\n',
+        encoding="utf-8",
+    )
+    return to
+
+
+# F. Wake of a turbine 0.7 m wide in a flume of 18 m by 4 m with 2 m of water at 0.8 m/s: velocities at the height of
+# its axis, at two intensities of turbulence, over its diameter and that speed.
+WAKE = "Data/river/flume_experiment"
+WAKE_FILES = {"quiet": "Mycek_03TI_vel.txt", "turbulent": "Mycek_15TI_vel.txt"}
+
+
+def turbine_wake(data: Path, to: Path) -> Path:
+    """The folder of the flume with a turbine, as a user who knows of none; files as shipped."""
+    shutil.rmtree(to, ignore_errors=True)
+    to.mkdir(parents=True)
+    entries = []
+    for experiment, name in WAKE_FILES.items():
+        shutil.copy(data / WAKE / name, to / name)
+        entries.append(
+            f'  {name}: {{experiment: {experiment}, columns: {{x: Downstream, y: "y*", u: "u*"}}, '
+            "units: {x: 0.7 m, y: 0.7 m, u: 0.8 m/s}, zero: [6, 0], standard_error: 1 cm/s}"
+        )
+    flows = ", ".join(f"{experiment}: {{discharge: 6.4, level: 2.0}}" for experiment in WAKE_FILES)
+    (to / "site.yaml").write_text(
+        "channel: {length_m: 18, bottom_width_m: 4, bed_slope: 0}\nwalls: 0.010\n"
+        "grid: {x: [0, 18], y: [-2, 2], cell: [0.36, 0.1]}\n"
+        f"experiments: {{{flows}}}\nfiles:\n" + "\n".join(entries) + "\n",
+        encoding="utf-8",
+    )
+    return to
+
+
+MEASUREMENTS = "measurements to correct"
 HYDROBAYES = "Felipemendezrios/Hydrobayes @ ecd7947e, d83c12f9, 316ddab5"
 SETS = (
     MeasuredSet(
@@ -281,7 +345,7 @@ SETS = (
         compound_channel(2),
         "a shear layer with large eddies, cells of secondary current (Proust and Nikora 2020)",
         ("coherent_structures",),
-        ("mixing_length", "smagorinsky", "secondary_current", "panel_current"),
+        ("mixing_length", "smagorinsky", "secondary_current", "panel_current", "viscosity as a field"),
     ),
     MeasuredSet(
         "B smooth flume, four discharges",
@@ -289,7 +353,7 @@ SETS = (
         smooth_flume,
         "hydraulically smooth, n falls by some 10 % with Reynolds number (Proust et al. 2022)",
         ("depth_dependent_bed",),
-        (),
+        ("law of the depth",),
     ),
     MeasuredSet(
         "C tidal reach by ADCP",
@@ -313,6 +377,21 @@ SETS = (
         "the jam is not the same over the width: behind it 0.04 to 0.47 m/s side by side (authors' velocities)",
         ("drag at a place", "patch_density", "edge_thinning"),
     ),
+    MeasuredSet(
+        "E three waded sections of a gravel river",
+        f"Ecohydraulics/hydrobayescal @ 9500eae: {YUBA}, sheet {YUBA_SHEET}",
+        waded_river,
+        "depths by rod in X15 and X16 are 0.18 m more than level less bed, in the 15 others -0.07 to 0.01 m; X16 "
+        "and X17 were waded in part (the authors' workbook)",
+        (MEASUREMENTS,),
+    ),
+    MeasuredSet(
+        "F wake of a turbine, not stated",
+        f"browniea/Delft3D_verify @ e7687e4: {WAKE}",
+        turbine_wake,
+        "a turbine 0.7 m wide at x = 6 m, y = 0, thrust coefficient 0.72 (Mycek et al. 2014)",
+        ("drag at a place",),
+    ),
 )
 
 
@@ -328,6 +407,25 @@ class Outcome:
     errors: tuple[float, float, float, float]
 
 
+def judged(verdict: Verdict, one: MeasuredSet) -> str:
+    """Right, partly, wrong or undecided. A field or a law that goes before effects is what is named, not these."""
+    if verdict.doubts_the_data:
+        named, alike = {MEASUREMENTS}, set[str]()
+    elif verdict.kind == "cannot-tell":
+        return "undecided"
+    elif verdict.field is not None:
+        named, alike = {f"{verdict.field.term} as a field"}, set()
+    elif verdict.laws is not None and verdict.kind == "none-of-these":
+        named, alike = {f"law of {law.quantity}" for law in verdict.laws.laws}, set()
+    else:
+        named = {effect.effect for effect in verdict.effects}
+        named |= {f"{place.term} at a place" for place in verdict.places}
+        alike = {name.split("[")[0] for effect in verdict.effects for name in effect.alike}
+    if named & set(one.right):
+        return "right"
+    return "partly" if (named | alike) & {*one.right, *one.nearly} else "wrong"
+
+
 def outcome_of(one: MeasuredSet, data: Path, runs: Path, jobs: int) -> Outcome:
     """Import, diagnose and extend a set."""
     key = one.name.split()[0].lower()
@@ -340,23 +438,18 @@ def outcome_of(one: MeasuredSet, data: Path, runs: Path, jobs: int) -> Outcome:
         model_score(calibrated(CaseRun(load_case(model.source), runs / "runs"), excluded_by()))
         for model in (grown.cases[0], grown.cases[-1])
     )
-    names = {effect.name.split("[")[0] for effect in found.verdict.effects}
-    names |= {f"{place.term} at a place" for place in found.verdict.places}
-    alike = {name.split("[")[0] for effect in found.verdict.effects for name in effect.alike}
-    judged = "right" if names & set(one.right) else "wrong"
-    if judged == "wrong" and (names | alike) & {*one.right, *one.nearly}:
-        judged = "partly"
-    if found.verdict.kind == "cannot-tell":
-        judged = "undecided"
     errors = (
         first.in_sample.rmse["velocity"], last.in_sample.rmse["velocity"], held_out_rmse(first), held_out_rmse(last)
     )  # fmt: skip
-    return Outcome(one.name, one.known, found.verdict.kind, found.verdict.sentence, judged, errors)
+    return Outcome(one.name, one.known, found.verdict.kind, found.verdict.sentence, judged(found.verdict, one), errors)
 
 
 def page(found: list[Outcome]) -> str:
-    """The table of the page."""
+    """The table of the page, how many are right, and what was said."""
+    count = {word: sum(one.judged == word for one in found) for word in ("right", "partly", "undecided", "wrong")}
     lines = [
+        ", ".join(f"{number} {word}" for word, number in count.items()) + ".",
+        "",
         "| set | known | verdict | judged | error before | after | held out before | after |",
         "|---|---|---|---|---:|---:|---:|---:|",
     ]
@@ -375,8 +468,10 @@ def main() -> None:
     ask.add_argument("--only", default="", help="letters of the sets, such as A1,B")
     given = ask.parse_args()
     chosen = [one for one in SETS if not given.only or one.name.split()[0] in given.only.split(",")]
-    found = [outcome_of(one, given.data, given.runs, given.jobs) for one in chosen]
-    print(page(found))
+    found = []
+    for one in chosen:
+        found.append(outcome_of(one, given.data, given.runs, given.jobs))
+        print(page(found[-1:]), flush=True)
     if len(chosen) == len(SETS):
         text = PAGE.read_text(encoding="utf-8")
         before, after = text[: text.index(BEGIN) + len(BEGIN)], text[text.index(END) :]
