@@ -214,6 +214,21 @@ def test_what_the_tutorial_hides_is_found_and_added(willows: tuple[Path, dict[st
 
 
 @pytest.mark.slow
+def test_the_demonstration_goes_the_same_way(willows: tuple[Path, dict[str, list[str]]], tmp_path: Path) -> None:
+    """Its site is that of the tutorial, and what lies in its folder is not computed again."""
+    shutil.copytree(willows[0] / "runs", tmp_path / "tour")
+    results = {path: path.stat().st_mtime_ns for path in (tmp_path / "tour").rglob("*.h5")}
+    quiet, told = (here(tmp_path, "demo", "tour", "--short", "--jobs", "1", mode) for mode in ("--quiet", "--json"))
+    page = (tmp_path / "tour" / "overview.html").resolve()
+    assert (len(quiet.stdout.splitlines()), quiet.stderr, told.stderr) == (1, "", "")
+    assert str(page) in quiet.stdout
+    found = json.loads(told.stdout)
+    assert found["overview"] == str(page)
+    assert (page.is_file(), found["diagnosis"]["set"]) == (True, ["secondary_current"])
+    assert results == {path: path.stat().st_mtime_ns for path in (tmp_path / "tour").rglob("*.h5")} != {}
+
+
+@pytest.mark.slow
 def test_files_of_the_page_are_read_as_shown(tmp_path: Path) -> None:
     """docs/own_files.md: a table of an office, then the bend and the flume of data/samples, a diagnosis each."""
     text = OWN_FILES.read_text(encoding="utf-8")

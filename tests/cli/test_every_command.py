@@ -13,11 +13,12 @@ from vegglue.version import VERSION
 
 # The version is one word, with nothing around it.
 BARE = {"version"}
+# Its loop is that of the tutorial, whose results `test_documents` lets it use again.
+ELSEWHERE = {"demo"}
 NAMES = [name for group in COMMANDS.values() for name in group if name not in BARE]
 # One call of each command in a folder with a brook, in an order in which each finds what it needs; MODE keeps what two
 # passes write apart.
 CALLS: tuple[tuple[str, ...], ...] = (
-    ("demo", "tour", "--short", "--jobs", "1"),
     ("new", "beck-MODE"),
     ("plan", "brook.yaml", "--jobs", "1"),
     ("import", "mill", "--to", "mill-MODE.yaml"),
@@ -48,7 +49,7 @@ experiments: {June: {discharge: 2000 l/s, level: 95 cm}}
 
 
 def test_a_call_of_every_command_is_tried() -> None:
-    assert {call[0] for call in CALLS} == set(NAMES)
+    assert {call[0] for call in CALLS} | ELSEWHERE == set(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
