@@ -55,7 +55,7 @@ LEAST_EIGENVALUE = 1e-9
 LEFT_OUT, MOST_OF_SQUARE_ROOT = 0.01, 400
 # Places of the square root that are taken at once.
 PLACES_AT_ONCE = 16
-# Places whose mean is computed at a time.
+# Places whose correlations and mean are computed at a time.
 PLACES_AT_A_TIME = 5000
 
 
@@ -106,9 +106,13 @@ class Conditional:
 
 def correlation_of_bed(places: Array, others: Array, along: float, across: float, rough: bool) -> Array:
     """M (n, m) [-] between places (n, >= 2) and others (m, >= 2) [m]."""
-    dx, dy = (np.abs(places[:, None, axis] - others[None, :, axis]) for axis in (0, 1))
-    q = np.sqrt(5.0) * (dy / across if rough else np.hypot(dx / along, dy / across))
-    return np.asarray((1.0 + q + q**2 / 3.0) * np.exp(-q - (dx / along if rough else 0.0)))
+    found = np.empty((len(places), len(others)))
+    for first in range(0, len(others), PLACES_AT_A_TIME):
+        some = slice(first, first + PLACES_AT_A_TIME)
+        dx, dy = (np.abs(places[:, None, axis] - others[None, some, axis]) for axis in (0, 1))
+        q = np.sqrt(5.0) * (dy / across if rough else np.hypot(dx / along, dy / across))
+        found[:, some] = (1.0 + q + q**2 / 3.0) * np.exp(-q - (dx / along if rough else 0.0))
+    return found
 
 
 def fitted_covariances(survey: BedSurvey) -> list[CovarianceOfBed]:
