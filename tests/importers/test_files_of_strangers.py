@@ -55,9 +55,7 @@ def test_a_workbook_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
         parse_table(path)
 
 
-def test_a_workbook_with_few_cells_far_to_the_right_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_workbook_with_few_cells_far_to_the_right_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A hundredth of the limit, and of the memory: with all of it the library takes twenty seconds."""
 
     def rows() -> Iterator[bytes]:
