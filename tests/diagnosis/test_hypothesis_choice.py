@@ -9,6 +9,7 @@ from vegglue.diagnosis.competition import (
     Hypothesis,
     What,
     chance_of_a_place,
+    chance_of_any,
     chosen_hypothesis,
     nearly_as_likely,
 )
@@ -58,3 +59,12 @@ def test_chances_of_places_count_together() -> None:
     kinds = ("drag", "effect", "bed", "probe")
     hypotheses = [Hypothesis(kind, kind, 0.0, 0, None) for kind in kinds]
     assert chance_of_a_place(hypotheses, (0.5, 0.2, 0.2, 0.1)) == pytest.approx(0.7)
+
+
+def test_hypotheses_compete_with_nothing_too() -> None:
+    """An alarm of odds of two to one named foliage, a deposit and drag on reaches with nothing hidden."""
+    even = [Hypothesis("effect", "wind", np.log(0.5), 0, None)] * 2
+    none = [Hypothesis("effect", "wind", -9.0, 0, None)]
+    assert chance_of_any(even) == pytest.approx(0.5)
+    assert chance_of_any(none) == pytest.approx(np.exp(-9.0), rel=1e-3)
+    assert chance_of_any([Hypothesis("drag", "drag", np.log(19.0), 0, None), *none]) > 0.95

@@ -23,6 +23,9 @@ place says "none of what is known", which is vague: all places together have to 
 known_first_odds. Which of the places is taken need not be sure: they say the same. A place that nothing rivals within
 strong_odds is taken as it is: nothing is followed beside it.
 
+An alarm names nothing by itself: it is sounded at its rate by errors alone. Only where it is set_chance or more that
+one of the hypotheses is missing, and not nothing, is any taken.
+
 Smooth fields of a term (`field_scan`) are so free that they explain much of whatever is missing. They do not compete
 with a single cause, but with all that was accepted in the end.
 """
@@ -32,7 +35,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 
 from vegglue.arrays import Array
 from vegglue.calibration import score_test
@@ -406,6 +409,11 @@ def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypoth
 def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
     """Chance of each to be what is missing, were it one of them (k,) [-], see the head of this file."""
     return tempered_probabilities(np.array([one.log_evidence for one in hypotheses]))
+
+
+def chance_of_any(hypotheses: Sequence[Hypothesis]) -> float:
+    """The chance that one of them is missing, and not nothing, both as likely before [-]: o / (1 + o), o = sum e^E."""
+    return float(expit(logsumexp([one.log_evidence for one in hypotheses])))
 
 
 def worth_refitting(evidence: Array, best: float) -> list[int]:

@@ -25,6 +25,7 @@ from vegglue.diagnosis.competition import (
     Hypothesis,
     What,
     chance_of_a_place,
+    chance_of_any,
     chances_of,
     chosen_hypothesis,
     hypotheses_of,
@@ -132,7 +133,8 @@ def _with_alarm(screening: Screening, found: SearchState) -> SearchState:
 def _best_branch(
     screening: Screening, hypotheses: Sequence[Hypothesis], found: SearchState, watch: Watch
 ) -> SearchBranch | Undecided:
-    """What is found with the likeliest hypothesis, and the model that follows; undecided when it leads to nothing.
+    """What is found with the likeliest hypothesis, and the model that follows; undecided when it leads to nothing, or
+    where all hypotheses together are not as likely as set_chance asks against nothing.
 
     Those that are nearly as likely are followed one step further, on the case's own grid and with the best that could
     come next, see `competition`.
@@ -152,6 +154,8 @@ def _best_branch(
         before = found.log_prior + found.of_shape
         return log_evidence(one.base) + one.found.log_prior + one.found.of_shape - before + further
 
+    if chance_of_any(hypotheses) < constants().set_chance:
+        return Undecided(tuple(hypotheses), tuple(chances_of(hypotheses)))
     rivals = nearly_as_likely(hypotheses)
     branches = in_threads(branch_with, [(screening, hypotheses, j, found, watch) for j in rivals])
     possible = [(j, one) for j, one in zip(rivals, branches, strict=True) if one is not None]

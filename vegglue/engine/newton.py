@@ -41,7 +41,7 @@ from vegglue.flow.jacobian import (
     with_kept_shares,
 )
 from vegglue.flow.local_changes import Term, with_changed_term
-from vegglue.flow.march import fall_back
+from vegglue.flow.march import fall_back, march_to_rest
 from vegglue.flow.newton import CLOSE
 from vegglue.flow.problem import EMPTY, Problem, crop
 from vegglue.flow.problem_setup import build_problem, with_effects_of
@@ -173,7 +173,17 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
             if own is not None:
                 break
         else:
-            return None
+            # A fit tries another place instead; where one begins, the flow is worth a march.
+            if before is not None and before.state.shape[0] == problem.shape[0] and before.rows == problem.shape[1]:
+                return None
+            numerics = model.case.numerics
+            how = fall_back(numerics.march_step, numerics.march_span)
+            marched = march_to_rest(problem, backwater(problem), tolerance, how)
+            if not marched.steady:
+                return None
+            band = wet_band(problem, marched.state)
+            part, state = crop(problem, *band), rows_inside(marched.state, band)
+            solution, own = replace(solution, state=state), factors(part, state)
         flow = SteadyFlow(solution.state, band, problem.shape[1], own, EMPTY, 0.0)
     return flow, _read(model, experiment, problem, flow.state, flow.band)[0]
 
