@@ -23,6 +23,7 @@ STUDIES = Path(__file__).parent
         "laws",
         "law_alarms",
         "natural",
+        "peer",
         "scale",
         "sensitivity",
         "loop",
