@@ -14,7 +14,7 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Planned
 from vegglue.diagnosis.first_competition import NAMED_AT
-from vegglue.diagnosis.plan import USUAL_ALARM, _after_survey, plan_measurements, shown_by
+from vegglue.diagnosis.plan import _after_survey, needed_evidence, plan_measurements, shown_by
 from vegglue.diagnosis.plan_model import (
     PlanModel,
     bending_of,
@@ -166,7 +166,7 @@ def test_sections_beside_a_decimetre_are_measured_together_in_another_flow(model
     table = table.assign(x=table["x"] + 0.03)
     wide = plan_model(model, planned, table, [], possible_pieces(model, planned, table, []))
     none = np.zeros(len(wide.candidates))
-    search = plan_search(wide, EffectsInGeneral(1), planned, USUAL_ALARM, frozenset(table["experiment"]), none)
+    search = plan_search(wide, EffectsInGeneral(1), planned, needed_evidence(), frozenset(table["experiment"]), none)
     together = [[wide.pieces[j].x for j in move] for move in search.moves(()) if len(move) > 1]
     assert [9.0, 12.0, 16.0] in together
 

@@ -2,8 +2,8 @@
 
 A plan does what a diagnosis does, without measured values. Fingerprints of all candidates, slopes of the parameters and
 the covariance of all errors (instruments, grid, model, site, bed) give the length of each fingerprint after
-calibration. The alarm of the diagnosis gives the threshold, see `calibration/detection`. The flow is not known yet: all
-of it is computed at several draws of the priors and averaged. Effects act to first order.
+calibration. What a diagnosis needs to name anything gives the threshold, see `calibration/detection`. The flow is not
+known yet: all of it is computed at several draws of the priors and averaged. Effects act to first order.
 
 A line of bed levels conditions the error of the bed, a random field with a prior, and changes nothing else.
 """
@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import logit, ndtri
 
 from vegglue.arrays import Array
 from vegglue.calibration.candidates import (
@@ -79,13 +79,17 @@ from vegglue.results.plan import (
 # |cosine| from which another effect is listed as similar [-]: half of the squares of a trace are then the same.
 SIMILAR_FROM = 0.7
 SIMILAR_SHOWN = 3
-# ln of the sum of Bayes factors at which a diagnosis is alarmed, before any measurement says so [-]: between 0.4 and
-# 0.9 on the sites of `configs/`.
-USUAL_ALARM = 0.6
 # Sizes at which a chance is computed, down to 1e-4 of the furthest, and of the prior [-].
 SIZES_TRIED, SIZES_OF_PRIOR = 120, 40
 # Draws of errors alone for the alarm [-]: 50 lie beyond the 95 % point.
 ALARM_DRAWS = 1000
+
+
+def needed_evidence() -> float:
+    """ln of the odds against nothing at which a diagnosis names anything, ln(p/(1 - p)), p = set_chance [-]; alarms are
+    sounded earlier, at 0.4 to 0.9 on the sites of `configs/`.
+    """
+    return float(logit(constants().set_chance))
 
 
 def plan_measurements(
@@ -125,7 +129,7 @@ def plan_measurements(
     proposed = not len(at_hand) and not base
     if proposed:
         watch(Progress("choosing a first set"))
-        search = plan_search(wide, question, planned, USUAL_ALARM, frozenset(), np.zeros(len(wide.candidates)))
+        search = plan_search(wide, question, planned, needed_evidence(), frozenset(), np.zeros(len(wide.candidates)))
         chosen = search.best_set(planned.hours)
         if not chosen:
             raise InputError(
@@ -166,7 +170,7 @@ def plan_measurements(
 @dataclass(frozen=True)
 class ShownByPlan:
     """The hypotheses of a diagnosis in the middle of the priors, without a residual: kinds as in a screening, the first
-    of listed effects; level: of the alarm; cosines with spots (c,) by term, and with slopes (c, p); spread (p,):
+    of listed effects; level: to name anything; cosines with spots (c,) by term, and with slopes (c, p); spread (p,):
     standard errors of z. lengths: of the traces of each effect at the shapes that it may have (t,) [standard errors per
     unit of gain]; named (effect, lengths): chance to be named at each of NAMED_AT; relative (draws, effect): length of
     a trace around the middle of the priors over that in the middle [-].
@@ -186,7 +190,7 @@ class ShownByPlan:
 
     @property
     def beyond(self) -> Array:
-        """By how much the length that is named with even odds is above the score of the alarm (effect,) [standard
+        """By how much the length that is named with even odds is above the score needed (effect,) [standard
         errors]; that of an effect that never is counts as the largest of NAMED_AT.
         """
         even = np.array([_first_at(NAMED_AT, one, 0.5) for one in self.named])
@@ -244,7 +248,7 @@ def shown_by(wide: PlanModel) -> ShownByPlan:
         *kinds_of_instruments(noise, instruments, of_instruments, ()),
     )
     errors = draw_whitened_errors(noise, ALARM_DRAWS, np.random.default_rng(1))
-    level = alarm_level(kinds, errors, 1, constants().false_alarm_rate)
+    level = max(alarm_level(kinds, errors, 1, constants().false_alarm_rate), needed_evidence())
     units = projected.units
     spots: dict[str, Array] = {
         str(term): np.abs(units.T @ one.units).max(axis=1, initial=0.0) for term, one in in_places.items()
