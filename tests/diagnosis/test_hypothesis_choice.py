@@ -9,9 +9,9 @@ from vegglue.diagnosis.competition import (
     Hypothesis,
     What,
     chance_of_a_place,
-    chance_of_any,
     chosen_hypothesis,
     nearly_as_likely,
+    odds_against_nothing,
 )
 
 
@@ -65,6 +65,7 @@ def test_hypotheses_compete_with_nothing_too() -> None:
     """An alarm of odds of two to one named foliage, a deposit and drag on reaches with nothing hidden."""
     even = [Hypothesis("effect", "wind", np.log(0.5), 0, None)] * 2
     none = [Hypothesis("effect", "wind", -9.0, 0, None)]
-    assert chance_of_any(even) == pytest.approx(0.5)
-    assert chance_of_any(none) == pytest.approx(np.exp(-9.0), rel=1e-3)
-    assert chance_of_any([Hypothesis("drag", "drag", np.log(19.0), 0, None), *none]) > 0.95
+    assert odds_against_nothing(even) == pytest.approx(1.0)
+    assert odds_against_nothing(none) == pytest.approx(np.exp(-9.0))
+    strong = [Hypothesis("drag", "drag", np.log(5.0), 0, None), *none]
+    assert odds_against_nothing(strong) > constants().missing_odds > odds_against_nothing(even)

@@ -23,8 +23,8 @@ place says "none of what is known", which is vague: all places together have to 
 known_first_odds. Which of the places is taken need not be sure: they say the same. A place that nothing rivals within
 strong_odds is taken as it is: nothing is followed beside it.
 
-An alarm names nothing by itself: it is sounded at its rate by errors alone. Only where it is set_chance or more that
-one of the hypotheses is missing, and not nothing, is any taken.
+An alarm names nothing by itself: it is sounded at its rate by errors alone. Only where all hypotheses together lead
+nothing by missing_odds is any taken.
 
 Smooth fields of a term (`field_scan`) are so free that they explain much of whatever is missing. They do not compete
 with a single cause, but with all that was accepted in the end.
@@ -35,7 +35,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.special import expit, logsumexp
+from scipy.special import logsumexp
 
 from vegglue.arrays import Array
 from vegglue.calibration import score_test
@@ -411,9 +411,9 @@ def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
     return tempered_probabilities(np.array([one.log_evidence for one in hypotheses]))
 
 
-def chance_of_any(hypotheses: Sequence[Hypothesis]) -> float:
-    """The chance that one of them is missing, and not nothing, both as likely before [-]: o / (1 + o), o = sum e^E."""
-    return float(expit(logsumexp([one.log_evidence for one in hypotheses])))
+def odds_against_nothing(hypotheses: Sequence[Hypothesis]) -> float:
+    """sum of e^E_j: the odds that one of them is missing, and not nothing, both as likely before [-]."""
+    return float(np.exp(min(logsumexp([one.log_evidence for one in hypotheses]), LARGEST_LOG_ODDS)))
 
 
 def worth_refitting(evidence: Array, best: float) -> list[int]:

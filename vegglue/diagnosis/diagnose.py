@@ -25,11 +25,11 @@ from vegglue.diagnosis.competition import (
     Hypothesis,
     What,
     chance_of_a_place,
-    chance_of_any,
     chances_of,
     chosen_hypothesis,
     hypotheses_of,
     nearly_as_likely,
+    odds_against_nothing,
     tempered_probabilities,
 )
 from vegglue.diagnosis.conclusion import NEIGHBOURS_WITHIN, assemble_diagnosis
@@ -134,7 +134,7 @@ def _best_branch(
     screening: Screening, hypotheses: Sequence[Hypothesis], found: SearchState, watch: Watch
 ) -> SearchBranch | Undecided:
     """What is found with the likeliest hypothesis, and the model that follows; undecided when it leads to nothing, or
-    where all hypotheses together are not as likely as set_chance asks against nothing.
+    where all hypotheses together do not lead nothing by missing_odds.
 
     Those that are nearly as likely are followed one step further, on the case's own grid and with the best that could
     come next, see `competition`.
@@ -154,7 +154,7 @@ def _best_branch(
         before = found.log_prior + found.of_shape
         return log_evidence(one.base) + one.found.log_prior + one.found.of_shape - before + further
 
-    if chance_of_any(hypotheses) < constants().set_chance:
+    if odds_against_nothing(hypotheses) < constants().missing_odds:
         return Undecided(tuple(hypotheses), tuple(chances_of(hypotheses)))
     rivals = nearly_as_likely(hypotheses)
     branches = in_threads(branch_with, [(screening, hypotheses, j, found, watch) for j in rivals])

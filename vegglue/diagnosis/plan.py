@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logit, ndtri
+from scipy.special import ndtri
 
 from vegglue.arrays import Array
 from vegglue.calibration.candidates import (
@@ -86,10 +86,10 @@ ALARM_DRAWS = 1000
 
 
 def needed_evidence() -> float:
-    """ln of the odds against nothing at which a diagnosis names anything, ln(p/(1 - p)), p = set_chance [-]; alarms are
-    sounded earlier, at 0.4 to 0.9 on the sites of `configs/`.
+    """ln of the odds against nothing at which a diagnosis names anything [-]; alarms are sounded earlier, at 0.4 to 0.9
+    on the sites of `configs/`.
     """
-    return float(logit(constants().set_chance))
+    return float(np.log(constants().missing_odds))
 
 
 def plan_measurements(
