@@ -125,19 +125,6 @@ def test_an_effect_elsewhere_is_still_a_candidate() -> None:
         assert ("wind" in [one.name for one in candidates_of(case, STATION)]) == proposed
 
 
-def test_what_may_be_off_in_one_experiment_may_be_in_all() -> None:
-    """Two discharges a little too low, as of one rating curve, were water that seeps in, or probes near the surface."""
-    names = {one.name for one in candidates_of(CASE, STATION)}
-    assert {
-        "discharge_error",
-        "outlet_level_error",
-        *(f"discharge_error[{name}]" for name in CASE.experiments),
-    } <= names
-    only, setting = next(iter(CASE.experiments.items()))
-    one_flow = CASE.model_copy(update={"experiments": {only: setting}})
-    assert "discharge_error" not in {one.name for one in candidates_of(one_flow, STATION)}
-
-
 def test_what_cannot_be_is_no_candidate() -> None:
     """Walls are those of a laboratory; without plants, banks or gauges nothing is wrong with them."""
     walls = FrictionClass(law="manning", n=0.01)

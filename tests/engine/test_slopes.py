@@ -54,14 +54,17 @@ def test_a_point_leads_to_one_on_narrower_cells() -> None:
 def test_where_a_point_nearby_leads_nowhere_a_cold_start_finds_the_flow() -> None:
     """There was said to be no flow, and the diagnosis of a river ended."""
     model, z = twin(), np.array([0.3, -0.2, 0.5, 0.1])
-    cold = linearise(model, z)
+    coarse = coarser(model)
+    assert coarse is not None
+    cold, there = linearise(model, z), linearise(coarse, z)
     assert cold is not None
+    assert there is not None
     astray = {}
-    for experiment, flow in cold.flows.items():
+    for experiment, flow in there.flows.items():
         assert isinstance(flow, SteadyFlow)
         noise = np.random.default_rng(4).uniform(-3.0, 3.0, flow.state.shape)
         astray[experiment] = replace(flow, state=flow.state + noise, slopes=np.zeros_like(flow.slopes))
-    found = linearise(model, z, replace(cold, flows=astray))
+    found = linearise(model, z, replace(there, flows=astray))
     assert found is not None
     assert found.prediction == pytest.approx(cold.prediction, abs=1e-6)
 

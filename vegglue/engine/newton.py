@@ -167,14 +167,15 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
             hopeful = True
     if flow is None:
         starts = [warm] if hopeful else [_from_coarser_cells(model, experiment, z, problem), warm]
-        # None, a cold start, comes last: a start nearby may lead nowhere where a cold one leads to the flow.
-        for beginning in [*(one for one in starts if one is not None), None]:
+        tried = [one for one in starts if one is not None]
+        # A fit that finds no flow tries another place; where one begins, the flow is worth a cold start, and a march.
+        begins = before is None or before.state.shape[0] != problem.shape[0] or before.rows != problem.shape[1]
+        for beginning in [*tried, None] if begins else tried:
             solution, own, band = settled(problem, beginning, tolerance)
             if own is not None:
                 break
         else:
-            # A fit tries another place instead; where one begins, the flow is worth a march.
-            if before is not None and before.state.shape[0] == problem.shape[0] and before.rows == problem.shape[1]:
+            if not begins:
                 return None
             numerics = model.case.numerics
             how = fall_back(numerics.march_step, numerics.march_span)
