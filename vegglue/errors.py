@@ -7,9 +7,6 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from vegglue.wording.numbers import shown_path as shown_path
-from vegglue.wording.sentences import macros
-
 # Signs that end a line or steer a terminal; files of strangers may hold them, and sentences quote files.
 _STEERING = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
@@ -36,6 +33,8 @@ class InputError(ValueError):
     def __str__(self) -> str:
         if not self.values:
             return _in_one_line(self.kind)
+        from vegglue.wording.sentences import macros  # which imports this file
+
         shown = {name: _in_one_line(one) if isinstance(one, str) else one for name, one in self.values.items()}
         lines = macros()[self.kind](shown).strip("\n").split("\n")
         return _in_one_line(" ".join(line.strip() for line in lines))
@@ -54,6 +53,14 @@ class StorageError(OSError):
 
     def _render_traceback_(self) -> list[str]:  # IPython shows these lines in place of a traceback
         return [f"{type(self).__name__}: {self}"]
+
+
+def shown_path(path: Path) -> str:
+    """The path as sentences name it: relative to where the user stands; as it is on another drive of Windows."""
+    try:
+        return os.path.relpath(path)
+    except ValueError:
+        return str(path)
 
 
 def path_from(folder: Path, path: Path) -> str:

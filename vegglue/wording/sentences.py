@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
+from vegglue.errors import shown_path
 from vegglue.wording.numbers import (
     MINUS,
     NARROW,
@@ -28,7 +29,6 @@ from vegglue.wording.numbers import (
     range_in_digits,
     section_in_words,
     short,
-    shown_path,
     sized,
     so_many,
     symbol_html,
