@@ -16,28 +16,10 @@ def _in_one_line(sentence: str) -> str:
 
 
 class InputError(ValueError):
-    """Something handed in is wrong: where, what was expected, what came, and what to do.
-
-    Parameters
-    ----------
-    kind : str
-        The macro of `wording/templates/refusals.j2` that words the values; without values the sentence itself.
-    **values : object
-        Numbers in SI, names, rows and paths, kept as `values`.
-    """
-
-    def __init__(self, kind: str, /, **values: object) -> None:
-        super().__init__(kind)
-        self.kind, self.values = kind, values
+    """Something handed in is wrong: where, what was expected, what came, and what to do."""
 
     def __str__(self) -> str:
-        if not self.values:
-            return _in_one_line(self.kind)
-        from vegglue.wording.sentences import macros  # which imports this file
-
-        shown = {name: _in_one_line(one) if isinstance(one, str) else one for name, one in self.values.items()}
-        lines = macros()[self.kind](shown).strip("\n").split("\n")
-        return _in_one_line(" ".join(line.strip() for line in lines))
+        return _in_one_line(super().__str__())
 
     def _render_traceback_(self) -> list[str]:  # IPython shows these lines in place of a traceback
         return [f"{type(self).__name__}: {self}"]

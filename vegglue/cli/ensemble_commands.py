@@ -29,7 +29,6 @@ from vegglue.cli.output import command_line, print_object
 from vegglue.cli.reporting import print_result, progress_reporter
 from vegglue.errors import InputError, shown_path
 from vegglue.wording.commands import DEMO, HELP
-from vegglue.wording.sentences import phrase
 
 
 def check_command(
@@ -81,7 +80,7 @@ def simulate_command(
 
         print_object(object_of(case, runs, ensemble) | {"up_to_date": current})
     elif current:
-        print(phrase("up_to_date", runs / case.name / "ensemble.h5"))
+        print(f"{runs / case.name / 'ensemble.h5'} is up to date.")
     else:
         print_result(case, runs, ensemble, as_object)
     refuse_useless(case, ensemble)

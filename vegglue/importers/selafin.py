@@ -15,7 +15,6 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.model_result import (
     ModelResult,
     bed_level_depth,
@@ -113,13 +112,13 @@ def _result(path: Path, file: BinaryIO, order: str) -> ModelResult:
             "them to VARIABLES FOR GRAPHIC PRINTOUTS."
         )
     bed, level, depth = bed_level_depth(found)
-    notes: list[ImportNote] = []
+    notes: list[str] = []
     if (negative := int((depth < 0.0).sum())) > 0:
-        notes.append(ImportNote(Noted.BELOW_BED, negative))
+        notes.append(f"{negative} negative depths taken as dry")
     if parameters[2] or parameters[3]:
-        notes.append(ImportNote(Noted.OFFSETS, names=tuple(map(str, parameters[2:4]))))
+        notes.append(f"places moved by the offsets {parameters[2]}, {parameters[3]} m of the header")
     if size - begin != frames * frame:
-        notes.append(ImportNote(Noted.CUT_FRAME))
+        notes.append("the last frame is cut off, the one before it is read")
     return model_result(
         "TELEMAC", x, y, bed, level, depth, found["u"], found["v"], roughness=found.get("friction"),
         corners=np.column_stack([x, y]), time=f"{date + ' + ' if date else ''}{seconds:g} s", notes=tuple(notes),

@@ -228,7 +228,6 @@ def _environment(page: bool, folder: str) -> "Environment":
         "sentence": (lambda value: Written(sentence(value), page_sentence(value))) if page else sentence,
         "phrase": (lambda *given: Written(phrase(*given), page_phrase(*given))) if page else phrase,
         "infinity": math.inf,
-        "so_many": so_many,
         "section_at": section_in_words,
         "tag_of": tag_of,
     }
