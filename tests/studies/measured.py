@@ -445,18 +445,17 @@ def outcome_of(one: MeasuredSet, data: Path, runs: Path, jobs: int) -> Outcome:
 
 
 def page(found: list[Outcome]) -> str:
-    """The table of the page, how many are right, and what was said."""
+    """The table of the page, and how many are right."""
     count = {word: sum(one.judged == word for one in found) for word in ("right", "partly", "undecided", "wrong")}
     lines = [
         ", ".join(f"{number} {word}" for word, number in count.items()) + ".",
         "",
-        "| set | known | verdict | judged | error before | after | held out before | after |",
-        "|---|---|---|---|---:|---:|---:|---:|",
+        "| set | verdict | judged | error before | after | held out before | after |",
+        "|---|---|---|---:|---:|---:|---:|",
     ]
     for one in found:
         numbers = " | ".join(f"{value:.4f}" for value in one.errors)
-        lines.append(f"| {one.name} | {one.known} | {one.verdict} | {one.judged} | {numbers} |")
-    lines += ["", *(f"- {one.name}: {one.said}" for one in found)]
+        lines.append(f"| {one.name} | {one.verdict} | {one.judged} | {numbers} |")
     return "\n".join(lines)
 
 
@@ -471,7 +470,7 @@ def main() -> None:
     found = []
     for one in chosen:
         found.append(outcome_of(one, given.data, given.runs, given.jobs))
-        print(page(found[-1:]), flush=True)
+        print(f"{page(found[-1:])}\n{found[-1].known}\n{found[-1].said}", flush=True)
     if len(chosen) == len(SETS):
         text = PAGE.read_text(encoding="utf-8")
         before, after = text[: text.index(BEGIN) + len(BEGIN)], text[text.index(END) :]
