@@ -262,7 +262,7 @@ kept.
 ## What other people's files hold
 
 Such a file is read, and `import` counts what it leaves out; or it is refused with exit code 2, and nothing is written.
-Tests are in `tests/importers/`, `tests/inference/test_command_doubts.py` and `tests/workflow/test_export.py`.
+[How tables are read](own_files.md#how-tables-are-read) has the rules for tables.
 
 | kind | what is done |
 |---|---|
@@ -270,18 +270,11 @@ Tests are in `tests/importers/`, `tests/inference/test_command_doubts.py` and `t
 | lost bottom track, ranges or ensembles of a boat | the ensemble has no place and is left out; a leap of the boat is refused |
 | raw ensembles with a wrong check sum or size, or cut short; cells of two sizes; a lost beam of four | the ensemble alone is left out; each cell keeps its place; three beams do if the file allows it |
 | velocities against the boat (reference NONE) | refused |
-| edges of gaugings; verticals without method, samples or time | left out |
-| a velocity of 0 between moving neighbours | refused until `missing` decides |
 | -999, zeros or constants as predictions of a command | failed members; refused if none is left, or if no parameter has an effect |
 | another system, datum or unit of a map; scale and offset of a raster | refused; applied |
-| undeclared fill values in a raster | no level there |
-| rows of means and totals, flagged or hidden rows, a second copy | left out; a copy is refused |
 | words of gauging offices (Ice, Eqp), a row of types, -999999, 3.7D-01 | no value; read |
 | marks in flows of the site file, stems and corners | refused |
 | damaged MATLAB files, and files that unpack to more than 100 MB | read by a process of its own; refused |
-| a mesh for map programs | vectors, system and numbers as GDAL, xugrid and QGIS read them |
-| results beside ArviZ 0.x and 1.x | both open them |
-| no worker of a cluster lives for 30 s | code 2; finished chunks are kept |
 
 ## Following a run
 
