@@ -22,14 +22,7 @@ from vegglue.calibration.candidates import cause_of
 from vegglue.calibration.fingerprints import Fingerprints, fingerprints_of
 from vegglue.calibration.laws_in_case import LawInCase, law_traces, laws_in_case, products_in_case
 from vegglue.calibration.residual_screening import GROUPS, Screening, kind_of_listed, screen
-from vegglue.calibration.score_test import (
-    HypothesisKind,
-    Projected,
-    alarm_p,
-    cosines,
-    family_of,
-    kind_of_hypotheses,
-)
+from vegglue.calibration.score_test import HypothesisKind, Projected, alarm_p, cosines, family_of, kind_of_hypotheses
 from vegglue.case.channel_geometry import half_width
 from vegglue.decision_constants import constants
 

@@ -32,13 +32,7 @@ from vegglue.inference.statements import (
 )
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL
 from vegglue.measurements.section_discharge import CarriedDischarge
-from vegglue.pages.headline import (
-    Headline,
-    VerdictFit,
-    WhatDataCannotShow,
-    verdict_fit,
-    what_data_cannot_show,
-)
+from vegglue.pages.headline import Headline, VerdictFit, WhatDataCannotShow, verdict_fit, what_data_cannot_show
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.open_questions import Question

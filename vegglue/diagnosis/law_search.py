@@ -20,13 +20,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, baseline
 from vegglue.calibration.candidates import start_with, with_effect
 from vegglue.calibration.fingerprints import Fingerprints
-from vegglue.calibration.law_screening import (
-    LARGEST_GAIN,
-    LawScreening,
-    law_fingerprints,
-    screen_laws,
-    screen_products,
-)
+from vegglue.calibration.law_screening import LARGEST_GAIN, LawScreening, law_fingerprints, screen_laws, screen_products
 from vegglue.calibration.laws_in_case import LawInCase
 from vegglue.calibration.residual_screening import refit_start
 from vegglue.case.parameter_space import theta_at

@@ -15,36 +15,17 @@ import numpy as np
 from scipy.special import ndtri
 
 from vegglue.arrays import Array
-from vegglue.calibration.candidates import (
-    Candidate,
-    instruments_of,
-    offset_columns,
-    plausible_offset,
-)
-from vegglue.calibration.detection import (
-    PLANNED_POWER,
-    detected_length,
-    detection_chance,
-    single_threshold,
-)
+from vegglue.calibration.candidates import Candidate, instruments_of, offset_columns, plausible_offset
+from vegglue.calibration.detection import PLANNED_POWER, detected_length, detection_chance, single_threshold
 from vegglue.calibration.fingerprints import Fingerprints, Places, places_of
 from vegglue.calibration.model_error import EFFECT_AT_PLACE
-from vegglue.calibration.noise import (
-    Noise,
-    draw_whitened_errors,
-    noise_of,
-    with_grid_error,
-    with_model_error,
-)
+from vegglue.calibration.noise import Noise, draw_whitened_errors, noise_of, with_grid_error, with_model_error
 from vegglue.calibration.residual_screening import kind_of_listed, kinds_of_instruments, kinds_of_places
 from vegglue.calibration.score_test import HypothesisKind, Projected, alarm_level, project
 from vegglue.case.case_effects import effect_named
 from vegglue.case.channel_geometry import half_width
 from vegglue.case.parameter_space import refuse_without_parameters, theta_at
-from vegglue.case.schema import (
-    Case,
-    Planned,
-)
+from vegglue.case.schema import Case, Planned
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.first_competition import NAMED_AT, chances_named, first_competition
 from vegglue.diagnosis.plan_model import (

@@ -12,29 +12,12 @@ from scipy.linalg import hadamard
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import FEWEST_CELLS_ACROSS, START_SPREAD
-from vegglue.calibration.candidates import (
-    Candidate,
-    candidates_of,
-    cause_of,
-    effect_entry,
-)
+from vegglue.calibration.candidates import Candidate, candidates_of, cause_of, effect_entry
 from vegglue.calibration.detection import information, own_and_shared
-from vegglue.calibration.model_error import (
-    BED_RADIUS,
-    FRICTION_RADIUS,
-    gaussian_basis,
-    model_error_columns,
-)
+from vegglue.calibration.model_error import BED_RADIUS, FRICTION_RADIUS, gaussian_basis, model_error_columns
 from vegglue.case.channel_geometry import cells_across, expected_depth, half_width
 from vegglue.case.gridded_site import build_site, in_experiment
-from vegglue.case.schema import (
-    Case,
-    Planned,
-    PlannedDischarge,
-    PlannedGauge,
-    PlannedPoint,
-    PlannedTransect,
-)
+from vegglue.case.schema import Case, Planned, PlannedDischarge, PlannedGauge, PlannedPoint, PlannedTransect
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.next_measurement import AS_MEASURED, SECTIONS, with_other_discharges
@@ -44,10 +27,7 @@ from vegglue.errors import InputError
 from vegglue.measurements.kinds import KINDS, STREAMWISE
 from vegglue.measurements.observations import section_places, station_table
 from vegglue.parallel import in_threads
-from vegglue.results.plan import (
-    PlannedPiece,
-    Work,
-)
+from vegglue.results.plan import PlannedPiece, Work
 from vegglue.results.plan_files import KIND_OF_WORK
 
 # Places around the middle of the prior at which lengths of traces are computed, on the coarsest cells [-]: of up to

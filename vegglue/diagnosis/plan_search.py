@@ -20,22 +20,12 @@ from vegglue.calibration.detection import (
     trace_distances,
 )
 from vegglue.calibration.residual_screening import GROUPS
-from vegglue.case.schema import (
-    Planned,
-)
+from vegglue.case.schema import Planned
 from vegglue.diagnosis.plan_model import DRAWS_AROUND, PlanModel, bending_of, errors_at, place_along
 from vegglue.effects.definition import Amplitude
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.measurements.observations import section_places
-from vegglue.results.plan import (
-    EffectsInGeneral,
-    OneEffect,
-    PlanQuestion,
-    ProposedPieces,
-    TwoEffects,
-    Work,
-    hours_of,
-)
+from vegglue.results.plan import EffectsInGeneral, OneEffect, PlanQuestion, ProposedPieces, TwoEffects, Work, hours_of
 
 # Proposals of one kind that are shown, and of all; those that are looked at again in a search, and rounds of exchange.
 OF_A_KIND, ADDITIONS_SHOWN, ADDITIONS_WEIGHED, ADDING_ROUNDS = 2, 8, 12, 2

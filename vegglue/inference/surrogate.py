@@ -38,12 +38,7 @@ from vegglue.engine.corrected import rows_of_stations, with_correction, without_
 from vegglue.engine.interface import Model, linearise, predict
 from vegglue.inference.importance_sampling import LogDensity, Mixture, Sample, sample
 from vegglue.inference.posterior_modes import ModesAndErrors, distinct_modes
-from vegglue.inference.weighted_statistics import (
-    effective_size,
-    root_mean_square,
-    weighted_median,
-    weighted_sd,
-)
+from vegglue.inference.weighted_statistics import effective_size, root_mean_square, weighted_median, weighted_sd
 from vegglue.progress import Watch
 from vegglue.results.posterior import Surrogate
 from vegglue.wording.phases import LEARNING

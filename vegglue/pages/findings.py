@@ -8,13 +8,7 @@ from vegglue.case.channel_geometry import discharges_upstream_of
 from vegglue.errors import shell_line
 from vegglue.flow.status import FAILED, STATUS_WORDS, members_with
 from vegglue.inference.command_ensemble import doubts_of_predictions
-from vegglue.inference.statements import (
-    BandCoverage,
-    NamedParameter,
-    limits_use,
-    parameter_of,
-    posterior_statements,
-)
+from vegglue.inference.statements import BandCoverage, NamedParameter, limits_use, parameter_of, posterior_statements
 from vegglue.measurements.observations import section_place
 from vegglue.measurements.section_discharge import changing_discharge
 from vegglue.pages.parameters import plant_parameter, residual_compared, symbols_of

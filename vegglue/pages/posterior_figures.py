@@ -18,14 +18,7 @@ from vegglue.inference.statements import parameter_of, weight_statements
 from vegglue.inference.weighted_statistics import effective_size, weighted_quantile
 from vegglue.pages.flow_maps import plans
 from vegglue.pages.measured_figures import canopy_profiles, discharges, residuals, verticals
-from vegglue.pages.parameters import (
-    ParameterRow,
-    as_power,
-    parameter_rows,
-    plant_parameter,
-    study_value,
-    symbols_of,
-)
+from vegglue.pages.parameters import ParameterRow, as_power, parameter_rows, plant_parameter, study_value, symbols_of
 from vegglue.pages.run import Run, published_picture
 from vegglue.pages.style import COLOUR, HEIGHT, WIDTH, Picture, canvas, formula_labels, label, styled
 from vegglue.pages.svg import FEWEST_TICKS, round_ticks

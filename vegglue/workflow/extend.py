@@ -39,14 +39,7 @@ from vegglue.results.json_store import comparison_that_fits, write_model_score
 from vegglue.results.result_files import diagnosis_that_fits
 from vegglue.wording.numbers import in_short
 from vegglue.wording.sentences import sentence, tagged
-from vegglue.workflow.case_run import (
-    CaseRun,
-    best_parameters,
-    calibrated,
-    calibrated_anew,
-    case_run,
-    keep_best_fit,
-)
+from vegglue.workflow.case_run import CaseRun, best_parameters, calibrated, calibrated_anew, case_run, keep_best_fit
 from vegglue.workflow.compare import Comparison, comparison_of, excluded_rows, keep_comparison, kept_model_score
 from vegglue.workflow.diagnose import diagnose
 
