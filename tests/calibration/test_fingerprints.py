@@ -18,7 +18,7 @@ from vegglue.calibration.fingerprints import (
     places_of,
     plausible_size,
 )
-from vegglue.calibration.laws_in_case import law_traces
+from vegglue.calibration.law_screening import law_traces
 from vegglue.calibration.model_error import EFFECT_AT_PLACE, model_error_columns
 from vegglue.calibration.noise import noise_of
 from vegglue.case.channel_geometry import half_width, site_scales

@@ -19,7 +19,7 @@ from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import ModelError, Planned, PlannedErrors
 from vegglue.case.site_schema import BedLayer
 from vegglue.case.survey_error import BedSurvey, bed_survey_text, line_weights
-from vegglue.diagnosis.held_out import unseen_errors
+from vegglue.diagnosis.comparison import unseen_errors
 from vegglue.diagnosis.next_measurement import surveys
 from vegglue.diagnosis.refits import relevelled
 from vegglue.engine.interface import Model, Point

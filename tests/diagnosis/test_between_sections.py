@@ -11,7 +11,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.noise import with_model_error
 from vegglue.case.schema import ModelError
-from vegglue.diagnosis.held_out import acts_elsewhere, halfway, largest_error_between
+from vegglue.diagnosis.comparison import acts_elsewhere, halfway, largest_error_between
 from vegglue.engine.interface import Point
 
 pytestmark = pytest.mark.slow

@@ -12,12 +12,11 @@ import vegglue
 from vegglue.calibration.baseline import baseline
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
-from vegglue.diagnosis import channel_check, effect_contract, flow_check, station_check, vertical_check
+from vegglue.diagnosis import channel_check, effect_contract, flow_check, station_check
 from vegglue.diagnosis.case_check import check_case, critical_remarks
 from vegglue.diagnosis.channel_check import BankLawHeld, CanopyUnlikeMeasured, MembersNoPowerOfTwo, StationUnused
 from vegglue.diagnosis.flow_check import ComponentsExchanged, FlowUpstream, LevelsRiseDownstream
-from vegglue.diagnosis.station_check import StationsOnLand, StationsOnPatchEdge
-from vegglue.diagnosis.vertical_check import PointsOutsideWater
+from vegglue.diagnosis.station_check import PointsOutsideWater, StationsOnLand, StationsOnPatchEdge
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements import kinds, plausibility, section_discharge
@@ -42,7 +41,7 @@ def test_a_sound_case_is_passed_in_silence(tmp_path):
 
 def test_every_remark_has_words_for_all_its_values():
     """One that no test renders would end a check in a KeyError."""
-    modules = (channel_check, flow_check, station_check, vertical_check, effect_contract, plausibility)
+    modules = (channel_check, flow_check, station_check, effect_contract, plausibility)
     remarks = {
         one
         for module in modules

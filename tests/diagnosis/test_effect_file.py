@@ -11,7 +11,7 @@ import pytest
 from vegglue.case.config import load_case
 from vegglue.case.schema import Experiment
 from vegglue.diagnosis.comparison import MEASUREMENT
-from vegglue.diagnosis.discovered import Discovery, LawFound, ProductFound, effect_name, effect_text
+from vegglue.diagnosis.law_search import Discovery, LawFound, ProductFound, effect_name, effect_text
 from vegglue.effects.grammar import LAWS, PRODUCTS, Law
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError

@@ -8,7 +8,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.score_test import HypothesisKind, alarm_level, cosines, kind_of_hypotheses, project
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import What, chosen_hypothesis, tempered_probabilities
-from vegglue.diagnosis.first_competition import NAMED_AT, chances_named, first_competition
+from vegglue.diagnosis.plan_search import NAMED_AT, chances_named, first_competition
 from vegglue.diagnosis.search_state import rivals_among
 
 ROWS, TRIES = 50, 400

@@ -10,7 +10,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.noise import with_grid_error
 from vegglue.case.schema import ModelError
-from vegglue.diagnosis.held_out import HeldOutErrors, held_out_errors
+from vegglue.diagnosis.comparison import HeldOutErrors, held_out_errors
 from vegglue.engine.interface import Model
 
 SECTIONS, POINTS = ("A", "B", "C", "D", "E", "F"), 40

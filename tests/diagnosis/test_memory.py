@@ -3,7 +3,7 @@
 import pytest
 from coarse_twin import coarse_twin
 
-from vegglue.diagnosis.memory import GIGABYTE, jobs_in_memory
+from vegglue.diagnosis.diagnose import GIGABYTE, jobs_in_memory
 from vegglue.errors import InputError
 from vegglue.flow import nested_dissection
 

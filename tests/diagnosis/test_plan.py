@@ -13,7 +13,6 @@ from vegglue.calibration.detection import information
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Planned
-from vegglue.diagnosis.first_competition import NAMED_AT
 from vegglue.diagnosis.plan import _after_survey, needed_evidence, plan_measurements, shown_by
 from vegglue.diagnosis.plan_model import (
     PlanModel,
@@ -26,7 +25,7 @@ from vegglue.diagnosis.plan_model import (
     verticals_at,
     with_chosen,
 )
-from vegglue.diagnosis.plan_search import plan_search
+from vegglue.diagnosis.plan_search import NAMED_AT, plan_search
 from vegglue.engine.interface import Model, linearise
 from vegglue.errors import InputError
 from vegglue.plain_json import plain

@@ -12,12 +12,10 @@ import pytest
 
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import at_point
-from vegglue.calibration.law_screening import law_fingerprints
-from vegglue.calibration.laws_in_case import LEAST_SPREAD, laws_in_case, products_in_case
+from vegglue.calibration.law_screening import LEAST_SPREAD, law_fingerprints, laws_in_case, products_in_case
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
-from vegglue.diagnosis.discovered import Discovery
-from vegglue.diagnosis.law_search import discover_laws
+from vegglue.diagnosis.law_search import Discovery, discover_laws
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser

@@ -8,7 +8,7 @@ from sound_case import SOUND, found_in, odd, read_case
 
 from vegglue.case.config import load_case
 from vegglue.diagnosis.case_check import check_case, critical_remarks
-from vegglue.diagnosis.vertical_check import (
+from vegglue.diagnosis.station_check import (
     ErrorsAcrossPlants,
     HeightsExchanged,
     HeightsFromSurface,

@@ -5,8 +5,13 @@ import pytest
 import scipy.stats
 
 from vegglue.calibration.fit import chance_of_misfit, freedom_of_misfit
-from vegglue.inference.leave_one_out import leave_one_out, leave_out, log_likelihoods, share_inside
-from vegglue.inference.weighted_statistics import pareto_smoothed
+from vegglue.inference.weighted_statistics import (
+    leave_one_out,
+    leave_out,
+    log_likelihoods,
+    pareto_smoothed,
+    share_inside,
+)
 
 STATIONS, DRAWS = 30, 6000
 

@@ -18,7 +18,7 @@ from vegglue.calibration.noise import Noise, noise_of, with_correlation, with_gr
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, ModelError, Parameter
-from vegglue.diagnosis.held_out import halfway
+from vegglue.diagnosis.comparison import halfway
 from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError

@@ -25,8 +25,7 @@ from vegglue.calibration.candidates import Candidate, start_amplitude, with_effe
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_named
-from vegglue.diagnosis.discovered import Discovery
-from vegglue.diagnosis.law_search import laws_beyond
+from vegglue.diagnosis.law_search import Discovery, laws_beyond
 from vegglue.diagnosis.refits import Refit
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError

@@ -34,20 +34,18 @@ from vegglue.diagnosis.flow_check import (
 )
 from vegglue.diagnosis.station_check import (
     AxesExchanged,
+    ErrorsAcrossPlants,
+    HeightsExchanged,
+    HeightsFromSurface,
+    HeightsTakenForLevels,
     PlacesInOtherUnit,
+    PointsOutsideWater,
     SharedPlaces,
     StationsNearWall,
     StationsOnLand,
     StationsOnMap,
     StationsOnPatchEdge,
     StationsOutsideGrid,
-)
-from vegglue.diagnosis.vertical_check import (
-    ErrorsAcrossPlants,
-    HeightsExchanged,
-    HeightsFromSurface,
-    HeightsTakenForLevels,
-    PointsOutsideWater,
 )
 from vegglue.measurements.adv_section import DeadProbe
 from vegglue.measurements.kinds import UnstatedErrors

@@ -11,8 +11,8 @@ from commands import SMOOTH, commanded
 from reach import COARSE
 
 import vegglue
+from vegglue.calibration.baseline import CommandPlace, command_place
 from vegglue.calibration.candidates import Candidate, candidates_of, cause_of, with_effect
-from vegglue.calibration.command_place import CommandPlace, command_place
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case

@@ -7,7 +7,7 @@ from typing import Any
 
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import model_score_json
-from vegglue.diagnosis.discovered import LawFound
+from vegglue.diagnosis.law_search import LawFound
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
 from vegglue.inference.statements import off_its_prior, posterior_statements, pressed_bounds
 from vegglue.results.diagnosis import Diagnosis, diagnosis_json

@@ -1,14 +1,14 @@
 """What is odd about a case, as remarks, before hours are spent on it; errors are refused earlier.
 
 Remarks are frozen values that `wording.sentences.sentence` renders. Each comes from one function of a file of checks
-(channel_check, flow_check, station_check, vertical_check); a new one is added to the lists below.
+(channel_check, flow_check, station_check); a new one is added to the lists below.
 """
 
 from dataclasses import replace
 
 from vegglue.case.gridded_site import Site
 from vegglue.case.schema import Case
-from vegglue.diagnosis import channel_check, flow_check, station_check, vertical_check
+from vegglue.diagnosis import channel_check, flow_check, station_check
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plausibility import implausible_levels
 
@@ -28,8 +28,8 @@ def critical_remarks(case: Case, site: Site, observations: Observations) -> list
         *station_check.remarks_on_implausible_values(case, site, observations),
         *station_check.remarks_on_frames(case, observations),
         *(one for one in station_check.remarks_on_land(case, site, observations) if one.most),
-        *vertical_check.remarks_on_exchanged_heights(case, observations),
-        *vertical_check.remarks_on_unmoved_heights(case, observations),
+        *station_check.remarks_on_exchanged_heights(case, observations),
+        *station_check.remarks_on_unmoved_heights(case, observations),
         *flow_check.remarks_on_directions(case, possible),
         *flow_check.remarks_on_turned_velocities(case, observations),
         *flow_check.remarks_on_outlet_levels(case, site, possible),
@@ -61,14 +61,14 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[objec
         *station_check.remarks_on_frames(case, observations),
         *station_check.remarks_on_stations(case, site, observations),
         *station_check.remarks_on_shared_places(observations),
-        *vertical_check.remarks_on_exchanged_heights(case, observations),
-        *vertical_check.remarks_on_unmoved_heights(case, observations),
-        *vertical_check.remarks_on_heights(observations),
+        *station_check.remarks_on_exchanged_heights(case, observations),
+        *station_check.remarks_on_unmoved_heights(case, observations),
+        *station_check.remarks_on_heights(observations),
         *flow_check.remarks_on_directions(case, possible),
         *flow_check.remarks_on_turned_velocities(case, observations),
         *flow_check.remarks_on_turned_probes(observations),
         *flow_check.remarks_on_outlet_levels(case, site, possible),
-        *vertical_check.remarks_on_lost_points(observations, doubted),
+        *station_check.remarks_on_lost_points(observations, doubted),
         *channel_check.remarks_on_ensemble(case, observations),
         *channel_check.remarks_on_kept_fields(case, site),
         *channel_check.remarks_on_bed(case, site),
@@ -84,7 +84,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[objec
         *channel_check.remarks_on_bank_law(case, site),
         *station_check.remarks_on_patch_edges(case, observations),
         *station_check.remarks_on_walls(case, observations),
-        *vertical_check.remarks_on_errors_across_plants(case, observations),
+        *station_check.remarks_on_errors_across_plants(case, observations),
         *flow_check.remarks_on_discharges(case, site, observations),
     ]
 

@@ -26,10 +26,10 @@ from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, not_excluded
 from vegglue.diagnosis.child_config import candidate_at
+from vegglue.diagnosis.comparison import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.competition import tempering
 from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.handbook import parameter_doubts
-from vegglue.diagnosis.held_out import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.law_search import laws_beside_accepted
 from vegglue.diagnosis.search_state import SearchState, rivals_in
 from vegglue.effects.definition import Stage

@@ -13,12 +13,15 @@ from functools import partial
 
 import numpy as np
 
-from vegglue.calibration.baseline import Baseline, kept_baseline, log_evidence
+from vegglue.calibration.baseline import FEWEST_CELLS_ACROSS, Baseline, kept_baseline, log_evidence
 from vegglue.calibration.candidates import Instrument, candidate_in_case, error_columns
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.noise import with_unknown_errors
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.calibration.score_test import alarm_p
+from vegglue.case.channel_geometry import cells_across
+from vegglue.case.gridded_site import Site
+from vegglue.case.size_limits import WIDE_FROM, factor_bytes
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.candidate_effects import candidate_effects_of, laws_beside
 from vegglue.diagnosis.competition import (
@@ -48,8 +51,9 @@ from vegglue.diagnosis.search_state import (
     with_rivals_again,
 )
 from vegglue.engine.interface import Model
-from vegglue.engine.model import with_compilation
+from vegglue.engine.model import coarser, with_compilation
 from vegglue.errors import InputError
+from vegglue.flow.nested_dissection import MOST_BYTES, keep_factors_within
 from vegglue.measurements.plausibility import implausible_values
 from vegglue.parallel import in_threads, submit
 from vegglue.progress import Progress, Watch, silent
@@ -57,6 +61,52 @@ from vegglue.results.causes import CandidateEffect
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.wording.phases import CALIBRATING, SEARCHING, SEARCHING_WITH
 from vegglue.wording.sentences import sentence
+
+# What the process holds before it solves anything, and what it finds beside flows [bytes].
+BASE = 0.4e9
+# Flows that are held of each experiment at once [-], on the cells of the search and on the case's own: refits of all
+# hypotheses, and points of the calibration. Measured on natural reaches, 72 x 32 to 360 x 150 cells.
+SEARCHED, OWN = 12.0, 4.0
+# A flow without its factors on a wide grid, and what each core works with [bytes a cell].
+FLOW, AT_WORK = 1000.0, 5000.0
+# Factors of so many flows on the case's own cells are kept if there is room [-]: those of two experiments, of a point
+# and of the one it started from, and two to spare.
+SETS = 6.0
+# Share of the machine's memory that may be used unless a command says otherwise [-].
+MEMORY_SHARE = 0.9
+GIGABYTE = 1e9
+
+
+def jobs_in_memory(model: Model, jobs: int, allowed: float) -> int:
+    """As many of `jobs` cores as the memory allowed [bytes] has room for; factors of wide grids are kept within it.
+
+    Raises
+    ------
+    InputError
+        If one core needs more.
+    """
+    found = coarser(model)
+    searched = found.site if found is not None and cells_across(found.site) >= FEWEST_CELLS_ACROSS else model.site
+    experiments, cells = len(model.case.experiments), model.site.bed.size
+    held = BASE + experiments * (SEARCHED * _flow_bytes(searched) + OWN * _flow_bytes(model.site))
+    nx, ny = model.site.bed.shape
+    in_use = factor_bytes(nx, ny) if ny >= WIDE_FROM else 0.0  # the least of factors that are kept
+    each = AT_WORK * cells + 2.0 * in_use
+    fit = min(int((allowed - held) / each), jobs)
+    if fit < 1:
+        raise InputError(
+            f"{model.case.name}: a diagnosis on {nx} x {ny} cells needs about {(held + each) / GIGABYTE:.1f} GB, "
+            f"{allowed / GIGABYTE:.1f} GB are allowed: take larger cells, or raise --memory."
+        )
+    room, enough = allowed - held - AT_WORK * cells * fit, max(MOST_BYTES, SETS * in_use)
+    keep_factors_within(min(max(room, 2.0 * in_use), enough))
+    return fit
+
+
+def _flow_bytes(site: Site) -> float:
+    nx, ny = site.bed.shape
+    return FLOW * nx * ny if ny >= WIDE_FROM else factor_bytes(nx, ny)
+
 
 # Effects and places that are accepted at most, and instruments.
 MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6

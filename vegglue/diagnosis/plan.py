@@ -27,7 +27,6 @@ from vegglue.case.channel_geometry import half_width
 from vegglue.case.parameter_space import refuse_without_parameters, theta_at
 from vegglue.case.schema import Case, Planned
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.first_competition import NAMED_AT, chances_named, first_competition
 from vegglue.diagnosis.plan_model import (
     PlanModel,
     bending_of,
@@ -37,7 +36,7 @@ from vegglue.diagnosis.plan_model import (
     relative_lengths,
     with_chosen,
 )
-from vegglue.diagnosis.plan_search import plan_search
+from vegglue.diagnosis.plan_search import NAMED_AT, chances_named, first_competition, plan_search
 from vegglue.engine.interface import Model, Point
 from vegglue.errors import InputError
 from vegglue.normal_range import NORMAL95

@@ -15,8 +15,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import Candidate
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error
-from vegglue.diagnosis.comparison import By, held_out_rmse, improvement, model_score
-from vegglue.diagnosis.held_out import ActsElsewhere, acts_elsewhere
+from vegglue.diagnosis.comparison import ActsElsewhere, By, acts_elsewhere, held_out_rmse, improvement, model_score
 from vegglue.diagnosis.refits import is_near_off
 from vegglue.results.causes import LocalAnomaly
 from vegglue.results.diagnosis import Diagnosis

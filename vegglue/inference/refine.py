@@ -23,11 +23,17 @@ from vegglue.engine.interface import Model, predict
 from vegglue.inference.glue import check_stations, efficiency
 from vegglue.inference.homogeneity import transfer
 from vegglue.inference.importance_sampling import LogDensity, Sample, mixture_at_modes, sample
-from vegglue.inference.leave_one_out import leave_one_out, leave_out, log_likelihoods, share_inside
 from vegglue.inference.posterior_modes import ModesAndErrors, members_of, modes_and_errors, points_of_prior
 from vegglue.inference.posterior_summary import posterior_of
 from vegglue.inference.surrogate import CommandToLearn, learn
-from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
+from vegglue.inference.weighted_statistics import (
+    leave_one_out,
+    leave_out,
+    log_likelihoods,
+    root_mean_square,
+    share_inside,
+    stations_by_kind,
+)
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.posterior import (

@@ -1,9 +1,13 @@
-"""Statistics of weighted members: quantiles, moments, the effective number of members, and draws of equal weight."""
+"""Statistics of weighted members: quantiles, moments, the effective number of members, draws of equal weight, and
+whether they predict held-out data.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import logsumexp, ndtr, ndtri
 
 from vegglue.arrays import Array
 
@@ -187,3 +191,81 @@ def stations_by_kind(station: pd.DataFrame) -> dict[str, NDArray[np.intp]]:
     """Rows of the used stations by kind of measurement."""
     used = station["used"].to_numpy()
     return {str(kind): np.flatnonzero(used & (station["kind"] == kind)) for kind in station["kind"][used].unique()}
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Log predictive density of what was left out [-], and k-hat of the weights that leave it out."""
+
+    score: float
+    k: float
+
+
+@dataclass(frozen=True)
+class StationScores:
+    """Each station (n,) given all others: log predictive density, k-hat, and the share of its prediction below it."""
+
+    score: Array
+    k: Array
+    below: Array
+
+
+def log_likelihoods(residual: Array, precision: Array) -> Array:
+    """ln p(y_i | the other stations, draw) (m, n) of residuals (m, n), errors of the inverse covariance (n, n)."""
+    own = np.diag(precision)
+    return np.asarray(0.5 * np.log(own / (2.0 * np.pi)) - 0.5 * (residual @ precision) ** 2 / own)
+
+
+def leave_one_out(residual: Array, precision: Array, weights: Array) -> StationScores:
+    """Every station left out in turn.
+
+        p(y_i | others, draw) = N(y_i - Q_ii^-1 (Q r)_i, Q_ii^-1),   Q = C^-1,   r the residual of the draw
+
+    Draws of the posterior without i have the weights w / p(y_i | others), smoothed; their k-hat shows whether these are
+    to be trusted.
+
+    Parameters
+    ----------
+    residual : ndarray (m, n)
+        Of the draws [unit of the station].
+    precision : ndarray (n, n)
+        Q, the inverse of the covariance C of the errors.
+    weights : ndarray (m,)
+        Above 0 [-].
+
+    Returns
+    -------
+    StationScores
+
+    References
+    ----------
+    Buerkner, Gabry and Vehtari (2021), doi:10.1007/s00180-020-01045-4; Vehtari et al. (2024).
+    """
+    logs = log_likelihoods(residual, precision)
+    away = (residual @ precision) / np.sqrt(np.diag(precision))
+    score, k, below = (np.empty(residual.shape[1]) for _ in range(3))
+    for i in range(residual.shape[1]):
+        others, k[i] = pareto_smoothed(np.log(weights) - logs[:, i])
+        score[i] = _log_mean(logs[:, i], others)
+        below[i] = others @ ndtr(away[:, i])
+    return StationScores(score, k, below)
+
+
+def leave_out(residual: Array, precision: Array, weights: Array, group: np.ndarray) -> LeftOut:
+    """The stations `group` left out together: mean y_g - Q_gg^-1 (Q r)_g, covariance Q_gg^-1; else `leave_one_out`."""
+    part = precision[np.ix_(group, group)]
+    pull = (residual @ precision)[:, group]
+    size = np.sum(pull * np.linalg.solve(part, pull.T).T, axis=1)
+    logs = 0.5 * np.linalg.slogdet(part)[1] - 0.5 * group.size * np.log(2.0 * np.pi) - 0.5 * size
+    others, k = pareto_smoothed(np.log(weights) - logs)
+    return LeftOut(_log_mean(logs, others), k)
+
+
+def _log_mean(logs: Array, weights: Array) -> float:
+    counts = weights > 1e-300  # the others together weigh less than rounding
+    return float(logsumexp(logs[counts] + np.log(weights[counts])))
+
+
+def share_inside(below: Array, level: float) -> float:
+    """Share of measurements within the band that should hold `level` of them [-]."""
+    return float(np.mean(np.abs(below - 0.5) < 0.5 * level))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vegglue.calibration.laws_in_case import laws_beyond_their_range
+from vegglue.calibration.law_screening import laws_beyond_their_range
 from vegglue.case.case_effects import effect_of
 from vegglue.case.schema import Case
 from vegglue.diagnosis.case_check import check_case, critical_remarks

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.calibration.command_place import CommandPlace, command_place
+from vegglue.calibration.baseline import CommandPlace, command_place
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case

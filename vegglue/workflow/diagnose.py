@@ -5,8 +5,7 @@ from pathlib import Path
 from vegglue.calibration.candidates import Candidate, cause_of
 from vegglue.case.resolved_config import resolved_yaml
 from vegglue.case.schema import Case
-from vegglue.diagnosis.diagnose import diagnose_model
-from vegglue.diagnosis.memory import GIGABYTE, MEMORY_SHARE, jobs_in_memory
+from vegglue.diagnosis.diagnose import GIGABYTE, MEMORY_SHARE, diagnose_model, jobs_in_memory
 from vegglue.effects.definition import Effect
 from vegglue.engine.interface import responses
 from vegglue.engine.model import with_compilation

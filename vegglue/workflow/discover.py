@@ -11,8 +11,7 @@ from vegglue.case.resolved_config import as_yaml, refuse_parent, write_made
 from vegglue.case.schema import Case
 from vegglue.diagnosis.child_config import child_tree
 from vegglue.diagnosis.comparison import excluding, exclusion_in_words
-from vegglue.diagnosis.discovered import Discovery, LawFound, effect_name, effect_text
-from vegglue.diagnosis.law_search import discover_laws
+from vegglue.diagnosis.law_search import Discovery, LawFound, discover_laws, effect_name, effect_text
 from vegglue.effects.library import library
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
