@@ -3,7 +3,7 @@
 import numpy as np
 
 from vegglue.measurements.kinds import KINDS
-from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
+from vegglue.results.loop_results import HeldOut, InSample, ModelScore, PredictiveScores
 
 
 def a_model_score(name: str, validation: float = np.nan) -> ModelScore:

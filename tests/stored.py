@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from vegglue.results.ensemble import Header
-from vegglue.results.fields import FieldWindow
+from vegglue.results.ensemble import FieldWindow, Header
 from vegglue.results.result_files import read_ensemble, read_fields
 from vegglue.results.resume import EnsembleWriter, ensemble_writer
 

@@ -18,7 +18,7 @@ from vegglue.calibration.candidates import NOT_SEARCHED
 from vegglue.case.resolved_config import case_hash
 from vegglue.cli.main import app
 from vegglue.effects.library import library
-from vegglue.results.json_store import comparison_that_fits
+from vegglue.results.loop_results import comparison_that_fits
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 OWN_FILES = ROOT / "docs" / "own_files.md"

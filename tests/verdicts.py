@@ -6,8 +6,9 @@ from typing import Any
 from diagnoses import a_candidate_effect
 
 from vegglue.calibration.fit import chance_of_misfit
+from vegglue.diagnosis.verdict_rules import VerdictInputs, make_verdict
 from vegglue.results.causes import CandidateEffect, Step
-from vegglue.results.verdict import ChiSquare, EstimatedErrors, Verdict, VerdictInputs, make_verdict
+from vegglue.results.verdict import ChiSquare, EstimatedErrors, Verdict
 from vegglue.wording.sentences import tag_of
 
 AS_STATED = EstimatedErrors(correlation=0.0, scale=1.0, grid_error=0.0, flagged=())

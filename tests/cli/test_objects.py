@@ -6,7 +6,7 @@ from diagnoses import NOTHING, a_diagnosis
 from linear_baseline import CASE_OF_TWINS
 
 from vegglue.cli.objects import run_object
-from vegglue.results.open_questions import Question, RivalEffects
+from vegglue.results.loop_results import Question, RivalEffects
 
 
 def test_a_child_does_not_take_the_place_of_its_parent() -> None:

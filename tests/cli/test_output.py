@@ -11,7 +11,6 @@ from diagnoses import EVERY_KIND, IMPLAUSIBLE, NOTHING, Rival, a_diagnosis
 from model_scores import a_model_score
 from posteriors import a_posterior, changed
 
-from vegglue.cli.output import command_line
 from vegglue.cli.printed import (
     TERMINAL_WIDTH,
     VERDICT_LINES,
@@ -21,6 +20,7 @@ from vegglue.cli.printed import (
     summary_lines,
     verdict_lines,
 )
+from vegglue.cli.terminal import command_line
 from vegglue.inference.statements import parameters_at_bounds
 from vegglue.pages.headline import Headline
 from vegglue.results.verdict import ErrorsStillLarger, TooManyGroups

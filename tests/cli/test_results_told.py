@@ -11,8 +11,8 @@ import pytest
 from posteriors import changed
 from reach import COARSE, here, vegglue, write_reach
 
-from vegglue.cli.output import left_out_of
 from vegglue.cli.printed import POSTERIOR_LINES, TERMINAL_WIDTH, posterior_lines
+from vegglue.cli.terminal import left_out_of
 from vegglue.results.result_files import read_posterior
 
 MEMBERS = 32

@@ -15,7 +15,7 @@ from vegglue.calibration.noise import covariance_of, noise_of, with_model_error
 from vegglue.case.config import load_case
 from vegglue.cli.printed import show_ladder
 from vegglue.diagnosis.comparison import held_out_rmse, homogeneity, improvement, model_score, model_score_in_short
-from vegglue.results.model_comparison import ModelScore
+from vegglue.results.loop_results import ModelScore
 from vegglue.workflow.compare import Comparison
 
 CASE = load_case(Path(__file__).parents[2] / "configs" / "twin.yaml")

@@ -19,7 +19,7 @@ from vegglue.diagnosis.comparison import excluded_by, excluding, exclusion_in_wo
 from vegglue.engine.interface import Model, Point
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import write_diagnosis
-from vegglue.workflow.case_run import CaseRun, excluded_in_all
+from vegglue.workflow.case_run import CaseRun, excluded_in
 from vegglue.workflow.extend import write_child
 
 pytestmark = pytest.mark.slow
@@ -88,4 +88,4 @@ def test_a_diagnosis_of_another_state_of_the_case_leaves_nothing_out(model: Mode
     (tmp_path / case.name).mkdir()
     found = flagging(model, 3)
     write_diagnosis(tmp_path / case.name / "diagnosis.h5", found, "", "e" * 64)
-    assert excluded_in_all([CaseRun(case, tmp_path)]).empty
+    assert excluded_in(CaseRun(case, tmp_path)).empty

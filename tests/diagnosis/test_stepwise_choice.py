@@ -21,7 +21,7 @@ from vegglue.diagnosis.stepwise_choice import (
     chosen,
     why_not_kept,
 )
-from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
+from vegglue.results.loop_results import HeldOut, InSample, ModelScore, PredictiveScores
 
 STATIONS = 12
 EXPERIMENTS = ("low", "high")

@@ -21,9 +21,9 @@ from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.search_state import rivals_in, undecided_of
+from vegglue.diagnosis.verdict_rules import AT_BOUND
 from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival, Step
 from vegglue.results.verdict import (
-    AT_BOUND,
     AmplitudeAtBound,
     AmplitudeBeyondPlausible,
     BedCorrected,

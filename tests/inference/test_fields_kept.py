@@ -26,8 +26,7 @@ from vegglue.flow.sensor import read_sensors
 from vegglue.flow.status import FAILED
 from vegglue.inference.solve_ensemble import solve_chunk, solve_ensemble, solve_flow
 from vegglue.measurements.observations import read_observations
-from vegglue.results.ensemble import Ensemble
-from vegglue.results.fields import Fields, megabytes, predict_at, window_of
+from vegglue.results.ensemble import Ensemble, Fields, megabytes, predict_at, window_of
 from vegglue.results.result_files import read_ensemble, read_fields
 
 SMALL = ("members: 1024, seed: 7", "members: 16, seed: 7, fields: {x: [8, 20]}")

@@ -16,6 +16,7 @@ from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.cli.printed import show_carried
+from vegglue.diagnosis.verdict_rules import OF_DISCHARGES
 from vegglue.effects.library import library
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.section_discharge import (
@@ -26,7 +27,7 @@ from vegglue.measurements.section_discharge import (
     mismatched_discharges,
 )
 from vegglue.pages.answer import not_reliable
-from vegglue.results.verdict import OF_DISCHARGES, AmplitudeBeyondPlausible
+from vegglue.results.verdict import AmplitudeBeyondPlausible
 
 # Water that enters over a stretch of a bank, and a discharge that is not the reported one: more passes the sections.
 REALLY_OTHERWISE = {"open-d": ("high", 1.087), "open-m": ("low", 1.11)}

@@ -25,16 +25,20 @@ from vegglue.pages.answer import (
     not_reliable,
     subject_model,
 )
-from vegglue.pages.diagnosis_tables import diagnosis_section
-from vegglue.pages.findings import MembersSolved, findings
-from vegglue.pages.headline import Headline, worst_zone
+from vegglue.pages.findings import MembersSolved, findings, station_rows
+from vegglue.pages.headline import Headline, diagnosis_section, worst_zone
 from vegglue.pages.parameters import PosteriorVerdict
 from vegglue.pages.run import LoopResults, Run
 from vegglue.pages.sections import safe_json
-from vegglue.pages.tables import station_rows
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.model_comparison import ComparedModel, ModelComparison
-from vegglue.results.open_questions import HiddenEffect, ProposedMeasurement, Question, RivalEffects
+from vegglue.results.loop_results import (
+    ComparedModel,
+    HiddenEffect,
+    ModelComparison,
+    ProposedMeasurement,
+    Question,
+    RivalEffects,
+)
 from vegglue.results.verdict import EffectsStillSignificant, MisfitTooSmall, NoneLeads
 from vegglue.wording.sentences import page_sentence
 

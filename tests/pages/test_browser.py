@@ -9,7 +9,7 @@ from diagnoses import a_diagnosis
 from report_runs import a_toy, told_of, written
 
 from vegglue.pages.run import LoopResults
-from vegglue.results.model_comparison import ComparedModel, ModelComparison
+from vegglue.results.loop_results import ComparedModel, ModelComparison
 
 pytestmark = pytest.mark.slow  # a browser is started
 

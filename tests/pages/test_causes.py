@@ -8,7 +8,7 @@ import pytest
 from diagnoses import EVERY_KIND, NO_LOCATION, NOTHING, a_diagnosis, a_field, an_anomaly, an_instrument
 
 from vegglue.case.config import load_case
-from vegglue.pages.diagnosis_tables import diagnosis_section
+from vegglue.pages.headline import diagnosis_section
 from vegglue.pages.place_maps import field_picture, outlines, place_picture, plan_marks
 from vegglue.pages.run import Run, accepted_causes
 from vegglue.results.causes import FieldMapKept

@@ -29,14 +29,13 @@ from vegglue.pages.diagnosis_figures import (
     save_diagnosis_figure,
     save_fingerprint_figure,
 )
-from vegglue.pages.diagnosis_tables import candidate_rows, diagnosis_section
 from vegglue.pages.flow_maps import Outline
-from vegglue.pages.headline import Headline, candidate_status, rms_residual
+from vegglue.pages.headline import Headline, candidate_rows, candidate_status, diagnosis_section, rms_residual
 from vegglue.pages.ladder_figure import LINES, draw_errors, draw_ladder, save_ladder_figure
 from vegglue.pages.style import COLOUR
 from vegglue.results.causes import Step
 from vegglue.results.diagnosis import Diagnosis, Predictions
-from vegglue.results.model_comparison import (
+from vegglue.results.loop_results import (
     ComparedModel,
     HeldOut,
     InSample,

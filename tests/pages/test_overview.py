@@ -10,9 +10,9 @@ from diagnoses import a_diagnosis
 from posteriors import changed
 from report_runs import a_toy, kict, told_of
 
-from vegglue.pages.overview import DrawnInterval, draw_interval_rows, render_overview, write_overview
+from vegglue.pages.page import DrawnInterval, draw_interval_rows, render_overview, write_overview
 from vegglue.pages.run import LoopResults, Run
-from vegglue.results.model_comparison import ComparedModel, ModelComparison
+from vegglue.results.loop_results import ComparedModel, ModelComparison
 
 STEPS = tuple(ComparedModel(name, f"{name}.yaml", name, (), 4, *[0.02] * 4, 0.01) for name in ("toy", "toy-eddies"))
 LADDER = ModelComparison((STEPS[0], replace(STEPS[1], added=("eddies",), unseen=0.005)), 0, "Added: eddies.")

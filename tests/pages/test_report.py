@@ -12,10 +12,10 @@ from report_runs import MEMBERS, a_toy, kict, told_of, written
 
 from vegglue.errors import StorageError
 from vegglue.measurements.observations import EXCLUDED
+from vegglue.pages.findings import run_health
 from vegglue.pages.parameters import parameter_rows
 from vegglue.pages.run import Run, file_name, is_synthetic, station_zones
 from vegglue.pages.sections import section_panels
-from vegglue.pages.tables import run_health
 
 pytestmark = pytest.mark.slow  # whole pages
 VOID = {"meta", "link", "br", "hr", "img", "input"}

@@ -11,7 +11,7 @@ import pytest
 from stored import ALL, HASH, WINDOW, a_header, append, assert_whole, members_of, write_chunks
 
 from vegglue.errors import InputError, StorageError
-from vegglue.results.json_store import questions_that_fit
+from vegglue.results.loop_results import questions_that_fit
 from vegglue.results.result_files import read_ensemble, stored_hash
 from vegglue.results.resume import EnsembleWriter, ensemble_writer, part_file, remove_left_over_fields
 from vegglue.workflow.twin import opened_answer

@@ -26,7 +26,7 @@ from stored import (
 )
 
 from vegglue.errors import InputError, StorageError
-from vegglue.results.fields import FieldWindow, fields_group
+from vegglue.results.ensemble import FieldWindow, fields_group
 from vegglue.results.result_files import read_fields
 from vegglue.results.resume import ensemble_writer
 

@@ -9,10 +9,16 @@ import numpy as np
 import pytest
 from model_scores import a_model_score
 
-from vegglue.results.json_store import (
+from vegglue.results.loop_results import (
     COMPARISON_FILE,
     QUESTIONS_FILE,
     SCORE_FILE,
+    ComparedModel,
+    HiddenEffect,
+    ModelComparison,
+    ProposedMeasurement,
+    Question,
+    RivalEffects,
     comparison_that_fits,
     model_score_that_fits,
     questions_that_fit,
@@ -20,8 +26,6 @@ from vegglue.results.json_store import (
     write_model_score,
     write_questions,
 )
-from vegglue.results.model_comparison import ComparedModel, ModelComparison
-from vegglue.results.open_questions import HiddenEffect, ProposedMeasurement, Question, RivalEffects
 
 HASH, OTHER = "a" * 64, "b" * 64
 STEP = ComparedModel("brook", "brook.yaml", HASH, ("Größe",), 4, 0.011, 0.02, 0.03, 0.04, 0.012)

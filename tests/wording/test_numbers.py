@@ -19,8 +19,14 @@ from vegglue.cli.printed import show_ladder
 from vegglue.diagnosis.comparison import MEASUREMENT
 from vegglue.flow.status import FAILED
 from vegglue.measurements.kinds import errors_in_short
-from vegglue.results.model_comparison import ComparedModel, ModelComparison
-from vegglue.results.open_questions import HiddenEffect, ProposedMeasurement, Question, RivalEffects
+from vegglue.results.loop_results import (
+    ComparedModel,
+    HiddenEffect,
+    ModelComparison,
+    ProposedMeasurement,
+    Question,
+    RivalEffects,
+)
 from vegglue.results.result_files import read_ensemble
 from vegglue.wording.numbers import (
     duration_in_short,

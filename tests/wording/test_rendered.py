@@ -94,8 +94,8 @@ from vegglue.pages.headline import WorstZone
 from vegglue.pages.parameters import PosteriorVerdict, ResidualCompared
 from vegglue.results.causes import CandidateEffect, FaultyInstrument, ModelErrorUsed, Rival
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.fields import FieldsTooLarge
-from vegglue.results.open_questions import HiddenEffect, OneOfRivals, ProposedMeasurement, Question, RivalEffects
+from vegglue.results.ensemble import FieldsTooLarge
+from vegglue.results.loop_results import HiddenEffect, OneOfRivals, ProposedMeasurement, Question, RivalEffects
 from vegglue.results.plan import (
     Confusion,
     EffectsInGeneral,

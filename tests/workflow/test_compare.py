@@ -15,10 +15,9 @@ from vegglue.case.schema import Case, Validation
 from vegglue.diagnosis.comparison import MEASUREMENT, excluded_by
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
-from vegglue.results.json_store import comparison_that_fits, write_comparison
-from vegglue.results.model_comparison import ComparedModel, ModelComparison
+from vegglue.results.loop_results import ComparedModel, ModelComparison, comparison_that_fits, write_comparison
 from vegglue.workflow import case_run, compare
-from vegglue.workflow.case_run import CaseRun, excluded_in_all, folder_of, judged_by
+from vegglue.workflow.case_run import CaseRun, excluded_in, folder_of, judged_by
 
 
 @pytest.fixture
@@ -112,7 +111,7 @@ def test_a_model_is_judged_by_its_diagnosis_of_now_beside_a_ladder_of_before(
     write_comparison(folder_of(tmp_path, second), ModelComparison((before,), 0, ""), case_hash(second))
     for cases in ([case, second], [second, case]):
         asked.clear()
-        assert excluded_in_all([CaseRun(one, tmp_path) for one in cases]).empty
+        assert excluded_in(*(CaseRun(one, tmp_path) for one in cases)).empty
         assert set(asked) == {(one.name, case_hash(one)) for one in cases} | {("brook", "as it was")}
 
 

@@ -22,8 +22,7 @@ from vegglue.engine.newton import NEWTON
 from vegglue.errors import InputError
 from vegglue.results.causes import Step
 from vegglue.results.diagnosis import ParameterEstimates
-from vegglue.results.json_store import write_questions
-from vegglue.results.open_questions import ProposedMeasurement, Question, RivalEffects
+from vegglue.results.loop_results import ProposedMeasurement, Question, RivalEffects, write_questions
 from vegglue.workflow import next_measurement as verb
 from vegglue.workflow.case_run import folder_of
 from vegglue.workflow.next_measurement import next_measurement

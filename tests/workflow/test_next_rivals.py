@@ -9,7 +9,7 @@ import pytest
 from diagnoses import IMPLAUSIBLE, a_diagnosis
 
 from vegglue.diagnosis.next_measurement import MeasurementWorth, least_distances
-from vegglue.results.open_questions import OneOfRivals, RivalEffects
+from vegglue.results.loop_results import OneOfRivals, RivalEffects
 from vegglue.workflow.next_measurement import questions_about, what_is_open
 
 

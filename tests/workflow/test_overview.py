@@ -8,8 +8,7 @@ from small_case import SMALL
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.errors import InputError
-from vegglue.results.json_store import write_comparison
-from vegglue.results.model_comparison import ComparedModel, ModelComparison
+from vegglue.results.loop_results import ComparedModel, ModelComparison, write_comparison
 from vegglue.workflow.report import overview
 
 

@@ -18,8 +18,7 @@ from vegglue.engine.interface import linearise
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.pages.plan import confusions, days_of_work
-from vegglue.results.plan import FieldPlan, PlannedPiece, Work
-from vegglue.results.plan_files import field_places, field_stations
+from vegglue.results.plan import FieldPlan, PlannedPiece, Work, field_places, field_stations
 from vegglue.workflow.case_run import CaseRun
 
 # Of UTM zone 32: the central meridian of 9 degrees east has the easting 500,000 m, the equator the northing 0.

@@ -13,7 +13,7 @@ from reach import write_reach
 import vegglue
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import excluded_by
-from vegglue.results.json_store import write_model_score
+from vegglue.results.loop_results import write_model_score
 from vegglue.workflow import extend
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.compare import Comparison, comparison_of, excluded_rows, keep_comparison

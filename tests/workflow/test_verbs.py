@@ -17,7 +17,7 @@ from vegglue.inference.statements import ReadingsExcluded, posterior_statements
 from vegglue.measurements.observations import EXCLUDED, read_observations
 from vegglue.progress import Progress
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.json_store import comparison_that_fits, questions_that_fit
+from vegglue.results.loop_results import comparison_that_fits, questions_that_fit
 from vegglue.results.result_files import stored_hash, write_diagnosis
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.infer import is_inferred

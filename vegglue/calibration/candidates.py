@@ -110,6 +110,14 @@ class Candidate:
             for name, one, mean, sd in all_of
         } | {free[name]: prior for name, prior in self.fitted}  # fmt: skip
 
+    def drawn_shapes(self, random: np.random.Generator) -> dict[str, float]:
+        """Values of the shapes between those that a search tries, as nature does; those that are fixed as they are."""
+        drawn = {
+            shape.name: float(random.uniform(min(shape.grid), max(shape.grid))) if shape.grid else shape.default
+            for shape in self.effect.shapes
+        }
+        return drawn | dict(self.fixed)
+
     def settings(self) -> list[dict[str, float]]:
         """Values of the shapes to try: those that are fixed, else their grids, or their defaults; none of `free`."""
         if self.fixed:

@@ -1,7 +1,7 @@
 """The commands of the shell: each parses its options, calls one verb of `workflow`, and prints what came.
 
 To add a command, write a function `NAME_command` in the file of its group (`ensemble_commands`, `loop_commands`,
-`library_commands`), with options from `options.py` where they mean the same, and list
+`library_commands`), with options from `terminal.py` where they mean the same, and list
 it in COMMANDS of `main.py`. What it does belongs into `workflow`; what it prints into `printed.py` and, for `--json`,
 `objects.py`. Both tables of `docs/commands.md` list it.
 

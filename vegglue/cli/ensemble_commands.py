@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal
 import typer
 
 import vegglue
-from vegglue.cli.options import (
+from vegglue.cli.reporting import print_result, progress_reporter
+from vegglue.cli.terminal import (
     FLAG,
     RUNS,
     Cluster,
@@ -22,11 +23,11 @@ from vegglue.cli.options import (
     Quiet,
     Runs,
     Trust,
+    command_line,
     opened_run,
     print_doubts_of_ensemble,
+    print_object,
 )  # fmt: skip
-from vegglue.cli.output import command_line, print_object
-from vegglue.cli.reporting import print_result, progress_reporter
 from vegglue.errors import InputError, shown_path
 from vegglue.wording.commands import DEMO, HELP
 

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 import vegglue
-from vegglue.cli.options import FLAG, RUNS, Config, Force, Json, Quiet, Runs, Trust
-from vegglue.cli.output import command_line, print_object
 from vegglue.cli.reporting import progress_reporter
+from vegglue.cli.terminal import FLAG, RUNS, Config, Force, Json, Quiet, Runs, Trust, command_line, print_object
 from vegglue.errors import InputError, shown_path
 from vegglue.wording.commands import HELP
 

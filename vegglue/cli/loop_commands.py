@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 import vegglue
-from vegglue.cli.options import (
+from vegglue.cli.reporting import print_result, progress_reporter
+from vegglue.cli.terminal import (
     FLAG,
     RUNS,
     Cluster,
@@ -19,12 +20,12 @@ from vegglue.cli.options import (
     Quiet,
     Runs,
     Trust,
+    command_line,
     number_given,
     opened_run,
     opened_runs,
+    print_object,
 )
-from vegglue.cli.output import command_line, print_object
-from vegglue.cli.reporting import print_result, progress_reporter
 from vegglue.errors import InputError, shown_path
 from vegglue.wording.commands import HELP
 from vegglue.wording.numbers import so_many

@@ -29,7 +29,7 @@ from vegglue.cli.loop_commands import (
     overview_command,
     plan_command,
 )
-from vegglue.cli.options import FLAG
+from vegglue.cli.terminal import FLAG
 from vegglue.errors import InputError, StorageError
 from vegglue.version import VERSION
 from vegglue.wording.commands import HELP, LAST_WORDS

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vegglue.case.schema import Case
-from vegglue.cli.output import command_line, console, print_table
+from vegglue.cli.terminal import command_line, console, print_table
 from vegglue.diagnosis.comparison import exclusion_in_words, held_out_rmse, improvement
 from vegglue.errors import shown_path
 from vegglue.flow.status import FAILED, SOLVED_BY_MARCHING, members_with
@@ -35,7 +35,7 @@ from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.pages.headline import Headline, VerdictFit, WhatDataCannotShow, verdict_fit, what_data_cannot_show
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
-from vegglue.results.open_questions import Question
+from vegglue.results.loop_results import Question
 from vegglue.results.plan import FieldPlan
 from vegglue.results.posterior import Posterior
 from vegglue.wording.numbers import FIRM, in_digits, range_in_digits, so_many

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vegglue.cli.output import console, print_object
+from vegglue.cli.terminal import console, print_object
 from vegglue.progress import Progress, Watch, progress_lines, silent, with_pace
 
 if TYPE_CHECKING:

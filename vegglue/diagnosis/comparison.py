@@ -36,7 +36,7 @@ from vegglue.measurements.kinds import KINDS, leading_velocities
 from vegglue.measurements.observations import EXCLUDED, section_places, station_table
 from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.model_comparison import HeldOut, InSample, ModelScore, PredictiveScores
+from vegglue.results.loop_results import HeldOut, InSample, ModelScore, PredictiveScores
 from vegglue.wording.sentences import phrase
 
 # How often errors alone exceed the reported bound; 5 % is usual.

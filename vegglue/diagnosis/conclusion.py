@@ -32,6 +32,7 @@ from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_
 from vegglue.diagnosis.handbook import parameter_doubts
 from vegglue.diagnosis.law_search import laws_beside_accepted
 from vegglue.diagnosis.search_state import SearchState, rivals_in
+from vegglue.diagnosis.verdict_rules import VerdictInputs, make_verdict
 from vegglue.effects.definition import Stage
 from vegglue.effects.identity import EffectIdentity
 from vegglue.engine.interface import Model, Point
@@ -62,8 +63,6 @@ from vegglue.results.verdict import (
     PlacesOnMap,
     TooShallow,
     Verdict,
-    VerdictInputs,
-    make_verdict,
 )
 from vegglue.version import VERSION
 

@@ -297,7 +297,7 @@ def remarks_on_outlet_levels(case: Case, site: Site, observations: Observations)
 
 def remarks_on_directions(case: Case, observations: Observations) -> Iterator[object]:
     """Velocities that run across or upstream, and levels that rise downstream."""
-    exchanged = _exchanged(case, observations)
+    exchanged = exchanged_components(case, observations)
     if exchanged:
         yield ComponentsExchanged(tuple(exchanged), *next(iter(exchanged.values())))
     of = {name: rows for name, rows in _by_experiment(case, observations).items() if name not in exchanged}
@@ -309,26 +309,16 @@ def remarks_on_directions(case: Case, observations: Observations) -> Iterator[ob
         against = mean[(mean["max"] < 0.0) & (mean["size"] >= FEWEST_OF_A_SECTION)]
         if name not in whole and len(against):
             yield SectionsUpstream(name, tuple(map(str, against.index)), float(against["mean"].mean()))
-    rising = _rising(case, observations)
+    rising = rising_levels(case, observations)
     for first, last in dict.fromkeys((first, last) for first, last, _ in rising.values()):
         by = {name: rise for name, (*ends, rise) in rising.items() if ends == [first, last]}
         yield LevelsRiseDownstream(tuple(by), tuple(by.values()), first, last)
 
 
-def exchanged_components(case: Case, observations: Observations) -> tuple[str, ...]:
-    """Experiments with more water across than along: components exchanged, or of the map."""
-    return tuple(_exchanged(case, observations))
-
-
-def rising_levels(case: Case, observations: Observations) -> tuple[str, ...]:
-    """Experiments whose levels rise downstream."""
-    return tuple(_rising(case, observations))
-
-
 def misdirected(case: Case, observations: Observations) -> tuple[str, ...]:
     """Experiments with an odd direction, whose sections do not show what they carry."""
     upstream = [name for name, rows in _by_experiment(case, observations).items() if _median(rows) < 0.0]
-    return (*_exchanged(case, observations), *_rising(case, observations), *upstream)
+    return (*exchanged_components(case, observations), *rising_levels(case, observations), *upstream)
 
 
 def _by_experiment(case: Case, observations: Observations) -> dict[str, pd.DataFrame]:
@@ -341,8 +331,8 @@ def _median(rows: pd.DataFrame) -> float:
     return float(rows.loc[rows["kind"] == STREAMWISE, "value"].median())
 
 
-def _exchanged(case: Case, observations: Observations) -> dict[str, tuple[float, float]]:
-    """Of each such experiment the median |u| and |v| [m/s]."""
+def exchanged_components(case: Case, observations: Observations) -> dict[str, tuple[float, float]]:
+    """Median |u| and |v| [m/s] of each experiment with more water across than along: exchanged, or of the map."""
     middle = {
         name: tuple(float(rows.loc[rows["kind"] == kind, "value"].abs().median()) for kind in (STREAMWISE, TRANSVERSE))
         for name, rows in _by_experiment(case, observations).items()
@@ -350,9 +340,10 @@ def _exchanged(case: Case, observations: Observations) -> dict[str, tuple[float,
     return {name: (along, across) for name, (along, across) in middle.items() if across > along}
 
 
-def _rising(case: Case, observations: Observations) -> dict[str, tuple[float, float, float]]:
-    """By experiment the x of two gauges and the largest rise from one to the next, or from the first to the last [m],
-    beyond its error, and beyond the head u2/2g of the fastest velocity, which a widening may give back.
+def rising_levels(case: Case, observations: Observations) -> dict[str, tuple[float, float, float]]:
+    """Experiments whose levels rise downstream: the x of two gauges and the largest rise from one to the next, or from
+    the first to the last [m], beyond its error, and beyond the head u2/2g of the fastest velocity, which a widening may
+    give back.
     """
     found = {}
     for name, rows in _by_experiment(case, observations).items():

@@ -8,7 +8,7 @@ from vegglue.calibration.fit import interval95
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.channel_geometry import site_scales
 from vegglue.case.parameter_space import probability
-from vegglue.case.schema import Case, Parameter
+from vegglue.case.schema import Case
 from vegglue.effects.scales import SiteScales
 from vegglue.results.verdict import BeyondHandbook, EstimateAtBound, EstimateOffPrior
 
@@ -48,21 +48,16 @@ def parameter_doubts(base: Baseline) -> Iterator[EstimateAtBound | BeyondHandboo
         if name in of_effects:
             continue
         prior, value = case.parameters[name], interval95(model, base.fitted, name)[0]
-        yield from _at_bound(name, prior, value)
+        if prior.low is not None and prior.high is not None and prior.distribution in ("uniform", "loguniform"):
+            below = float(probability(prior, value))
+            if min(below, 1.0 - below) < PRESSES:
+                yield EstimateAtBound(name, value, prior.unit, prior.low, prior.high, below < 0.5)
         known = _handbook(case, scales, name)
         if known is not None and not known.low <= value <= known.high:
             yield BeyondHandbook(name, value, prior.unit, known.low, known.high, known.source)
         far = abs(float(base.fitted.point.z[model.names.index(name)]))
         if prior.distribution in ("normal", "lognormal") and far > OFF_STATED:
             yield EstimateOffPrior(name, value, prior.unit, far)
-
-
-def _at_bound(name: str, prior: Parameter, value: float) -> Iterator[EstimateAtBound]:
-    if prior.low is None or prior.high is None:
-        return
-    below = float(probability(prior, value))
-    if min(below, 1.0 - below) < PRESSES and prior.distribution in ("uniform", "loguniform"):
-        yield EstimateAtBound(name, value, prior.unit, prior.low, prior.high, below < 0.5)
 
 
 def _handbook(case: Case, scales: SiteScales, name: str) -> HandbookRange | None:

@@ -17,7 +17,7 @@ from scipy.special import ndtri
 from vegglue.arrays import Array
 from vegglue.calibration.candidates import Candidate, instruments_of, offset_columns, plausible_offset
 from vegglue.calibration.detection import PLANNED_POWER, detected_length, detection_chance, single_threshold
-from vegglue.calibration.fingerprints import Fingerprints, Places, places_of
+from vegglue.calibration.fingerprints import Fingerprints, places_of
 from vegglue.calibration.model_error import EFFECT_AT_PLACE
 from vegglue.calibration.noise import Noise, draw_whitened_errors, noise_of, with_grid_error, with_model_error
 from vegglue.calibration.residual_screening import kind_of_listed, kinds_of_instruments, kinds_of_places
@@ -120,7 +120,7 @@ def plan_measurements(
         question = _question(wide.candidates, about, size, between)
     watch(Progress("weighing what they show"))
     shown = shown_by(wide)
-    at_places = _chances_at_places(shown)
+    places, chances_of_places = _places(model.case, shown)
     flows = frozenset(at_hand["experiment"])
     present = flows | {one.experiment for one in base if one.experiment}
     hours = hours_of(base, planned.costs.discharge, flows)
@@ -136,14 +136,14 @@ def plan_measurements(
         budget=planned.hours,
         draws=len(shown.relative),
         effects=_effects(wide, shown),
-        places=_places(model.case, at_places),
+        places=places,
         instruments=_instruments(wide, shown),
         parameters=_parameters(model.case, shown),
         question=question,
         answer=search.start.mean,
         further=search.ranked(),
         extended=search.extended(left) if left > 0.0 else None,
-        chances_of_places=_chances_of_drag(at_places),
+        chances_of_places=chances_of_places,
     )
 
 
@@ -315,43 +315,24 @@ def _effects(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedEffect, ...]:
     return tuple(sorted(found, key=lambda one: (-one.chance, one.name)))
 
 
-ChancesAtPlaces = list[tuple[Places, Array, Array]]
-
-
-def _chances_at_places(shown: ShownByPlan) -> ChancesAtPlaces:
-    """Of each term: its spots, the chance that a plausible size is detected there, and the size that is detected."""
-    found = []
+def _places(case: Case, shown: ShownByPlan) -> tuple[tuple[PlannedPlaces, ...], PlaceChances | None]:
+    """Each term, and the chances of the smallest spots of drag."""
+    found, of_drag = [], None
     for places, kind in zip(shown.fingerprints.places, shown.kinds[1:], strict=False):
         threshold = single_threshold(kind.size, kind.log_prior, shown.level)
         smallest = detected_length(threshold) / np.maximum(kind.projected.length, 1e-300)
-        found.append((places, detection_chance(kind.size, threshold), smallest))
-    return found
-
-
-def _places(case: Case, at_places: ChancesAtPlaces) -> tuple[PlannedPlaces, ...]:
-    return tuple(
-        PlannedPlaces(
-            places.term,
-            effect_named(case, EFFECT_AT_PLACE[places.term]).amplitude.unit,
-            places.plausible,
-            places.x.size,
-            float(np.mean(chance >= PLANNED_POWER)) if chance.size else 0.0,
-            float(np.median(smallest)) if smallest.size else float("inf"),
-        )
-        for places, chance, smallest in at_places
-    )
-
-
-def _chances_of_drag(at_places: ChancesAtPlaces) -> PlaceChances | None:
-    """Of the smallest spots of drag."""
-    for places, chance, _ in at_places:
+        chance = detection_chance(kind.size, threshold)
+        unit = effect_named(case, EFFECT_AT_PLACE[places.term]).amplitude.unit
+        share = float(np.mean(chance >= PLANNED_POWER)) if chance.size else 0.0
+        median = float(np.median(smallest)) if smallest.size else float("inf")
+        found.append(PlannedPlaces(places.term, unit, places.plausible, places.x.size, share, median))
         if places.term == "drag" and places.x.size:
             small = np.flatnonzero(places.length == places.length.min())
-            return PlaceChances(
+            of_drag = PlaceChances(
                 tuple(map(float, places.x[small])), tuple(map(float, places.y[small])),
                 tuple(map(float, chance[small])), float(places.length[small[0]]), float(places.width[small[0]]),
             )  # fmt: skip
-    return None
+    return tuple(found), of_drag
 
 
 def _instruments(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedInstruments, ...]:

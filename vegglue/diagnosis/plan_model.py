@@ -27,8 +27,7 @@ from vegglue.errors import InputError
 from vegglue.measurements.kinds import KINDS, STREAMWISE
 from vegglue.measurements.observations import section_places, station_table
 from vegglue.parallel import in_threads
-from vegglue.results.plan import PlannedPiece, Work
-from vegglue.results.plan_files import KIND_OF_WORK
+from vegglue.results.plan import KIND_OF_WORK, PlannedPiece, Work
 
 # Places around the middle of the prior at which lengths of traces are computed, on the coarsest cells [-]: of up to
 # seven parameters each is varied by itself. Chosen: each costs the flows and a fingerprint of each effect.
@@ -357,7 +356,8 @@ def _plan_model(
     error = np.concatenate([of_stations, np.full(len(places), planned.errors.survey)])
     settings = [(one, shapes) for one in candidates for shapes in one.settings()]
     shaped = [j for j, one in enumerate(candidates) if len(one.settings()) > 1]
-    between = [(j, _between(candidates[j], (j, k))) for j in shaped for k in range(SETTINGS_BETWEEN)]
+    seeds = [(j, k) for j in shaped for k in range(SETTINGS_BETWEEN)]
+    between = [(seed[0], candidates[seed[0]].drawn_shapes(np.random.default_rng(seed))) for seed in seeds]
     wanted = [*settings, *((candidates[j], shapes) for j, shapes in between)]
     every = _with_rows(responses(search, start, _causes(search, wanted)), len(places))
     one_each = np.array([columns[columns.size // 2] for columns in setting_columns(candidates)], dtype=int)
@@ -490,14 +490,6 @@ def places_of_draws(parameters: int) -> Array:
     number = np.arange(parameters)
     corners = hadamard(DRAWS_AROUND)[:, 1 + number % (DRAWS_AROUND - 1)] * (-1.0) ** (number // (DRAWS_AROUND - 1))
     return START_SPREAD * np.vstack([np.zeros(parameters), corners])
-
-
-def _between(one: Candidate, seed: tuple[int, int]) -> dict[str, float]:
-    random = np.random.default_rng(seed)
-    return {
-        shape.name: float(random.uniform(min(shape.grid), max(shape.grid))) if shape.grid else shape.default
-        for shape in one.effect.shapes
-    } | dict(one.fixed)
 
 
 def _causes(model: Model, wanted: Sequence[tuple[Candidate, dict[str, float]]]) -> list[Cause]:

@@ -212,7 +212,7 @@ def remarks_on_implausible_values(
     components are exchanged, as those along are too slow for that reason.
     """
     table, exchanged = observations.table, exchanged_components(case, observations)
-    excused = velocity_rows(table) & table["experiment"].isin(exchanged)
+    excused = velocity_rows(table) & table["experiment"].isin(list(exchanged))
     return implausible_values(case, site, table.assign(used=table["used"] & ~excused))
 
 

@@ -19,7 +19,7 @@ from vegglue.diagnosis.comparison import ActsElsewhere, By, acts_elsewhere, held
 from vegglue.diagnosis.refits import is_near_off
 from vegglue.results.causes import LocalAnomaly
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.model_comparison import ModelScore
+from vegglue.results.loop_results import ModelScore
 
 # Fall of the held-out squares, over its standard error, from which it is clear: 19 times of 20 it is no chance.
 CLEAR = 2.0

@@ -34,8 +34,7 @@ from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.observations import Observations
 from vegglue.parallel import as_finished, in_threads
 from vegglue.progress import Progress, Watch
-from vegglue.results.ensemble import Header
-from vegglue.results.fields import QUANTITIES, FieldWindow, excess, window_of
+from vegglue.results.ensemble import QUANTITIES, FieldWindow, Header, excess, window_of
 from vegglue.results.resume import EnsembleWriter, ensemble_writer
 from vegglue.version import VERSION
 from vegglue.wording.sentences import sentence

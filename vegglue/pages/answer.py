@@ -22,8 +22,7 @@ from vegglue.pages.sections import SectionPanels, section_panels
 from vegglue.pages.style import Picture
 from vegglue.results.causes import CandidateLaws
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.model_comparison import ModelComparison
-from vegglue.results.open_questions import HiddenEffect, Question
+from vegglue.results.loop_results import HiddenEffect, ModelComparison, Question
 from vegglue.results.verdict import MisfitTooSmall, is_too_small
 
 # Ways of judging a model, the most telling first: fields of a step of the ladder.

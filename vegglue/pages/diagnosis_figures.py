@@ -18,9 +18,8 @@ from vegglue.calibration.score_test import alike_groups
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.measurements.kinds import KINDS, WATER_LEVEL, Kind
-from vegglue.pages.diagnosis_tables import candidate_rows
 from vegglue.pages.flow_maps import Outline
-from vegglue.pages.headline import Headline, rms_residual
+from vegglue.pages.headline import Headline, candidate_rows, rms_residual
 from vegglue.pages.place_maps import bed_picture, field_picture, outlines, paint_places, place_picture, plan_marks
 from vegglue.pages.run import Run, accepted_causes, published_picture
 from vegglue.pages.style import COLOUR, HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, save, styled

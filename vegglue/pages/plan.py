@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -11,11 +10,27 @@ from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of
-from vegglue.pages.page import write_page
-from vegglue.pages.style import COLOUR, inline, palette_css
-from vegglue.pages.svg import linear_scale, round_ticks, svg_document, svg_element, svg_words, tick_labels
-from vegglue.results.plan import FieldPlan, PlaceChances, PlannedEffect, Work
-from vegglue.results.plan_files import LETTERS, FieldFiles, FieldPlace, field_places
+from vegglue.pages.style import (
+    COLOUR,
+    inline,
+    linear_scale,
+    palette_css,
+    round_ticks,
+    svg_document,
+    svg_element,
+    svg_words,
+    tick_labels,
+)
+from vegglue.results.plan import (
+    LETTERS,
+    FieldFiles,
+    FieldPlace,
+    FieldPlan,
+    PlaceChances,
+    PlannedEffect,
+    Work,
+    field_places,
+)
 from vegglue.wording.sentences import page_document, phrase
 
 # The map [px]: its width, letters, and room beside it; its height over its width is between these. Upright, for a
@@ -50,13 +65,8 @@ class DayOfWork:
     work: tuple[WorkInFlow, ...]
 
 
-def write_plan_page(folder: Path, case: Case, site: Site, plan: FieldPlan, files: FieldFiles) -> Path:
-    """Write plan.html into a folder; returns the page. Errors: StorageError."""
-    return write_page(folder / "plan.html", lambda: render_plan(case, site, plan, files))
-
-
 def render_plan(case: Case, site: Site, plan: FieldPlan, files: FieldFiles) -> str:
-    """The page as text."""
+    """The page of a plan as text."""
     light, dark = palette_css()
     places = field_places(plan)
     title = phrase("label", "plan") + f" {case.title or case.name}"
@@ -113,17 +123,13 @@ def days_of_work(case: Case, plan: FieldPlan, places: Sequence[FieldPlace]) -> l
                 days.append(work := [])
             begins = work[-1].ends if work else 0.0
             work.append(WorkInFlow(place, begins, begins + piece.hours, piece.y))
-        found += [_day(case, len(found) + k, flow, work) for k, work in enumerate(days, 1)]
+        discharge, level = "", ""
+        if flow in case.experiments:
+            one = case.experiments[flow]
+            *inflows, level = (f"{q:g}" if not isinstance(q, str) else q for q in (*one.discharge.values(), one.level))
+            discharge = ", ".join(inflows)
+        found += [DayOfWork(len(found) + k, flow, discharge, level, tuple(work)) for k, work in enumerate(days, 1)]
     return found
-
-
-def _day(case: Case, number: int, flow: str, work: Sequence[WorkInFlow]) -> DayOfWork:
-    if not flow or flow not in case.experiments:
-        return DayOfWork(number, flow, "", "", tuple(work))
-    one = case.experiments[flow]
-    discharge = ", ".join(f"{value:g}" if not isinstance(value, str) else value for value in one.discharge.values())
-    level = f"{one.level:g}" if not isinstance(one.level, str) else one.level
-    return DayOfWork(number, flow, discharge, level, tuple(work))
 
 
 def draw_plan_map(

@@ -21,8 +21,7 @@ from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.pages.style import Picture, publish, publish_text
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import Ensemble
-from vegglue.results.model_comparison import ModelComparison
-from vegglue.results.open_questions import Question
+from vegglue.results.loop_results import ModelComparison, Question
 from vegglue.results.posterior import Posterior
 from vegglue.whole_files import folder_within
 from vegglue.wording.sentences import page_phrase, phrase

@@ -182,7 +182,8 @@ def ensemble_table(columns: Mapping[str, Array], members: NDArray[np.int64] | No
     """CSV with one row for each member, as pyemu and PEST++ read ensembles; members: their numbers, if not 0, 1, ..."""
     rows = np.column_stack(list(columns.values()))
     numbers = range(len(rows)) if members is None else members.tolist()
-    return _csv([MEMBER, *columns], ([one, *map(repr, row)] for one, row in zip(numbers, rows.tolist(), strict=True)))
+    members_of_rows = zip(numbers, rows.tolist(), strict=True)
+    return csv_text([MEMBER, *columns], ([one, *map(repr, row)] for one, row in members_of_rows))
 
 
 def names_table(case: Case, names: Mapping[str, str], station: pd.DataFrame, observed: Sequence[str]) -> str:
@@ -192,7 +193,7 @@ def names_table(case: Case, names: Mapping[str, str], station: pd.DataFrame, obs
         ["observation", short, f"{row.experiment} {row.section} {row.kind}".strip(), "", row.x, row.y]
         for short, row in zip(observed, station.itertuples(), strict=True)
     ]
-    return _csv(["what", "name", "stands for", "unit", "x [m]", "y [m]"], [*of_parameters, *of_stations])
+    return csv_text(["what", "name", "stands for", "unit", "x [m]", "y [m]"], [*of_parameters, *of_stations])
 
 
 def write_spotpy(
@@ -207,7 +208,7 @@ def write_spotpy(
     heading += [*(f"simulation_{number}" for number in range(prediction.shape[1])), "chain"]
     rows = np.column_stack([like, *theta.values(), prediction])
     numbers = ([*map(repr, row), int(one)] for row, one in zip(rows.tolist(), chain, strict=True))
-    write_text(path, _csv(heading, numbers), MAKE_ROOM)
+    write_text(path, csv_text(heading, numbers), MAKE_ROOM)
 
 
 def write_evaluation(path: Path, station: pd.DataFrame) -> None:
@@ -216,7 +217,7 @@ def write_evaluation(path: Path, station: pd.DataFrame) -> None:
     table = zip(names, station["value"].astype(float), weights, station["kind"], strict=True)
     rows = [[f"simulation_{number}", name, repr(value), weight, kind] for number, (name, value, weight, kind) in
             enumerate(table)]  # fmt: skip
-    write_text(path, _csv(["column", "name", "value", "weight", "kind"], rows), MAKE_ROOM)
+    write_text(path, csv_text(["column", "name", "value", "weight", "kind"], rows), MAKE_ROOM)
 
 
 def log_likelihood(station: pd.DataFrame, prediction: Array) -> Array:
@@ -288,9 +289,8 @@ def read_parameters(path: Path, case: Case) -> dict[str, Array]:
     return found
 
 
-def _csv(heading: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+def csv_text(heading: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """A table as CSV."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(heading)
-    writer.writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([heading, *rows])
     return text.getvalue()

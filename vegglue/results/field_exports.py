@@ -1,7 +1,5 @@
 """Fields and stations for other programs: GeoTIFF, a netCDF mesh after CF 1.8 and UGRID 1.0, and CSV."""
 
-import csv
-import io
 import re
 import warnings
 from collections.abc import Mapping
@@ -20,6 +18,7 @@ from vegglue.case.site_schema import Frame
 from vegglue.case.text_files import names_in_files, write_text
 from vegglue.errors import InputError
 from vegglue.flow.sensor import FlowFields
+from vegglue.results.calibration_files import csv_text
 from vegglue.results.labelled_arrays import ENGINE, extra_library
 from vegglue.whole_files import failed_writes_told, write_file
 from vegglue.wording.remedies import MAKE_ROOM
@@ -244,15 +243,10 @@ def _places(x: Array, y: Array, grid: Grid, frame: Frame | None) -> list[Array]:
 
 
 def _write(path: Path, heading: list[str], columns: list[Array]) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(heading)
-
     def shown(value: object) -> str:
         """Numbers in full, so that they are the same when read again; nothing for what is unknown."""
         if isinstance(value, float | np.floating):
             return "" if np.isnan(value) else repr(float(value))
         return str(value)
 
-    writer.writerows([shown(value) for value in row] for row in zip(*columns, strict=True))
-    write_text(path, text.getvalue(), MAKE_ROOM)
+    write_text(path, csv_text(heading, (map(shown, row) for row in zip(*columns, strict=True))), MAKE_ROOM)

@@ -15,12 +15,10 @@ from vegglue.errors import InputError, StorageError, shown_command
 from vegglue.flow.sensor import FlowFields
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.diagnosis_file import diagnosis_attributes, diagnosis_from, diagnosis_groups
-from vegglue.results.ensemble import Ensemble, ensemble_from
-from vegglue.results.fields import Fields, fields_from
+from vegglue.results.ensemble import Ensemble, Fields, ensemble_from, fields_from
 from vegglue.results.hdf5 import UNREADABLE, open_hdf5, read_groups, stored_attribute, write_whole
 from vegglue.results.layout import Group, Stored, Variable, fitting, names_of
-from vegglue.results.posterior import Posterior
-from vegglue.results.posterior_file import posterior_attributes, posterior_from, posterior_groups
+from vegglue.results.posterior import Posterior, posterior_attributes, posterior_from, posterior_groups
 from vegglue.results.resume import part_file
 from vegglue.wording.remedies import KEEP_FIELDS
 

@@ -25,8 +25,7 @@ import numpy as np
 
 from vegglue.arrays import Single
 from vegglue.errors import StorageError
-from vegglue.results.ensemble import ROWS, Header, unsolved
-from vegglue.results.fields import QUANTITIES, FieldWindow, fields_group
+from vegglue.results.ensemble import QUANTITIES, ROWS, FieldWindow, Header, fields_group, unsolved
 from vegglue.results.hdf5 import (
     UNREADABLE,
     append_digest,

@@ -5,7 +5,7 @@ runs/<name>/ carry the hash of the case; a file of another state of the case is 
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral
@@ -31,7 +31,7 @@ from vegglue.flow.sensor import FlowFields
 from vegglue.inference.solve_ensemble import solve_flow
 from vegglue.measurements.observations import Observations, read_observations, refuse_unknown_limits
 from vegglue.progress import Watch, silent
-from vegglue.results.json_store import comparison_that_fits
+from vegglue.results.loop_results import comparison_that_fits
 from vegglue.results.posterior import Posterior
 from vegglue.results.result_files import (
     diagnosis_that_fits,
@@ -283,13 +283,8 @@ def median_flow(run: CaseRun, posterior: Posterior) -> dict[str, FlowFields]:
     return flow
 
 
-def excluded_in(run: CaseRun) -> pd.DataFrame:
-    """Measurements that the diagnosis of the case, or of the model its comparison begins with, has excluded."""
-    return excluded_in_all([run])
-
-
-def excluded_in_all(several: Sequence[CaseRun]) -> pd.DataFrame:
-    """Measurements excluded by the diagnosis of any of the cases."""
+def excluded_in(*several: CaseRun) -> pd.DataFrame:
+    """Measurements that the diagnosis of any of the cases, or of the model its comparison begins with, has excluded."""
     # A comparison may begin with one of the cases as it was before: with its name, but another hash.
     models = dict.fromkeys((run.runs, *model) for run in several for model in judged_by(run.case, run.runs).items())
     found = (diagnosis_that_fits(runs / name / "diagnosis.h5", wanted) for runs, name, wanted in models)

@@ -18,10 +18,17 @@ from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.json_store import comparison_that_fits, model_score_that_fits, write_comparison, write_model_score
-from vegglue.results.model_comparison import ComparedModel, ModelComparison, ModelScore
+from vegglue.results.loop_results import (
+    ComparedModel,
+    ModelComparison,
+    ModelScore,
+    comparison_that_fits,
+    model_score_that_fits,
+    write_comparison,
+    write_model_score,
+)
 from vegglue.wording.numbers import in_short, in_short_html, so_many
-from vegglue.workflow.case_run import CaseRun, calibrated, case_run, excluded_in_all
+from vegglue.workflow.case_run import CaseRun, calibrated, case_run, excluded_in
 
 # What the name of a case with a finished result ends with when the built-in engine predicts.
 BUILT_IN = "-built-in"
@@ -85,7 +92,7 @@ def compare(
         several.insert(0, several[0].of(theirs.model_copy(update=own)))
     hashes = [run.config_hash for run in several]  # before anything is read, see CaseRun.config_hash
     refuse_other_measurements(several)
-    aside, model_scores = excluded_in_all(several), []
+    aside, model_scores = excluded_in(*several), []
     with at_most(several[0].jobs):
         for number, run in enumerate(several):
             run.watch(Progress(with_compilation(f"comparing {run.case.name}"), number, len(several), "models"))

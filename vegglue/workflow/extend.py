@@ -35,7 +35,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.parallel import at_most, in_threads, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.json_store import comparison_that_fits, write_model_score
+from vegglue.results.loop_results import comparison_that_fits, write_model_score
 from vegglue.results.result_files import diagnosis_that_fits
 from vegglue.wording.numbers import in_short
 from vegglue.wording.sentences import sentence, tagged

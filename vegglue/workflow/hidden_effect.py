@@ -182,11 +182,7 @@ def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.
     in no list stands anywhere on the floor.
     """
     if listed:
-        drawn = {
-            shape.name: float(random.uniform(min(shape.grid), max(shape.grid))) if shape.grid else shape.default
-            for shape in candidate.effect.shapes
-        }
-        return drawn | dict(candidate.fixed)
+        return candidate.drawn_shapes(random)
     used = model.station[model.station["used"]]
     low, high = model.case.grid.x
     first, last = (low + share * (high - low) for share in PLACED_ALONG)

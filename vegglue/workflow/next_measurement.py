@@ -22,8 +22,7 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Progress, Watch, silent
 from vegglue.results.causes import CandidateEffect, CandidateLaw, CandidateLaws
 from vegglue.results.diagnosis import Diagnosis
-from vegglue.results.json_store import questions_that_fit, write_questions
-from vegglue.results.open_questions import (
+from vegglue.results.loop_results import (
     HiddenEffect,
     HiddenLaw,
     OneOfRivals,
@@ -31,6 +30,8 @@ from vegglue.results.open_questions import (
     Question,
     RivalEffects,
     Subject,
+    questions_that_fit,
+    write_questions,
 )
 from vegglue.wording.phases import WEIGHING
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run

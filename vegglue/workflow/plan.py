@@ -11,8 +11,7 @@ from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.plain_json import plain
 from vegglue.progress import Watch, silent
-from vegglue.results.plan import FieldPlan, plan_json
-from vegglue.results.plan_files import write_field_files
+from vegglue.results.plan import FieldPlan, plan_json, write_field_files
 from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.workflow.case_run import CaseRun, case_run
 
@@ -78,7 +77,7 @@ def plan(
     folder = run.folder / FOLDER
     files = write_field_files(folder, run.case, found)
     write_text(folder / "plan.json", json.dumps(plain(plan_json(found)), allow_nan=False), MAKE_ROOM)
-    from vegglue.pages.plan import write_plan_page
+    from vegglue.pages.plan import render_plan
 
-    write_plan_page(folder, run.case, run.site, found, files)
+    write_text(folder / "plan.html", render_plan(run.case, run.site, found, files), MAKE_ROOM)
     return found

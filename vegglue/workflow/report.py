@@ -11,12 +11,11 @@ from vegglue.diagnosis.comparison import without_stations
 from vegglue.errors import InputError, shown_command, shown_path
 from vegglue.inference.command_ensemble import refuse_useless
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
-from vegglue.pages.overview import write_overview
-from vegglue.pages.page import write_report
+from vegglue.pages.page import write_overview, write_report
 from vegglue.pages.run import LoopResults, Run
 from vegglue.parallel import one_thread
 from vegglue.progress import Progress, Watch, silent
-from vegglue.results.json_store import comparison_that_fits, questions_that_fit
+from vegglue.results.loop_results import comparison_that_fits, questions_that_fit
 from vegglue.results.result_files import diagnosis_that_fits, read_ensemble, read_posterior
 from vegglue.results.resume import begun_or_finished
 from vegglue.wording.phases import DRAWING, SOLVING_FLOW

@@ -1,0 +1,355 @@
+"""The rules that make a verdict of what a diagnosis found. Silence has to be earned, and so has a name: see DECISIONS.
+
+A new reason is a class in `results/verdict.py`, its rule here, and its macro in wording/templates/verdict.j2.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from dataclasses import field as by_default
+
+from vegglue.case.parameter_space import FURTHEST
+from vegglue.decision_constants import constants
+from vegglue.effects.identity import EffectIdentity
+from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues
+from vegglue.measurements.section_discharge import CHANGE_DISCHARGE, CarriedDischarge, discharge_mismatches
+from vegglue.normal_range import NORMAL95
+from vegglue.results.causes import (
+    CandidateEffect,
+    CandidateLaws,
+    FaultyInstrument,
+    FieldFound,
+    LocalAnomaly,
+    ModelErrorUsed,
+    Rival,
+    Step,
+    effects_among,
+)
+from vegglue.results.verdict import (
+    AmplitudeAtBound,
+    AmplitudeBeyondPlausible,
+    BedCorrected,
+    ChiSquare,
+    CorrelatedErrors,
+    EffectFound,
+    EffectsExcluded,
+    EffectsNotExcluded,
+    EffectsStillSignificant,
+    EffectsTested,
+    EffectsUntestable,
+    ErrorsLargerThanStated,
+    ErrorsStillLarger,
+    EstimatedErrors,
+    FewTestable,
+    HeldOutMissed,
+    ImplausibleAmplitude,
+    InstrumentExcluded,
+    LawStandsOut,
+    MisfitBeyondErrors,
+    MisfitRemains,
+    MisfitTooSmall,
+    MisfitUnexplained,
+    ModelErrorExceeded,
+    NameHangsOnSection,
+    NeighboursCorrelated,
+    NeighboursExcluded,
+    NoFlowHeldOut,
+    NoneLeads,
+    Note,
+    ParameterFarFromPrior,
+    Reason,
+    Remaining,
+    StatedErrorsTooSmall,
+    TooManyGroups,
+    UncertainBetweenSections,
+    Verdict,
+    VerdictKind,
+    is_too_small,
+)
+
+# Effects of the library, and terms at a place, that let sections read another discharge than stated: water that comes
+# or goes, readings that are off as a whole, a bed or a level that is not there.
+OF_DISCHARGES = (
+    *CHANGE_DISCHARGE, "outlet_level_error", "gauge_datum", "device_gain", "probe_gain", "zero_offset",
+    "partial_depth", "floor_level_error", "bank_level_error", "bed_slope_error", "flank_scour",
+)  # fmt: skip
+TERMS_OF_DISCHARGES, OF_DEVICES = ("inflow", "bed"), ("device_gain", "zero_offset")
+# Share of a plausible size within which an amplitude lies at an end of its support: as far off as refits start at
+# least, see `candidates.START_OFF_ENDS`.
+AT_BOUND = 0.01
+# Amplitude over a plausible one, above which it is noted as too large to be believed. Chosen, not measured.
+IMPLAUSIBLE = 3.0
+
+
+@dataclass(frozen=True)
+class VerdictInputs:
+    """What a verdict rests on.
+
+    candidates: every tested effect, the strongest first; implausible: values that no flow can have; held_out: errors at
+    held-out measurements over the expected ones [-], NaN without any, infinite without a flow; by_chance: what of that
+    errors alone exceed in 5 % of cases; neighbours: whether readings side by side are excluded; strained: the
+    parameter furthest off its prior, and how far [standard deviations]; between: errors between the sections over those
+    of the data [-]; carried: sections that clearly carry another discharge than stated; remainder: whether all
+    significant effects may be a remainder of what was accepted; surroundings: notes on the map, the measured stretch,
+    the depth and the parameters; excluded: effects that cannot act at the site, with the reason of each; hangs_on: the
+    section without which another name leads; bed: where it differs from the surveyed one, the clearest first.
+    """
+
+    candidates: tuple[CandidateEffect, ...]
+    errors: EstimatedErrors
+    misfit: ChiSquare
+    steps: tuple[Step, ...] = ()
+    places: tuple[LocalAnomaly, ...] = ()
+    instruments: tuple[FaultyInstrument, ...] = ()
+    undecided: tuple[Rival, ...] = ()
+    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()
+    field: FieldFound | None = None
+    laws: CandidateLaws | None = None
+    model_error: ModelErrorUsed | None = None
+    not_excluded: tuple[tuple[str, ...], ...] = ()
+    held_out: float = float("nan")
+    by_chance: float = 1.0
+    neighbours: bool = False
+    strained: tuple[str, float] = ("", 0.0)
+    between: float = 1.0
+    carried: tuple[CarriedDischarge, ...] = ()
+    significant_effects: Mapping[str, float] = by_default(default_factory=dict)
+    remainder: bool = False
+    surroundings: tuple[Note, ...] = ()
+    excluded: Mapping[str, str] = by_default(default_factory=dict)
+    hangs_on: NameHangsOnSection | None = None
+    bed: tuple[BedCorrected, ...] = ()
+
+
+def make_verdict(inputs: VerdictInputs) -> Verdict:
+    """The verdict on what was found, with what remains and what else should be known."""
+    testable = sum(one.detectability.testable for one in inputs.candidates)
+    plain = Verdict(
+        kind="cannot-tell",
+        misfit=inputs.misfit,
+        effects=tuple(effect_found(step, inputs.candidates) for step in inputs.steps),
+        places=inputs.places,
+        tested=EffectsTested(effects_among(inputs.candidates), len(inputs.candidates), testable),
+        not_excluded=inputs.not_excluded,
+        significant_effects=dict(inputs.significant_effects),
+    )
+    found = _concluded(inputs, plain)
+    remaining: list[Remaining] = []
+    if (inputs.steps or inputs.places) and found.kind != "cannot-tell" and inputs.field is None:
+        if inputs.errors.clearly_larger:
+            remaining.append(ErrorsStillLarger(inputs.errors.scale))
+        if ranked := sorted(inputs.significant_effects.items(), key=lambda one: one[1]):
+            remaining.append(EffectsStillSignificant(tuple(ranked), inputs.remainder))
+    explained = () if found.doubts_the_data else tuple(discharge_mismatches(inputs.carried))
+    sure = not (found.kind == "cannot-tell" or found.reasons or remaining or found.field or found.laws)
+    bed = inputs.bed[0] if inputs.bed and sure and found.anomaly is None else None
+    found = replace(found, remaining=tuple(remaining), may_explain=explained, bed=bed)
+    return replace(found, notes=tuple(_notes(inputs, found)))
+
+
+def _concluded(inputs: VerdictInputs, plain: Verdict) -> Verdict:
+    """Kind, reasons and what is named: data first, then doubt, laws, fields, places, effects, and silence."""
+    if inputs.implausible:
+        return replace(plain, reasons=inputs.implausible)
+    if off := _unexplained(inputs):
+        return replace(plain, reasons=tuple(discharge_mismatches(off)))
+    doubt, laws, accepted = _doubt(inputs), inputs.laws, bool(inputs.steps or inputs.places)
+    if laws is not None:
+        nothing_else = not (accepted or inputs.undecided or inputs.field)
+        if nothing_else or (not doubt and laws.likelier and not accepted):
+            return _with_laws(inputs, plain, laws, doubt)
+    if inputs.field is not None:
+        return replace(plain, kind="none-of-these", field=inputs.field)
+    if accepted and doubt:
+        return replace(plain, reasons=(doubt,))
+    if inputs.places:
+        return replace(plain, kind="none-of-these")
+    if inputs.steps:
+        first = inputs.steps[0]
+        if len(first.groups) > constants().most_groups:
+            effects = tuple(Rival(name, "effect", first.chance[name]) for name in first.rivals)
+            return replace(plain, reasons=(TooManyGroups(effects),))
+        single = all(len(step.rivals) == 1 and not step.others for step in inputs.steps)
+        kind: VerdictKind = "identified" if single and laws is None else "one-of"
+        if laws is not None and laws.clear:
+            kind = "none-of-these"
+        return replace(plain, kind=kind, laws=laws, instruments=inputs.instruments)
+    if inputs.undecided:
+        return replace(plain, undecided=inputs.undecided, reasons=(NoneLeads(),))
+    return _silent(inputs, plain)
+
+
+def _unexplained(inputs: VerdictInputs) -> list[CarriedDischarge]:
+    """Sections that carry another discharge than stated, for no reason among what was accepted."""
+    if any(place.term in TERMS_OF_DISCHARGES for place in inputs.places):
+        return []
+    names = {step.accepted for step in inputs.steps}
+    believed = [
+        EffectIdentity.parse(one.name)
+        for one in inputs.candidates
+        if one.name in names and one.amplitude.relative_size <= constants().far_off_prior
+    ]
+
+    def may_be_why(one: EffectIdentity, section: CarriedDischarge) -> bool:
+        # Which sections a device measured is not known here.
+        acts = not one.target or one.name in OF_DEVICES or bool({section.experiment, section.section} & set(one.target))
+        return one.name in OF_DISCHARGES and acts
+
+    return [section for section in inputs.carried if not any(may_be_why(one, section) for one in believed)]
+
+
+def _doubt(inputs: VerdictInputs) -> Reason | None:
+    """Why no name can be believed, None when it can."""
+    parameter, far = inputs.strained
+    ratio = inputs.misfit.value / max(inputs.misfit.freedom, 1)
+    if ratio > constants().absurd_misfit:
+        return MisfitBeyondErrors(math.sqrt(ratio))
+    if far > constants().far_off_prior:
+        return ParameterFarFromPrior(parameter, far)
+    names = {step.accepted for step in inputs.steps}
+    at_bound = []
+    for one in (each for each in inputs.candidates if each.name in names):
+        # An end other than that at which it is off, or as far off its prior as a calibration goes.
+        amplitude = one.amplitude
+        ends = [end for end in amplitude.support if end != amplitude.off]
+        near = any(abs(amplitude.value - end) < AT_BOUND * amplitude.scale for end in ends)
+        if near or amplitude.relative_size > FURTHEST - AT_BOUND:
+            at_bound.append(one.name)
+    if at_bound:
+        return AmplitudeAtBound(tuple(at_bound))
+    sizes = [(one.amplitude.relative_size, one.name) for one in inputs.candidates if one.name in names]
+    sizes += [(abs(one.amplitude) / one.plausible, f"{one.term} at a place") for one in inputs.places]
+    size, name = max(sizes, default=(0.0, ""))
+    return AmplitudeBeyondPlausible(name, float(size)) if size > constants().far_off_prior else inputs.hangs_on
+
+
+def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt: Reason | None) -> Verdict:
+    """Laws if no known effect explains the misfit, and if errors need not be absurdly large beside them; an instrument
+    that is clearly off goes before laws that are not likelier than all else, except readings side by side.
+    """
+    found = replace(plain, laws=laws)
+    used, absurd = inputs.model_error, math.sqrt(constants().absurd_misfit)
+    if inputs.errors.scale > absurd:
+        doubt = doubt or ErrorsLargerThanStated(inputs.errors.scale)
+    if used is not None and used.needed > 2.0 * absurd:  # four times what is allowed; chosen, not measured
+        doubt = doubt or ModelErrorExceeded(used.needed, used.friction)
+    if inputs.neighbours and not laws.likelier:
+        doubt = doubt or NeighboursExcluded()
+    if doubt:
+        return replace(found, reasons=(doubt,))
+    if laws.likelier:
+        return replace(found, kind="none-of-these")
+    if inputs.instruments and all(map(is_clear, inputs.instruments)):
+        return replace(found, kind="instrument", instruments=inputs.instruments)
+    return found
+
+
+def _silent(inputs: VerdictInputs, plain: Verdict) -> Verdict:
+    """Nothing is missing, or an instrument is off, if silence is earned."""
+    clear = tuple(filter(is_clear, inputs.instruments))
+    all_clear = bool(clear) and len(clear) == len(inputs.instruments) and not inputs.neighbours
+    named = inputs.instruments if all_clear else ()
+    if inputs.misfit.p < constants().poor_fit_chance:
+        return replace(plain, reasons=(MisfitUnexplained(),))
+    if unearned := _unearned(inputs):
+        return replace(plain, reasons=(unearned,), instruments=named)
+    if inputs.between > constants().held_out_ratio:
+        kind: VerdictKind = "instrument" if all_clear else "cannot-tell"
+        return replace(plain, kind=kind, reasons=(UncertainBetweenSections(inputs.between),), instruments=named)
+    if plain.tested.testable < constants().testable_share * max(len(inputs.candidates), 1):
+        return replace(plain, reasons=(FewTestable(),))
+    return replace(plain, kind="instrument" if clear else "nothing-missing", instruments=clear, clears_the_model=True)
+
+
+def _unearned(inputs: VerdictInputs) -> Reason | None:
+    """Why it cannot be concluded that nothing is missing, None when it can."""
+    errors, used = inputs.errors, inputs.model_error
+    if errors.clearly_larger:
+        return ErrorsLargerThanStated(errors.scale)
+    if errors.correlation > constants().largest_correlation:
+        return CorrelatedErrors(errors.correlation)
+    if inputs.neighbours:
+        return NeighboursExcluded()
+    if used is not None and used.asks_for_more:
+        return ModelErrorExceeded(used.needed, used.friction)
+    if inputs.held_out == math.inf:
+        return NoFlowHeldOut()
+    if inputs.held_out > max(constants().held_out_ratio, inputs.by_chance):
+        return HeldOutMissed(inputs.held_out)
+    return None
+
+
+def is_clear(instrument: FaultyInstrument) -> bool:
+    """Whether an instrument is off by instrument_errors of its standard errors."""
+    low, high = instrument.interval95
+    return bool(abs(instrument.offset) > constants().instrument_errors * (high - low) / (2.0 * NORMAL95))
+
+
+def effect_found(step: Step, candidates: Iterable[CandidateEffect]) -> EffectFound:
+    """An accepted effect with what it may be instead, the likeliest first."""
+    best = next(one for one in candidates if one.name == step.accepted)
+    alike = next(group for group in step.groups if step.accepted in group)
+    first = step.likelier_place
+    rivals = [Rival(name, "effect", step.chance[name]) for name in step.rivals if name not in alike]
+    for name, chance in step.others.items():
+        place = step.places.get(name)
+        if name != first:
+            at = {} if place is None else {"x": place.x, "y": place.y, "amplitude": place.amplitude}
+            rivals.append(Rival(name, name if place is None else place.term, chance, **at))
+    return EffectFound(
+        name=best.name,
+        title=best.title,
+        amplitude=best.amplitude.value,
+        interval95=best.amplitude.interval95,
+        unit=best.amplitude.unit,
+        probability=sum(step.chance[name] for name in alike),
+        alike=tuple(name for name in alike if name != step.accepted),
+        rivals=tuple(sorted(rivals, key=lambda one: -one.probability)),
+        likelier=step.places[first] if first else None,
+        likelier_probability=step.others[first] if first else float("nan"),
+    )
+
+
+def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
+    """What else should be known, on discharges and on what is named first."""
+    misfit, errors, accepted = inputs.misfit, inputs.errors, tuple(step.accepted for step in inputs.steps)
+    yield from discharge_mismatches(inputs.carried)
+    if is_too_small(misfit.value, misfit.freedom):
+        yield MisfitTooSmall(misfit.value, misfit.freedom)
+    by_name = {one.name: one for one in inputs.candidates}
+    for name in accepted:
+        if (times := by_name[name].amplitude.relative_size) > IMPLAUSIBLE:
+            yield ImplausibleAmplitude(name, times)
+    hidden = tuple(name for group in inputs.not_excluded for name in group)
+    if hidden and misfit.p >= constants().poor_fit_chance:
+        yield EffectsNotExcluded(hidden, bool(inputs.steps or inputs.places))
+    if inputs.excluded:
+        yield EffectsExcluded(tuple(inputs.excluded.items()))
+    if inputs.model_error is not None:
+        yield inputs.model_error
+    if inputs.laws is not None and found.laws is None:
+        yield LawStandsOut(inputs.laws, accepted)
+    if errors.correlation > 0:
+        yield NeighboursCorrelated(errors.correlation)
+    if errors.scale > 1 and not any(isinstance(one, ErrorsStillLarger) for one in found.remaining):
+        yield StatedErrorsTooSmall(errors.scale)
+    others = [one for one in inputs.instruments if one not in found.instruments]
+    yield from (InstrumentExcluded(one, is_clear(one), constants().instrument_errors) for one in others)
+    elsewhere, alike = {*hidden, *accepted}, dict[str, list[CandidateEffect]]()
+    blind = [one for one in inputs.candidates if not one.detectability.testable]
+    unnamed = [one for one in blind if one.name not in {*elsewhere, *inputs.significant_effects}]
+    for one in unnamed:  # by what they look like, the largest group first
+        alike.setdefault(one.detectability.looks_like, []).append(one)
+    groups = sorted(alike.items(), key=lambda group: (not group[0], -len(group[1])))
+    if unnamed:
+        yield EffectsUntestable(
+            tuple((parameter, tuple(one.name for one in some)) for parameter, some in groups),
+            effects_among(unnamed),
+            len(unnamed),
+            any(one.name in elsewhere for one in blind),
+        )
+    yield from inputs.surroundings
+    yield from (one for one in inputs.bed if one is not found.bed)
+    named = found.kind in ("identified", "one-of", "none-of-these", "instrument")
+    if named and misfit.p < constants().poor_fit_chance and found.laws is None:
+        yield MisfitRemains(misfit)

@@ -1,0 +1,434 @@
+"""What the loop leaves beside a diagnosis: what models miss, one by one and side by side, the baseline first; and what
+is still to be separated, with the measurements that could.
+
+They are kept as JSON in the folder of a run: rung.json, comparison.json and questions.json, each with the config hash.
+What belongs to another state of the case, or cannot be read, counts as not there.
+"""
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from vegglue.arrays import Array
+from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
+from vegglue.measurements.kinds import KINDS
+from vegglue.plain_json import number_kept, plain
+from vegglue.wording.numbers import in_short, in_short_html, so_many
+from vegglue.wording.remedies import MAKE_ROOM
+from vegglue.wording.sentences import phrase, sentence, tag_of, tagged
+
+
+@dataclass(frozen=True)
+class InSample:
+    """Errors at what the calibration used.
+
+    Attributes
+    ----------
+    rmse
+        Root mean square error by kind [its unit], NaN if not measured.
+    chi2, stations
+        Of independent errors [-], over so many stations.
+    noise_floor
+        Root mean square measurement error of a velocity [m/s].
+    """
+
+    rmse: dict[str, float]
+    chi2: float
+    stations: int
+    noise_floor: float
+
+    @property
+    def velocity(self) -> float:
+        """That of velocities along x, else of the first other direction that was measured [m/s]; NaN without any."""
+        of_kinds = (self.rmse[kind.name] for kind in KINDS.values() if kind.velocity)
+        return next((error for error in of_kinds if np.isfinite(error)), float("nan"))
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors of each used station when its section, or its experiment, is left out of the calibration.
+
+    Attributes
+    ----------
+    sections, experiments
+        (n,) [unit of the kind], NaN if nothing could be left out.
+    velocity
+        Which are velocities along x, or of any direction if there is none along x (n,).
+    clusters
+        Experiment and section of each.
+    """
+
+    sections: Array
+    experiments: Array
+    velocity: np.ndarray
+    clusters: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class PredictiveScores:
+    """How well held-out velocities are predicted with their spread; NaN if nothing could be left out.
+
+    Attributes
+    ----------
+    log_score
+        Mean log predictive density by sections [-].
+    inside50, inside95
+        Share within the 50 % and the 95 % band [-].
+    """
+
+    log_score: float
+    inside50: float
+    inside95: float
+
+
+@dataclass(frozen=True)
+class ModelScore:
+    """The errors of one model of a comparison.
+
+    Attributes
+    ----------
+    name, title, effects
+        Of the case.
+    values
+        Parameters with their 95 % intervals.
+    in_sample : InSample
+    held_out : HeldOut
+    predictive : PredictiveScores
+    homogeneity
+        Chance that a parameter is the same in all experiments, by name [-].
+    validation
+        Root mean square error of velocities that no calibration used [m/s], NaN without them.
+    validation_inside95
+        Share of them within the 95 % band, of a bed whose survey states its error [-]; else NaN.
+    """
+
+    name: str
+    title: str
+    effects: tuple[str, ...]
+    values: dict[str, tuple[float, float, float]]
+    in_sample: InSample
+    held_out: HeldOut
+    predictive: PredictiveScores
+    homogeneity: dict[str, float]
+    validation: float
+    validation_inside95: float = float("nan")
+
+
+def model_score_from(tree: Mapping[str, Any]) -> ModelScore:
+    """The score of a model from an object of JSON, which has null for no number.
+
+    Errors: KeyError, TypeError or ValueError where it is none.
+    """
+    seen, held_out = tree["in_sample"], tree["held_out"]
+    return ModelScore(
+        name=str(tree["name"]),
+        title=str(tree["title"]),
+        effects=tuple(tree["effects"]),
+        values={name: (number_kept(a), number_kept(b), number_kept(c)) for name, (a, b, c) in tree["values"].items()},
+        in_sample=InSample(
+            rmse={kind: number_kept(seen["rmse"][kind]) for kind in KINDS},
+            chi2=number_kept(seen["chi2"]),
+            stations=int(seen["stations"]),
+            noise_floor=number_kept(seen["noise_floor"]),
+        ),
+        held_out=HeldOut(
+            sections=np.array([number_kept(error) for error in held_out["sections"]]),
+            experiments=np.array([number_kept(error) for error in held_out["experiments"]]),
+            velocity=np.array([bool(one) for one in held_out["velocity"]]),
+            clusters=tuple((str(experiment), str(section)) for experiment, section in held_out["clusters"]),
+        ),
+        predictive=PredictiveScores(**{name: number_kept(value) for name, value in tree["predictive"].items()}),
+        homogeneity={name: number_kept(p) for name, p in tree["homogeneity"].items()},
+        validation=number_kept(tree["validation"]),
+        validation_inside95=number_kept(tree.get("validation_inside95")),
+    )
+
+
+# Errors of a step, which may be unknown.
+ERRORS = ("in_sample", "held_out_sections", "held_out_experiments", "unseen", "noise_floor")
+
+
+@dataclass(frozen=True)
+class ComparedModel:
+    """One model of a stored comparison.
+
+    Attributes
+    ----------
+    name, config, config_hash
+        Of the case.
+    added
+        Effects that the model before has not.
+    parameters
+        Their number.
+    in_sample, held_out_sections, held_out_experiments, unseen
+        Root mean square errors of velocities along x [m/s], NaN if there are none.
+    noise_floor
+        Measurement error [m/s].
+    """
+
+    name: str
+    config: str
+    config_hash: str
+    added: tuple[str, ...]
+    parameters: int
+    in_sample: float
+    held_out_sections: float
+    held_out_experiments: float
+    unseen: float
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class ModelComparison:
+    """Models side by side.
+
+    Attributes
+    ----------
+    steps : tuple of ComparedModel
+    left_out
+        Number of readings excluded for all.
+    reason
+        Why it ends; empty unless models were searched.
+    verdict
+        Digest of the verdict that named what was added; empty unless models were searched.
+    unclear
+        Names of what was added although the fall of held-out errors may be chance.
+    """
+
+    steps: tuple[ComparedModel, ...]
+    left_out: int
+    reason: str
+    verdict: str = ""
+    unclear: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return in_short(
+            f"Comparison of {so_many(len(self.steps), 'model')}",
+            [
+                f"{one.name}: RMSE {one.in_sample:.3g} m/s, sections left out {one.held_out_sections:.3g} m/s"
+                for one in self.steps
+            ],
+        )
+
+    def _repr_html_(self) -> str:
+        headings = ("model", "parameters", "RMSE [m/s]", "sections left out", "experiments left out", "validation")
+        rows = [
+            (
+                one.name,
+                f"{one.parameters}",
+                *(
+                    "" if np.isnan(error) else f"{error:.3g}"
+                    for error in (one.in_sample, one.held_out_sections, one.held_out_experiments, one.unseen)
+                ),
+            )
+            for one in self.steps
+        ]
+        return in_short_html(repr(self).split("\n")[0], headings, rows)
+
+
+def comparison_from(tree: Mapping[str, Any]) -> ModelComparison:
+    """The comparison of an object of JSON, which has null for no number.
+
+    Errors: KeyError, TypeError or ValueError where it is none.
+    """
+    steps = []
+    for step in tree["steps"]:
+        errors = {name: number_kept(step[name]) for name in ERRORS}
+        steps.append(ComparedModel(**{**step, **errors, "added": tuple(step["added"])}))
+    reason, verdict, unclear = str(tree["reason"]), str(tree["verdict"]), tuple(map(str, tree["unclear"]))
+    return ModelComparison(tuple(steps), int(tree["left_out"]), reason, verdict, unclear)
+
+
+# Below this D^2 a measurement does not separate anything.
+SEPARATES = 4.0
+# Measurements shown of each question: more than these cannot be planned in one season.
+SHOWN = 4
+# A measurement that raises D^2 by less than a tenth adds nothing.
+ADDS = 1.1
+
+
+@dataclass(frozen=True)
+class RivalEffects:
+    """Effects, laws or places to separate from each other."""
+
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class OneOfRivals:
+    """One of several rivals to separate from all others."""
+
+    name: str
+    others: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class HiddenEffect:
+    """An effect to separate from a change of the parameter that leaves its trace."""
+
+    name: str
+    parameter: str
+
+
+@dataclass(frozen=True)
+class HiddenLaw:
+    """A law to separate from what calibration absorbs."""
+
+    name: str
+
+
+Subject = RivalEffects | OneOfRivals | HiddenEffect | HiddenLaw
+SUBJECTS: Mapping[str, type] = {tag_of(one): one for one in get_args(Subject)}
+
+
+@dataclass(frozen=True)
+class ProposedMeasurement:
+    """A measurement that could separate rivals.
+
+    Attributes
+    ----------
+    name
+        In words.
+    experiment, x, stations
+        In which experiment, at which place [m], and how many.
+    hours
+        Field work [h].
+    now, then
+        Squared standard errors D^2 between the nearest rivals, now and with it [-].
+    """
+
+    name: str
+    experiment: str
+    x: float
+    stations: int
+    hours: float
+    now: float
+    then: float
+
+    @property
+    def per_hour(self) -> float:
+        """What it adds to D^2 for each hour of field work [1/h]."""
+        return (self.then - self.now) / self.hours
+
+
+@dataclass(frozen=True)
+class Question:
+    """What to separate, and the measurements that could.
+
+    Attributes
+    ----------
+    about
+        The rivals.
+    measurements : tuple of ProposedMeasurement
+        By what they add in an hour.
+    seen_from
+        D^2 from which a diagnosis detects it 19 times of 20 [-]; infinite if that depends on no size.
+    """
+
+    about: Subject
+    measurements: tuple[ProposedMeasurement, ...]
+    seen_from: float = math.inf
+
+    @property
+    def tells_apart(self) -> str:
+        """What is to be separated, in words."""
+        return sentence(self.about)
+
+    @property
+    def answered(self) -> bool:
+        """Whether the data at hand would have shown it."""
+        return any(one.now >= self.seen_from for one in self.measurements)
+
+    @property
+    def useful(self) -> tuple[ProposedMeasurement, ...]:
+        """Those that would separate it by themselves, the few best ones; none if it is answered."""
+        if self.answered:
+            return ()
+        enough = (one for one in self.measurements if one.then >= SEPARATES and one.then > ADDS * one.now)
+        return tuple(enough)[:SHOWN]
+
+    @property
+    def nearest(self) -> ProposedMeasurement | None:
+        """The measurement that comes nearest to it, if there is any."""
+        return max(self.measurements, key=lambda one: one.then, default=None)
+
+    def __repr__(self) -> str:
+        return "\n".join([sentence(self), *(f"- {phrase('proposed_measurement', one)}" for one in self.useful)])
+
+
+def questions_from(tree: Sequence[Mapping[str, Any]]) -> tuple[Question, ...]:
+    """The questions of a list of JSON, null for a size that is never seen.
+
+    Errors: KeyError, TypeError or ValueError where it is none.
+    """
+    return tuple(
+        Question(
+            about=TypeAdapter(SUBJECTS[one["about"]["kind"]]).validate_python(one["about"]),
+            measurements=TypeAdapter(tuple[ProposedMeasurement, ...]).validate_python(one["measurements"]),
+            seen_from=math.inf if one["seen_from"] is None else float(one["seen_from"]),
+        )
+        for one in tree
+    )
+
+
+SCORE_FORMAT, COMPARISON_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 3", "vegglue questions 4"
+SCORE_FILE, COMPARISON_FILE, QUESTIONS_FILE = "rung.json", "comparison.json", "questions.json"
+Kept = TypeVar("Kept")
+# A measurement that is left out: where it stands, and its value.
+MeasurementRow = Sequence[str | float]
+
+
+def write_model_score(folder: Path, score: ModelScore, left_out: Sequence[MeasurementRow], config_hash: str) -> None:
+    """Keep what a model misses, calibrated without some measurements. Errors: StorageError."""
+    told = {"left_out": [*map(list, left_out)], "rung": asdict(score)}
+    _write(folder / SCORE_FILE, SCORE_FORMAT, config_hash, told)
+
+
+def model_score_that_fits(folder: Path, left_out: Sequence[MeasurementRow], config_hash: str) -> ModelScore | None:
+    """What the model of exactly this config misses, without exactly these measurements; None where it is not kept."""
+
+    def understand(told: Any) -> ModelScore | None:
+        return model_score_from(told["rung"]) if told["left_out"] == [*map(list, left_out)] else None
+
+    return _read_if_it_fits(folder / SCORE_FILE, SCORE_FORMAT, config_hash, understand)
+
+
+def write_comparison(folder: Path, comparison: ModelComparison, config_hash: str) -> None:
+    """Keep a comparison in the folder of one of its models, whose config hash is given. Errors: StorageError."""
+    _write(folder / COMPARISON_FILE, COMPARISON_FORMAT, config_hash, asdict(comparison))
+
+
+def comparison_that_fits(folder: Path, config_hash: str) -> ModelComparison | None:
+    """The comparison kept there for exactly this config, None without."""
+    return _read_if_it_fits(folder / COMPARISON_FILE, COMPARISON_FORMAT, config_hash, comparison_from)
+
+
+def write_questions(folder: Path, questions: Sequence[Question], config_hash: str) -> None:
+    """Keep what to measure next, which may be nothing. Errors: StorageError."""
+    _write(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, tagged(tuple(questions)))
+
+
+def questions_that_fit(folder: Path, config_hash: str) -> tuple[Question, ...] | None:
+    """The questions kept there for exactly this config; None if none were asked, empty if nothing is left to ask."""
+    return _read_if_it_fits(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, questions_from)
+
+
+def _write(path: Path, file_format: str, config_hash: str, told: Any) -> None:
+    tree = {"format": file_format, "config_hash": config_hash, "told": told}
+    write_text(path, json.dumps(plain(tree), ensure_ascii=False, indent=1, allow_nan=False) + "\n", MAKE_ROOM)
+
+
+def _read_if_it_fits(path: Path, file_format: str, config_hash: str, understand: Callable[[Any], Kept]) -> Kept | None:
+    try:
+        tree = json.loads(read_text(path, LARGEST_JSON))
+        if (tree["format"], tree["config_hash"]) != (file_format, config_hash):
+            return None
+        return understand(tree["told"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        return None
