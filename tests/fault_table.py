@@ -247,17 +247,15 @@ kept.
 
 ## How it is done
 
-- A file appears under its name only when it is whole and on the disk; it grows beside that place, with `.new` at its end.
-- Whole results end with the SHA-256 of all bytes before it, which other readers of HDF5 ignore. A separate process reads
-  every result first and compares shapes and types, as the HDF5 library reads some damaged files without end.
-- Members are kept chunk by chunk in `ensemble.h5.part`, each chunk with a checksum; the next run takes over the chunks
-  whose checksum is right.
-- An ensemble is written by one process at a time, by a lock of the operating system. Of two writers of a diagnosis, a
-  posterior or a page the later one stays. Locks of some network disks reach one machine only; the first of two runs then
-  stops with a message, and the second is whole.
+- A file appears under its name only when it is whole and on the disk.
+- Whole results end with the SHA-256 of all bytes before it. A separate process reads every result first, as the HDF5
+  library reads some damaged files without end.
+- Members are kept chunk by chunk in `ensemble.h5.part`; the next run takes over the chunks whose checksum is right.
+- An ensemble is written by one process at a time, by a lock of the operating system. Locks of some network disks reach
+  one machine only; the first of two runs then stops with a message, and the second is whole. Of two writers of a
+  diagnosis, a posterior or a page the later one stays.
 - A file with links or with data in other files is refused; a link in the folder of a run is replaced, not followed.
-- Configs that `import`, `extend` and `twin` write end with checksums: files that you edited are replaced with `--force`
-  only.
+- Configs that `import`, `extend` and `twin` write, if you edited them, are replaced with `--force` only.
 
 ## What other people's files hold
 
