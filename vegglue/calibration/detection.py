@@ -81,7 +81,20 @@ def detected_length(threshold: Array, chance: float = PLANNED_POWER, only_sign: 
 
 
 def chance_over_prior(size: Array, threshold: Array) -> Array:
-    """2 Phi(-t / (1 + a^2)^(1/2)): chance that an effect is detected whose gain is normal with a = s |S_perp| [-]."""
+    """2 Phi(-t / (1 + a^2)^(1/2)),   a = s |S_perp|: chance that an effect with a normal gain is detected.
+
+    Parameters
+    ----------
+    size : ndarray (c,)
+        a [-].
+    threshold : ndarray (c,)
+        t [standard errors].
+
+    Returns
+    -------
+    ndarray (c,)
+        [-]
+    """
     return np.asarray(2.0 * ndtr(-threshold / np.hypot(1.0, size)))
 
 
@@ -93,7 +106,22 @@ def chance_to_separate(squared_distance: Array) -> Array:
 
 
 def single_threshold(size: Array, log_prior: Array, level: float) -> Array:
-    """t of one hypothesis by itself (c,): t^2 = 2 (level - ln prior + 1/2 ln(1 + a^2)) (1 + a^2) / a^2."""
+    """t^2 = 2 (level - ln prior + 1/2 ln(1 + a^2)) (1 + a^2) / a^2: the score of one hypothesis that passes by itself.
+
+    Parameters
+    ----------
+    size : ndarray (c,)
+        a [-].
+    log_prior : ndarray (c,)
+        ln prior [-].
+    level : float
+        ln of the sum of Bayes factors to be passed [-].
+
+    Returns
+    -------
+    ndarray (c,)
+        t, at most LARGEST_SCORE [standard errors].
+    """
     needed = np.maximum(2.0 * (level - log_prior) + np.log1p(size**2), 0.0)
     return np.asarray(np.minimum(np.sqrt(needed / np.maximum(prior_shrinkage(size), 1e-300)), LARGEST_SCORE))
 

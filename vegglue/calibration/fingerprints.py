@@ -127,6 +127,11 @@ class Fingerprints:
         return np.array([[amplitude.allows(sign * gain, largest) for amplitude, gain in pairs] for sign in (1.0, -1.0)])
 
 
+def consecutive_columns(sizes: Sequence[int]) -> list[np.ndarray]:
+    """Numbers of columns that stand one group after another, by group."""
+    return [np.arange(*ends) for ends in pairwise(accumulate(sizes, initial=0))]
+
+
 def digits_of_place(width: float) -> int:
     """Decimals of coordinates [m] of something of a half width [m]."""
     return max(2, 1 - math.floor(math.log10(width)))
@@ -152,7 +157,7 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
     return Fingerprints(
         point=point,
         candidates=candidates,
-        columns=[np.arange(*ends) for ends in pairwise(accumulate(map(len, tried), initial=0))],
+        columns=consecutive_columns([len(settings) for settings in tried]),
         settings=[shapes for _, shapes in every],
         amplitudes=[one.amplitude for one, _ in every],
         causes=causes,

@@ -130,21 +130,27 @@ def _step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Ar
 
 def _bent(model: Model, noise: Noise, point: Point, damped: Array, step: Array) -> Array:
     """The step (p,) along the bend of the predictions, shorter if that is large; straight if no flow is found ahead."""
-    ahead = list[Array]()
-
-    def kept_without_slopes(prediction: Array) -> bool:
-        ahead.append(prediction)
-        return False
-
-    linearise(model, point.z + BEND_STEP * step, point, kept_without_slopes)
-    if not ahead:
+    ahead = prediction_at(model, point.z + BEND_STEP * step, point)
+    if ahead is None:
         return step
-    bend = 2.0 / BEND_STEP * ((ahead[0] - point.prediction) / BEND_STEP - point.slope @ step)
+    bend = 2.0 / BEND_STEP * ((ahead - point.prediction) / BEND_STEP - point.slope @ step)
     slope = noise.whiten(noise.used(point.slope))
     turn = -np.linalg.solve(damped, slope.T @ noise.whiten(noise.used(bend)))
     share = min(1.0, LARGEST_BEND * float(np.linalg.norm(step)) / max(float(np.linalg.norm(turn)), 1e-300))
     there = point.z + share * step + 0.5 * share**2 * turn
     return np.asarray(np.clip(there, -FURTHEST, FURTHEST) - point.z)
+
+
+def prediction_at(model: Model, z: Array, near: Point | None) -> Array | None:
+    """f(z) without slopes, from a point to start from; None if no flow is found."""
+    kept = list[Array]()
+
+    def without_slopes(prediction: Array) -> bool:
+        kept.append(prediction)
+        return False
+
+    linearise(model, z, near, without_slopes)
+    return kept[0] if kept else None
 
 
 def at_point(noise: Noise, point: Point) -> MapEstimate:

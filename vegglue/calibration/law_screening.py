@@ -21,14 +21,13 @@ places and instruments. The listed ones have the fingerprints of the flow withou
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, pairwise
 
 import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, SearchModel, search_model
 from vegglue.calibration.candidates import Candidate, cause_of
-from vegglue.calibration.fingerprints import LEAST_DEPTH, Fingerprints, fingerprints_of
+from vegglue.calibration.fingerprints import LEAST_DEPTH, Fingerprints, consecutive_columns, fingerprints_of
 from vegglue.calibration.model_error import CellResponses, cell_responses
 from vegglue.calibration.residual_screening import GROUPS, Screening, kind_of_listed, screen
 from vegglue.calibration.score_test import HypothesisKind, Projected, alarm_p, cosines, family_of, kind_of_hypotheses
@@ -320,7 +319,7 @@ def law_fingerprints(
     listed = replace(
         found,
         candidates=[found.candidates[j] for j in kept],
-        columns=_consecutive([found.columns[j].size for j in kept]),
+        columns=consecutive_columns([found.columns[j].size for j in kept]),
         settings=[found.settings[c] for c in columns],
         amplitudes=[found.amplitudes[c] for c in columns],
         causes=[found.causes[c] for c in columns],
@@ -328,11 +327,6 @@ def law_fingerprints(
     )
     laws = laws_in_case(search.model, search.point, [one.effect.name for one in listed.candidates])
     return LawFingerprints(listed, laws, _with_laws(listed, laws, search) if laws else listed)
-
-
-def _consecutive(sizes: Sequence[int]) -> list[np.ndarray]:
-    """Numbers of columns that stand one group after another, by group."""
-    return [np.arange(*ends) for ends in pairwise(accumulate(sizes, initial=0))]
 
 
 def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...] = ()) -> LawScreening:
@@ -360,7 +354,7 @@ def _with_laws(listed: Fingerprints, laws: list[LawInCase], search: SearchModel)
     return replace(
         listed,
         candidates=[*listed.candidates, *(one.candidate for one in laws)],
-        columns=[*listed.columns, *(first + some for some in _consecutive([len(some) for some in tried]))],
+        columns=[*listed.columns, *(first + some for some in consecutive_columns([len(some) for some in tried]))],
         settings=[*listed.settings, *(shapes for _, shapes in pairs)],
         amplitudes=[*listed.amplitudes, *(one.amplitude for one, _ in pairs)],
         causes=[*listed.causes, *(cause_of(search.model.case, one, shapes) for one, shapes in pairs)],
@@ -448,7 +442,7 @@ def screen_products(
     every = _with_laws(listed, [*singles, *products], search)
     full, first = screen(base, (), every, LAW_SEED), len(listed.settings)
     of_singles, of_products = (
-        _consecutive([len(one.candidate.settings()) for one in some]) for some in (singles, products)
+        consecutive_columns([len(one.candidate.settings()) for one in some]) for some in (singles, products)
     )
     middle = first + sum(some.size for some in of_singles)
     kind = _kind_of_laws(full, products, of_products, slice(middle, None))

@@ -275,7 +275,22 @@ def log_factors(scores: Array, size: Array) -> Array:
 
 
 def expected_gain(scores: Array, length: Array, size: Array) -> Array:
-    """T / |S_perp| a^2 / (1 + a^2) (c,): the mean of an amplitude to first order, given score, length and size a."""
+    """g = T / |S_perp| a^2 / (1 + a^2): the mean of a gain to first order.
+
+    Parameters
+    ----------
+    scores : ndarray (c,)
+        T [standard errors].
+    length : ndarray (c,)
+        |S_perp| [standard errors per unit of gain].
+    size : ndarray (c,)
+        a [-].
+
+    Returns
+    -------
+    ndarray (c,)
+        [unit of the gain]
+    """
     return np.asarray(scores / np.maximum(length, 1e-300) * prior_shrinkage(size))
 
 

@@ -393,13 +393,28 @@ def model_score_json(score: ModelScore) -> dict[str, Any]:
 def improvement(
     before: ModelScore, after: ModelScore, by: By = "sections", untold: Collection[str] = ()
 ) -> tuple[float, float]:
-    """Mean of e_before^2 - e_after^2 over held-out velocities, and its standard error, both in (m/s)^2.
+    """Reduction of held-out mean square error of velocities, and its standard error by the jackknife.
 
-        se^2 = (K - 1) / K sum_k (m_(k) - m)^2
+        m = mean(e_before^2 - e_after^2),   se^2 = (K - 1) / K sum_k (m_(k) - m)^2
 
-    m is the mean of all velocities, m_(k) that without cluster k (experiment and section) of K: the jackknife, which
-    holds for clusters of any size. untold: sections or experiments that do not count. Source: Miller (1974),
-    doi:10.1093/biomet/61.1.1; not checked against it.
+    m_(k) is the mean without cluster k (experiment and section) of K, which may be of any size.
+
+    Parameters
+    ----------
+    before, after : ModelScore
+    by : {"sections", "experiments"}
+        What is left out in turn.
+    untold : collection of str
+        Sections or experiments that do not count.
+
+    Returns
+    -------
+    float, float
+        m and se [(m/s)^2]; NaN if nothing is held out, se also for a single cluster.
+
+    References
+    ----------
+    Miller (1974), doi:10.1093/biomet/61.1.1; not checked against it.
     """
     gain = _of_velocities(before, by, untold) ** 2 - _of_velocities(after, by, untold) ** 2
     known = np.isfinite(gain)

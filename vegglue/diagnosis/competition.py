@@ -63,7 +63,20 @@ LARGEST_LOG_ODDS = 100.0
 
 
 def tempered_probabilities(evidence: Array, trace_error: float | None = None) -> Array:
-    """p_j of E_j (k,) [-]; trace_error: relative error of a fingerprint [-]."""
+    """p_j ~ exp((E_j - max E) / w_j),   w_j = 1 + e^2 2 E_j
+
+    Parameters
+    ----------
+    evidence : ndarray (k,)
+        E, ln evidence with its prior [-].
+    trace_error : float, optional
+        e, relative error of a fingerprint [-]; fingerprint_error of the constants if not given.
+
+    Returns
+    -------
+    ndarray (k,)
+        [-], of sum 1.
+    """
     weight = np.exp((evidence - evidence.max()) / tempering(evidence, trace_error))
     return np.asarray(weight / weight.sum())
 
@@ -186,8 +199,23 @@ def found_patch(
         ln E = ln B + ln prior,   x, y uniform over the places, ln 2l and ln 2w normal around the patches of the map
 
     B is Laplace's of all six (`refits`), so that each is charged, and the prior that of all spots of drag together.
-    Such plants block the water: no response to first order leads there. starts: x, y [m]. None if the map has no
-    plants, no flow is found, what is found is no longer than a spot, or it lies on the plants of the map.
+    Such plants block the water: no response to first order leads there.
+
+    Parameters
+    ----------
+    search : SearchModel
+    places : Places
+        Spots of drag.
+    kind : HypothesisKind
+        Of these spots.
+    starts : sequence of (float, float)
+        x, y to begin from [m].
+
+    Returns
+    -------
+    FoundPlace or None
+        None if the map has no plants, no flow is found, what is found is no longer than a spot, or it lies on the
+        plants of the map.
     """
     case, scales = search.model.case, site_scales(search.model.case, search.model.site)
     told = drag_of_patches(search, scales.canopy)

@@ -101,9 +101,22 @@ def best_field(search: SearchModel, half_width: float) -> tuple[FieldHypothesis,
 
 
 def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypothesis) -> FieldMap:
-    """The likeliest field, sum_k a_k phi_k, and how well it is known: var = phi' phi - |L^-1 F phi|^2 in each cell.
+    """The likeliest field and how well it is known.
 
-    L L' = F F' + C + J J', and sizes a ~ N(0, 1) before the data.
+        value = sum_k a_k phi_k,   var = phi' phi - |L^-1 F phi|^2,   L L' = F F' + C + J J'
+
+    Before the data a ~ N(0, 1).
+
+    Parameters
+    ----------
+    search : SearchModel
+    responses : CellResponses
+        Of the predictions to the term in each cell.
+    one : FieldHypothesis
+
+    Returns
+    -------
+    FieldMap
     """
     whole, residual = free_of_prior(search)
     along, across = one.over.along, one.over.across

@@ -4,7 +4,7 @@ stations, and flows, slopes, fingerprints and errors at several draws of the pri
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, chain, pairwise
+from itertools import chain
 
 import numpy as np
 import pandas as pd
@@ -14,6 +14,8 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import FEWEST_CELLS_ACROSS, START_SPREAD
 from vegglue.calibration.candidates import Candidate, candidates_of, cause_of, effect_entry
 from vegglue.calibration.detection import information, own_and_shared
+from vegglue.calibration.fingerprints import consecutive_columns
+from vegglue.calibration.fit import prediction_at
 from vegglue.calibration.model_error import BED_RADIUS, FRICTION_RADIUS, gaussian_basis, model_error_columns
 from vegglue.case.channel_geometry import cells_across, expected_depth, half_width
 from vegglue.case.gridded_site import build_site, in_experiment
@@ -104,7 +106,7 @@ class PlanModel:
 
 def setting_columns(candidates: Sequence[Candidate]) -> list[np.ndarray]:
     """Columns of all settings of each candidate, side by side."""
-    return [np.arange(*ends) for ends in pairwise(accumulate((len(one.settings()) for one in candidates), initial=0))]
+    return consecutive_columns([len(one.settings()) for one in candidates])
 
 
 def water_across(model: Model, experiment: str, x: float) -> tuple[Array, Array]:
@@ -344,7 +346,7 @@ def _plan_model(
     # Flows that the case does not have have the usual grid error.
     difference = np.zeros(len(here.station))
     if other is not None:
-        there = _prediction(in_own_flows(other), middle, start if search is on_coarse else None)
+        there = prediction_at(in_own_flows(other), middle, start if search is on_coarse else None)
         if there is not None:
             difference = there - start.prediction  # its sign is of no matter
             kind = here.station["kind"].to_numpy()
@@ -422,18 +424,6 @@ def relative_lengths(wide: PlanModel) -> Array:
     return np.where(middle > 1e-9, np.clip(ratio, 1.0 / LARGEST_LENGTH_RATIO, LARGEST_LENGTH_RATIO), 1.0)
 
 
-def _prediction(model: Model, z: Array, near: Point | None) -> Array | None:
-    """f(z) without slopes; None if no flow is found."""
-    kept = list[Array]()
-
-    def without_slopes(prediction: Array) -> bool:
-        kept.append(prediction)
-        return False
-
-    linearise(model, z, near, without_slopes)
-    return kept[0] if kept else None
-
-
 def _at_plausible_size(draw: PlanDraw, candidates: Sequence[Candidate]) -> Array:
     """Changes of all rows by each candidate at a plausible size, up and down (N, c, 2), NaN where there is no flow, the
     size is not possible, or the stage is none of BENDING_STAGES.
@@ -447,7 +437,7 @@ def _at_plausible_size(draw: PlanDraw, candidates: Sequence[Candidate]) -> Array
             return None
         entry = effect_entry(one, value, one.settings()[len(one.settings()) // 2])
         there = case.model_copy(update={"effects": {**case.effects, one.key: entry}})
-        found = _prediction(replace(draw.model, case=there), draw.point.z, draw.point)
+        found = prediction_at(replace(draw.model, case=there), draw.point.z, draw.point)
         return None if found is None else np.nan_to_num(found - draw.point.prediction)
 
     found = np.full((len(draw.values), len(candidates), 2), np.nan)

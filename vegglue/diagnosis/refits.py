@@ -146,11 +146,21 @@ class Relevelled:
 
 
 def relevelled(base: Baseline, line: SurveyedLine) -> Relevelled | None:
-    """The model without the level of a line; None where no flow is found on that bed.
+    """The model without the level of a line.
 
         ln B = ln p(y | its level unknown) - ln p(y | its level as surveyed) + ln B of the survey alone
 
     What the survey says of the offset is the prior of the flow in the first term, and counts once.
+
+    Parameters
+    ----------
+    base : Baseline
+    line : SurveyedLine
+
+    Returns
+    -------
+    Relevelled or None
+        None if no flow is found on that bed.
     """
     case = without_level(base.model.case, line)
     try:

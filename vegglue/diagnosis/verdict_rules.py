@@ -14,6 +14,7 @@ from vegglue.effects.identity import EffectIdentity
 from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues
 from vegglue.measurements.section_discharge import CHANGE_DISCHARGE, CarriedDischarge, discharge_mismatches
 from vegglue.normal_range import NORMAL95
+from vegglue.results import verdict
 from vegglue.results.causes import (
     CandidateEffect,
     CandidateLaws,
@@ -26,42 +27,15 @@ from vegglue.results.causes import (
     effects_among,
 )
 from vegglue.results.verdict import (
-    AmplitudeAtBound,
-    AmplitudeBeyondPlausible,
     BedCorrected,
     ChiSquare,
-    CorrelatedErrors,
     EffectFound,
-    EffectsExcluded,
-    EffectsNotExcluded,
-    EffectsStillSignificant,
     EffectsTested,
-    EffectsUntestable,
-    ErrorsLargerThanStated,
-    ErrorsStillLarger,
     EstimatedErrors,
-    FewTestable,
-    HeldOutMissed,
-    ImplausibleAmplitude,
-    InstrumentExcluded,
-    LawStandsOut,
-    MisfitBeyondErrors,
-    MisfitRemains,
-    MisfitTooSmall,
-    MisfitUnexplained,
-    ModelErrorExceeded,
     NameHangsOnSection,
-    NeighboursCorrelated,
-    NeighboursExcluded,
-    NoFlowHeldOut,
-    NoneLeads,
     Note,
-    ParameterFarFromPrior,
     Reason,
     Remaining,
-    StatedErrorsTooSmall,
-    TooManyGroups,
-    UncertainBetweenSections,
     Verdict,
     VerdictKind,
     is_too_small,
@@ -137,9 +111,9 @@ def make_verdict(inputs: VerdictInputs) -> Verdict:
     remaining: list[Remaining] = []
     if (inputs.steps or inputs.places) and found.kind != "cannot-tell" and inputs.field is None:
         if inputs.errors.clearly_larger:
-            remaining.append(ErrorsStillLarger(inputs.errors.scale))
+            remaining.append(verdict.ErrorsStillLarger(inputs.errors.scale))
         if ranked := sorted(inputs.significant_effects.items(), key=lambda one: one[1]):
-            remaining.append(EffectsStillSignificant(tuple(ranked), inputs.remainder))
+            remaining.append(verdict.EffectsStillSignificant(tuple(ranked), inputs.remainder))
     explained = () if found.doubts_the_data else tuple(discharge_mismatches(inputs.carried))
     sure = not (found.kind == "cannot-tell" or found.reasons or remaining or found.field or found.laws)
     bed = inputs.bed[0] if inputs.bed and sure and found.anomaly is None else None
@@ -168,14 +142,14 @@ def _concluded(inputs: VerdictInputs, plain: Verdict) -> Verdict:
         first = inputs.steps[0]
         if len(first.groups) > constants().most_groups:
             effects = tuple(Rival(name, "effect", first.chance[name]) for name in first.rivals)
-            return replace(plain, reasons=(TooManyGroups(effects),))
+            return replace(plain, reasons=(verdict.TooManyGroups(effects),))
         single = all(len(step.rivals) == 1 and not step.others for step in inputs.steps)
         kind: VerdictKind = "identified" if single and laws is None else "one-of"
         if laws is not None and laws.clear:
             kind = "none-of-these"
         return replace(plain, kind=kind, laws=laws, instruments=inputs.instruments)
     if inputs.undecided:
-        return replace(plain, undecided=inputs.undecided, reasons=(NoneLeads(),))
+        return replace(plain, undecided=inputs.undecided, reasons=(verdict.NoneLeads(),))
     return _silent(inputs, plain)
 
 
@@ -203,9 +177,9 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
     parameter, far = inputs.strained
     ratio = inputs.misfit.value / max(inputs.misfit.freedom, 1)
     if ratio > constants().absurd_misfit:
-        return MisfitBeyondErrors(math.sqrt(ratio))
+        return verdict.MisfitBeyondErrors(math.sqrt(ratio))
     if far > constants().far_off_prior:
-        return ParameterFarFromPrior(parameter, far)
+        return verdict.ParameterFarFromPrior(parameter, far)
     names = {step.accepted for step in inputs.steps}
     at_bound = []
     for one in (each for each in inputs.candidates if each.name in names):
@@ -216,11 +190,11 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
         if near or amplitude.relative_size > FURTHEST - AT_BOUND:
             at_bound.append(one.name)
     if at_bound:
-        return AmplitudeAtBound(tuple(at_bound))
+        return verdict.AmplitudeAtBound(tuple(at_bound))
     sizes = [(one.amplitude.relative_size, one.name) for one in inputs.candidates if one.name in names]
     sizes += [(abs(one.amplitude) / one.plausible, f"{one.term} at a place") for one in inputs.places]
     size, name = max(sizes, default=(0.0, ""))
-    return AmplitudeBeyondPlausible(name, float(size)) if size > constants().far_off_prior else inputs.hangs_on
+    return verdict.AmplitudeBeyondPlausible(name, float(size)) if size > constants().far_off_prior else inputs.hangs_on
 
 
 def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt: Reason | None) -> Verdict:
@@ -230,11 +204,11 @@ def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt
     found = replace(plain, laws=laws)
     used, absurd = inputs.model_error, math.sqrt(constants().absurd_misfit)
     if inputs.errors.scale > absurd:
-        doubt = doubt or ErrorsLargerThanStated(inputs.errors.scale)
+        doubt = doubt or verdict.ErrorsLargerThanStated(inputs.errors.scale)
     if used is not None and used.needed > 2.0 * absurd:  # four times what is allowed; chosen, not measured
-        doubt = doubt or ModelErrorExceeded(used.needed, used.friction)
+        doubt = doubt or verdict.ModelErrorExceeded(used.needed, used.friction)
     if inputs.neighbours and not laws.likelier:
-        doubt = doubt or NeighboursExcluded()
+        doubt = doubt or verdict.NeighboursExcluded()
     if doubt:
         return replace(found, reasons=(doubt,))
     if laws.likelier:
@@ -250,14 +224,14 @@ def _silent(inputs: VerdictInputs, plain: Verdict) -> Verdict:
     all_clear = bool(clear) and len(clear) == len(inputs.instruments) and not inputs.neighbours
     named = inputs.instruments if all_clear else ()
     if inputs.misfit.p < constants().poor_fit_chance:
-        return replace(plain, reasons=(MisfitUnexplained(),))
+        return replace(plain, reasons=(verdict.MisfitUnexplained(),))
     if unearned := _unearned(inputs):
         return replace(plain, reasons=(unearned,), instruments=named)
     if inputs.between > constants().held_out_ratio:
         kind: VerdictKind = "instrument" if all_clear else "cannot-tell"
-        return replace(plain, kind=kind, reasons=(UncertainBetweenSections(inputs.between),), instruments=named)
+        return replace(plain, kind=kind, reasons=(verdict.UncertainBetweenSections(inputs.between),), instruments=named)
     if plain.tested.testable < constants().testable_share * max(len(inputs.candidates), 1):
-        return replace(plain, reasons=(FewTestable(),))
+        return replace(plain, reasons=(verdict.FewTestable(),))
     return replace(plain, kind="instrument" if clear else "nothing-missing", instruments=clear, clears_the_model=True)
 
 
@@ -265,17 +239,17 @@ def _unearned(inputs: VerdictInputs) -> Reason | None:
     """Why it cannot be concluded that nothing is missing, None when it can."""
     errors, used = inputs.errors, inputs.model_error
     if errors.clearly_larger:
-        return ErrorsLargerThanStated(errors.scale)
+        return verdict.ErrorsLargerThanStated(errors.scale)
     if errors.correlation > constants().largest_correlation:
-        return CorrelatedErrors(errors.correlation)
+        return verdict.CorrelatedErrors(errors.correlation)
     if inputs.neighbours:
-        return NeighboursExcluded()
+        return verdict.NeighboursExcluded()
     if used is not None and used.asks_for_more:
-        return ModelErrorExceeded(used.needed, used.friction)
+        return verdict.ModelErrorExceeded(used.needed, used.friction)
     if inputs.held_out == math.inf:
-        return NoFlowHeldOut()
+        return verdict.NoFlowHeldOut()
     if inputs.held_out > max(constants().held_out_ratio, inputs.by_chance):
-        return HeldOutMissed(inputs.held_out)
+        return verdict.HeldOutMissed(inputs.held_out)
     return None
 
 
@@ -315,26 +289,26 @@ def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
     misfit, errors, accepted = inputs.misfit, inputs.errors, tuple(step.accepted for step in inputs.steps)
     yield from discharge_mismatches(inputs.carried)
     if is_too_small(misfit.value, misfit.freedom):
-        yield MisfitTooSmall(misfit.value, misfit.freedom)
+        yield verdict.MisfitTooSmall(misfit.value, misfit.freedom)
     by_name = {one.name: one for one in inputs.candidates}
     for name in accepted:
         if (times := by_name[name].amplitude.relative_size) > IMPLAUSIBLE:
-            yield ImplausibleAmplitude(name, times)
+            yield verdict.ImplausibleAmplitude(name, times)
     hidden = tuple(name for group in inputs.not_excluded for name in group)
     if hidden and misfit.p >= constants().poor_fit_chance:
-        yield EffectsNotExcluded(hidden, bool(inputs.steps or inputs.places))
+        yield verdict.EffectsNotExcluded(hidden, bool(inputs.steps or inputs.places))
     if inputs.excluded:
-        yield EffectsExcluded(tuple(inputs.excluded.items()))
+        yield verdict.EffectsExcluded(tuple(inputs.excluded.items()))
     if inputs.model_error is not None:
         yield inputs.model_error
     if inputs.laws is not None and found.laws is None:
-        yield LawStandsOut(inputs.laws, accepted)
+        yield verdict.LawStandsOut(inputs.laws, accepted)
     if errors.correlation > 0:
-        yield NeighboursCorrelated(errors.correlation)
-    if errors.scale > 1 and not any(isinstance(one, ErrorsStillLarger) for one in found.remaining):
-        yield StatedErrorsTooSmall(errors.scale)
+        yield verdict.NeighboursCorrelated(errors.correlation)
+    if errors.scale > 1 and not any(isinstance(one, verdict.ErrorsStillLarger) for one in found.remaining):
+        yield verdict.StatedErrorsTooSmall(errors.scale)
     others = [one for one in inputs.instruments if one not in found.instruments]
-    yield from (InstrumentExcluded(one, is_clear(one), constants().instrument_errors) for one in others)
+    yield from (verdict.InstrumentExcluded(one, is_clear(one), constants().instrument_errors) for one in others)
     elsewhere, alike = {*hidden, *accepted}, dict[str, list[CandidateEffect]]()
     blind = [one for one in inputs.candidates if not one.detectability.testable]
     unnamed = [one for one in blind if one.name not in {*elsewhere, *inputs.significant_effects}]
@@ -342,7 +316,7 @@ def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
         alike.setdefault(one.detectability.looks_like, []).append(one)
     groups = sorted(alike.items(), key=lambda group: (not group[0], -len(group[1])))
     if unnamed:
-        yield EffectsUntestable(
+        yield verdict.EffectsUntestable(
             tuple((parameter, tuple(one.name for one in some)) for parameter, some in groups),
             effects_among(unnamed),
             len(unnamed),
@@ -352,4 +326,4 @@ def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
     yield from (one for one in inputs.bed if one is not found.bed)
     named = found.kind in ("identified", "one-of", "none-of-these", "instrument")
     if named and misfit.p < constants().poor_fit_chance and found.laws is None:
-        yield MisfitRemains(misfit)
+        yield verdict.MisfitRemains(misfit)

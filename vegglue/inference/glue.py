@@ -123,9 +123,18 @@ def sizes_as_stated(station: pd.DataFrame) -> dict[str, float]:
 
 
 def efficiency(residual: Array, station: pd.DataFrame) -> Array:
-    """E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2) over kinds k, (member,) [-]; residual (member, station).
+    """E = 1 - mean_k (sum (u - U)^2 / sum (u - mean u)^2) over kinds k: the Nash-Sutcliffe efficiency of each member.
 
-    NaN if all values of a kind are equal: against a constant no efficiency is defined.
+    Parameters
+    ----------
+    residual : ndarray (member, station)
+        u - U [unit of each station].
+    station : DataFrame
+
+    Returns
+    -------
+    ndarray (member,)
+        [-], NaN if all values of a kind are equal: against a constant no efficiency is defined.
     """
     value = station["value"].to_numpy(float)
     kinds = stations_by_kind(station).values()

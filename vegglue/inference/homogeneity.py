@@ -146,10 +146,20 @@ def without_prior(case: Case, z: Array, variance: Array) -> tuple[Array, Array]:
 
 
 def correlations_of_estimates(noise: Noise, estimates: Sequence[Estimate | None], parameters: int) -> Array:
-    """rho_ef of each parameter (p, e, e): diag(A_e C_ef A_f') over its roots at e = f, A_e = V_e J_e' C_ee^-1.
+    """rho_ef = diag(A_e C_ef A_f') over its roots at e = f,   A_e = V_e J_e' C_ee^-1,   C the covariance of the errors
 
-    estimates: of each experiment its rows among the used stations, slopes J_e (n_e, p) and covariance V_e (p, p) of z,
-    or None; C: covariance of the errors. Source: error propagation of the linear least-squares estimate.
+    Parameters
+    ----------
+    noise : Noise
+    estimates : sequence of Estimate or None
+        Of each experiment its rows among the used stations, slopes J_e (n_e, p) and covariance V_e (p, p) of z.
+    parameters : int
+        p.
+
+    Returns
+    -------
+    ndarray (p, e, e)
+        [-], by error propagation of the linear least-squares estimate.
     """
     errors, count = covariance_of(noise), len(estimates)
     pulled = [
@@ -167,9 +177,21 @@ def correlations_of_estimates(noise: Noise, estimates: Sequence[Estimate | None]
 def equal_values_test(
     value: Array, error: Array, alike: Array | None = None, free: float = math.inf
 ) -> tuple[float, int, float]:
-    """chi2, degrees of freedom and p of equal values (e,); error NaN or 0: unknown; NaN for fewer than two known.
+    """Whether values that may be correlated are one value: chi2 about their weighted mean.
 
-    alike: rho (e, e), independent if it is not given; free: see `chance_of_as_much`.
+    Parameters
+    ----------
+    value, error : ndarray (e,)
+        Values and standard errors [any unit]; error NaN or 0: unknown.
+    alike : ndarray (e, e), optional
+        Correlation rho of the errors [-], independent if it is not given.
+    free : float
+        Degrees of freedom by which the size of the errors is known, see `chance_of_as_much`.
+
+    Returns
+    -------
+    float, int, float
+        chi2, its degrees of freedom, and p [-]; NaN for fewer than two known.
     """
     known = np.isfinite(value) & (error > 0)  # zero at an end of its support, where no step leads
     if known.sum() < 2:

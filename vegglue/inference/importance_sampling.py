@@ -82,8 +82,23 @@ def _parts(mixture: Mixture, z: Array) -> tuple[Array, Array]:
 
 
 def pooled_weights(log_target: Array, z: Array, rounds: list[tuple[int, Mixture]]) -> Array:
-    """w_i = p(z_i) / sum_r (n_r / n) q_r(z_i), of sum 1: n_r draws of each round r, from its own mixture q_r.
+    """w_i = p(z_i) / sum_r (n_r / n) q_r(z_i)
 
+    Parameters
+    ----------
+    log_target : ndarray (n,)
+        ln p up to a constant.
+    z : ndarray (n, p)
+    rounds : list of (int, Mixture)
+        n_r, the draws of each round, and q_r, the mixture they are drawn from.
+
+    Returns
+    -------
+    ndarray (n,)
+        [-], of sum 1.
+
+    References
+    ----------
     Cornuet et al. (2012), https://doi.org/10.1111/j.1467-9469.2011.00756.x.
     """
     sizes = np.array([size for size, _ in rounds], float)
@@ -222,10 +237,24 @@ def emulator_of_density(
 def fit_emulator(
     z: Array, values: Array, log_density: Array, centre: Array, lower: Array, highest: int = HIGHEST_DEGREE
 ) -> Emulator:
-    """Weighted least squares through the runs z (m, p) -> values (m, n), of the highest degree that they determine.
+    """Weighted least squares through runs, of the highest degree that they determine; best where the posterior is.
 
-    weight = (1 + (max l - l) / (HALF_WEIGHT_DROP p))^-2 with l the log density of each run (m,): the fit is best where
-    the posterior is. centre (p,), lower (p, p): u = lower^-1 (z - centre) are the variables of the polynomial.
+        weight = (1 + (max l - l) / (HALF_WEIGHT_DROP p))^-2,   u = lower^-1 (z - centre) the variables
+
+    Parameters
+    ----------
+    z : ndarray (m, p)
+    values : ndarray (m, n)
+    log_density : ndarray (m,)
+        l of each run.
+    centre : ndarray (p,)
+    lower : ndarray (p, p)
+    highest : int
+        Highest degree.
+
+    Returns
+    -------
+    Emulator
     """
     known = np.isfinite(log_density)
     z, values, log_density = z[known], values[known], log_density[known]

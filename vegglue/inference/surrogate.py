@@ -148,13 +148,30 @@ def _correlation(a: Array, b: Array, length: float) -> Array:
 def gaussian_process(
     names: tuple[str, ...], station: pd.DataFrame, noise: Noise, centre: Array, lower: Array, z: Array, d: Array
 ) -> Difference:
-    """d from runs at z (m, q) of the command, f_c - F_0 = d (m, n).
+    """d = f_c - F_0 from runs of the command, as a Gaussian process.
 
     The restricted likelihood is that of whitened differences which vary alike at all stations,
 
         (m - q - 1) ln tr(R' K^-1 R) + ln|K| + ln|H' K^-1 H|,   R = D - H B,
 
     so that large changes count most; S = R' K^-1 R / (m - q - 3) is the mean of its posterior.
+
+    Parameters
+    ----------
+    names, station
+        Parameters of the command, and the stations (n rows).
+    noise : Noise
+    centre : ndarray (q,)
+    lower : ndarray (q, q)
+        u = lower^-1 (z - centre).
+    z : ndarray (m, q)
+        Places of the runs [standard deviations of the prior].
+    d : ndarray (m, n)
+        Differences there [unit of each station].
+
+    Returns
+    -------
+    Difference
     """
     u = _places(z, centre, lower)
     terms, whitened = _terms(u), noise.whiten(d[:, noise.rows].T).T
@@ -182,7 +199,22 @@ def gaussian_process(
 
 
 def log_posterior_under(noise: Noise, model: Model, difference: Difference, z: Array, prediction: Array) -> Array:
-    """ln p(z | y) up to a constant (k,); z (k, p), F + m (k, station), NaN without a flow."""
+    """ln p(z | y) = ln N(y; F + m, C + v S) - |z|^2 / 2, up to a constant.
+
+    Parameters
+    ----------
+    noise : Noise
+    model : Model
+    difference : Difference
+    z : ndarray (k, p)
+    prediction : ndarray (k, station)
+        F + m [unit of each station], NaN without a flow.
+
+    Returns
+    -------
+    ndarray (k,)
+        -inf without a flow.
+    """
     known = np.isfinite(prediction[:, noise.rows]).all(axis=1)
     left = noise.whiten((noise.value - prediction[np.ix_(known, noise.rows)]).T)
     along, error = _along(difference, difference.places(model, z[known]), left)

@@ -94,11 +94,28 @@ class ReferenceValue:
 
 
 def density(values: Array, weights: Array, low: float, high: float, bounds: tuple[float, float]) -> tuple[Array, Array]:
-    """p(x) = sum_k w_k [N(x; x_k, b) + sum_c N(x; 2 c - x_k, b)] from low to high, b = 0.9 s n^(-1/5) (Silverman).
+    """p(x) = sum_k w_k [N(x; x_k, b) + sum_c N(x; 2 c - x_k, b)],   b = 0.9 s n^(-1/5)
 
-    Mirrored at the finite ones of the bounds c, so that no mass leaks out; n is the effective number of members, s the
-    lesser of standard deviation and quartile distance / 1.34. Returns grid and density (2 DENSITY_POINTS,), half of its
-    points where the values are: even ones alone draw a narrow density as wide as they stand apart.
+    Mirrored at the finite bounds c, so that no mass leaks out; n is the effective number of members, s the lesser of
+    standard deviation and quartile distance / 1.34.
+
+    Parameters
+    ----------
+    values, weights : ndarray (member,)
+    low, high : float
+        From where to where.
+    bounds : (float, float)
+        Of the values, infinite without.
+
+    Returns
+    -------
+    ndarray, ndarray (2 DENSITY_POINTS,)
+        Grid and density; half of the points lie where the values are: even ones alone draw a narrow density as wide as
+        they stand apart.
+
+    References
+    ----------
+    Silverman, for b; not checked against it.
     """
     share = weights / weights.sum()
     quartile = weighted_quantile(values, weights, [0.25, 0.75])
