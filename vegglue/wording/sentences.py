@@ -197,20 +197,21 @@ def file_text(template: str, values: Mapping[str, Any]) -> str:
 def macros(page: bool = False) -> dict[str, Callable[..., str]]:
     """All macros of all templates by name; page: those that write HTML.
 
+    Each template is compiled when one of its macros is first called: all of them take half a second.
+
     Raises
     ------
     ValueError
         If two templates define the same macro.
     """
     environment = _environment(page, "templates")
+    module_of = cache(lambda template: environment.get_template(template).module)
     found: dict[str, Callable[..., str]] = {}
-    for name in environment.list_templates():
-        for macro, render in vars(environment.get_template(name).module).items():
-            if macro.startswith("_"):
-                continue
+    for template in sorted((Path(__file__).parent / "templates").glob("*.j2")):
+        for macro in re.findall(r"{%-? *macro ([a-z]\w*)\(", template.read_text(encoding="utf-8")):
             if macro in found:
-                raise ValueError(f"{name}: expected each macro once, got {macro} again; rename one of the two.")
-            found[macro] = render
+                raise ValueError(f"{template.name}: expected each macro once, got {macro} again; rename one of both.")
+            found[macro] = lambda *given, of=template.name, macro=macro: getattr(module_of(of), macro)(*given)
     return found
 
 
