@@ -41,19 +41,23 @@ def test_help_and_version_import_nothing_heavy(tmp_path: Path, arguments: tuple[
     assert imported & (HEAVY | {"yaml"}) == set()
 
 
-@pytest.mark.parametrize("command", ["check", "diagnose", "infer", "run"])
+# Each command reads a config by the same calls, and is tried with two mistakes or three.
 @pytest.mark.parametrize(
-    ("old", "new"),
+    ("command", "old", "new"),
     [
-        ("title: A short", "title: [A short"),
-        ("canopy_height:", "canopy_hight:"),
-        ("discharge: 2.0", "discharge: fast water"),
-        ("discharge: 2.0", "discharge: -2.0"),
-        ("level: 0.95", "level: deep"),
-        ("file: velocities.csv", "file: elsewhere.csv"),
-        ("n_b: {distribution: uniform, low: 0.02, high: 0.10", "n_b: {distribution: normal, mean: 0.05, sd: 0.04"),
-        ("default: bed", "default: bad"),
-        ("  phi: {dist", "  stray: {distribution: normal, mean: 1, sd: 0.1, unit: '-'}\n  phi: {dist"),
+        ("check", "title: A short", "title: [A short"),
+        ("diagnose", "canopy_height:", "canopy_hight:"),
+        ("infer", "discharge: 2.0", "discharge: fast water"),
+        ("run", "discharge: 2.0", "discharge: -2.0"),
+        ("check", "level: 0.95", "level: deep"),
+        ("diagnose", "file: velocities.csv", "file: elsewhere.csv"),
+        (
+            "infer",
+            "n_b: {distribution: uniform, low: 0.02, high: 0.10",
+            "n_b: {distribution: normal, mean: 0.05, sd: 0.04",
+        ),
+        ("run", "default: bed", "default: bad"),
+        ("run", "  phi: {dist", "  stray: {distribution: normal, mean: 1, sd: 0.1, unit: '-'}\n  phi: {dist"),
     ],
 )
 def test_a_config_is_refused_before_anything_heavy_is_imported(
