@@ -5,38 +5,35 @@ A listed effect is called by its name. One data set of an independent code in th
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
-import numpy as np
 import pytest
+from coarse_twin import CASE, coarse_twin
 
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.fit import at_point
 from vegglue.calibration.law_screening import LEAST_SPREAD, law_fingerprints, laws_in_case, products_in_case
 from vegglue.calibration.noise import noise_of
-from vegglue.case.config import load_case
 from vegglue.diagnosis.law_search import Discovery, discover_laws
 from vegglue.effects.library import library
-from vegglue.engine.interface import Model, linearise
-from vegglue.engine.model import coarser
+from vegglue.engine.interface import Model, Point
 from vegglue.progress import silent
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import TwinBase, measured_twin, true_place, twin_base
 
-CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
-
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return CaseRun(load_case(CONFIG)).model
+    """On larger cells: the truth is made on smaller ones."""
+    return coarse_twin()[0]
 
 
-def test_laws_are_measured_by_what_the_data_have_seen(model: Model) -> None:
-    coarse = coarser(model)
-    assert coarse is not None
-    point = linearise(coarse, np.zeros(len(model.names)))
-    assert point is not None
-    laws = {one.law.name: one for one in laws_in_case(coarse, point, ["bank_trend", "bed_trend"])}
+@pytest.fixture(scope="module")
+def point() -> Point:
+    return coarse_twin()[1]
+
+
+def test_laws_are_measured_by_what_the_data_have_seen(model: Model, point: Point) -> None:
+    laws = {one.law.name: one for one in laws_in_case(model, point, ["bank_trend", "bed_trend"])}
     assert len(laws) > 30
     assert "law_bank_along_trend" not in laws, "bank_trend competes by itself"
     assert "law_bank_depth_power" in laws, "depth_dependent_bank does not compete here"
@@ -53,54 +50,42 @@ def test_laws_are_measured_by_what_the_data_have_seen(model: Model) -> None:
     assert 0.0 < low < high < 4.0, "no section crosses a patch; what is in it is seen all the same"
 
 
-def test_a_section_of_which_nothing_is_used_has_seen_nothing(model: Model) -> None:
+def test_a_section_of_which_nothing_is_used_has_seen_nothing(model: Model, point: Point) -> None:
     """Outside the grid it counted as measured at the end of the channel, and laws as seen there."""
-    coarse = coarser(model)
-    assert coarse is not None
-    last = coarse.station["section"] == "C"
-    station = coarse.station.assign(
-        used=coarse.station["used"] & ~last, x=np.where(last, model.case.grid.x[1] + 5.0, coarse.station["x"])
-    )
+    station, last = model.station, model.station["section"] == "C"
+    station = station.assign(used=station["used"] & ~last, x=station["x"].mask(last, model.case.grid.x[1] + 5.0))
     without = station[station["used"]].reset_index(drop=True)
-    point = linearise(coarse, np.zeros(len(model.names)))
-    assert point is not None
-    kept, left_out = (laws_in_case(replace(coarse, station=table), point, []) for table in (station, without))
+    kept, left_out = (laws_in_case(replace(model, station=table), point, []) for table in (station, without))
     assert [(one.law.name, one.seen) for one in kept] == [(one.law.name, one.seen) for one in left_out]
 
 
-def test_laws_are_looked_for_with_no_listed_effect_beside_them(model: Model) -> None:
+def test_laws_are_looked_for_with_no_listed_effect_beside_them(model: Model, point: Point) -> None:
     """`--without` all of them ended in a traceback."""
-    coarse = coarser(model)
-    assert coarse is not None
-    point, noise = linearise(coarse, np.zeros(len(model.names))), noise_of(coarse.station)
-    assert point is not None
-    base = Baseline(coarse, noise, at_point(noise, point), None, None)
+    noise = noise_of(model.station)
+    base = Baseline(model, noise, at_point(noise, point), None, None)
     found = law_fingerprints(base, tuple(library()))
     assert found.listed.candidates == []
-    assert found.listed.values.shape == (len(coarse.station), 0)
+    assert found.listed.values.shape == (len(model.station), 0)
     assert len(found.every.candidates) == len(found.laws) > 30
 
 
 @cache
-def ground_of(seed: int) -> TwinBase:
+def ground_of(seed: int, fine: bool) -> TwinBase:
     """The truth before something is hidden in it: most tests share it."""
-    model = CaseRun(load_case(CONFIG)).model
+    model = CaseRun(CASE).model if fine else coarse_twin()[0]
     return twin_base(model, true_place(len(model.names), seed))
 
 
-def searched(model: Model, hidden: list[str], seed: int) -> Discovery:
+def searched(hidden: list[str], seed: int, fine: bool = False) -> Discovery:
     """What is found in measurements of a truth that hides something at a ratio of 8, errors white."""
-    station, _ = measured_twin(ground_of(seed), hidden, 8.0, "white", seed)
-    return discover_laws(replace(model, station=station), without=(), watch=silent)
+    ground = ground_of(seed, fine)
+    station, _ = measured_twin(ground, hidden, 8.0, "white", seed)
+    return discover_laws(replace(ground.model, station=station), without=(), watch=silent)
 
 
-def test_products_have_the_references_of_both_laws(model: Model) -> None:
-    coarse = coarser(model)
-    assert coarse is not None
-    point = linearise(coarse, np.zeros(len(model.names)))
-    assert point is not None
-    law = next(one for one in laws_in_case(coarse, point, []) if one.law.name == "law_viscosity_offset_step")
-    products = {one.law.quantity.name: one for one in products_in_case(coarse, point, law, 0.6)}
+def test_products_have_the_references_of_both_laws(model: Model, point: Point) -> None:
+    law = next(one for one in laws_in_case(model, point, []) if one.law.name == "law_viscosity_offset_step")
+    products = {one.law.quantity.name: one for one in products_in_case(model, point, law, 0.6)}
     assert {"depth", "speed", "along", "edge"} <= set(products)
     assert "offset" not in products
     for one in products.values():
@@ -120,10 +105,10 @@ def test_every_silence_has_words_of_its_own() -> None:
 
 
 @pytest.mark.slow
-def test_with_nothing_hidden_no_law_is_named(model: Model) -> None:
+def test_with_nothing_hidden_no_law_is_named() -> None:
     """Three seeds; each names one by chance in at most 5 %."""
     for seed in (2, 6, 7):
-        found = searched(model, [], seed)
+        found = searched([], seed)
         assert found.laws == (), found.sentence
 
 
@@ -139,18 +124,18 @@ def test_with_nothing_hidden_no_law_is_named(model: Model) -> None:
         ("law_advection_depth_power", 2),
     ],
 )
-def test_a_hidden_law_is_found(model: Model, hidden: str, seed: int) -> None:
+def test_a_hidden_law_is_found(hidden: str, seed: int) -> None:
     """Its term and its quantity."""
-    found = searched(model, [hidden], seed)
+    found = searched([hidden], seed)
     assert found.best is not None, found
     assert found.best.law.name.rsplit("_", 1)[0] == hidden.rsplit("_", 1)[0]
     assert found.product is None, found.product
 
 
 @pytest.mark.slow
-def test_a_law_that_changes_along_the_channel_is_a_product(model: Model) -> None:
+def test_a_law_that_changes_along_the_channel_is_a_product() -> None:
     hidden = ["law_viscosity_offset_step=-1.12", "law_viscosity_offset_step_by_along=-3"]
-    found = searched(model, hidden, 2)
+    found = searched(hidden, 2, fine=True)  # on larger cells errors alone leave as much in 1 % of cases
     assert found.best is not None, found
     assert found.best.law.subject == ("viscosity", "offset")
     assert found.product is not None, found
@@ -160,17 +145,17 @@ def test_a_law_that_changes_along_the_channel_is_a_product(model: Model) -> None
 
 
 @pytest.mark.slow
-def test_banks_smoother_in_fast_water(model: Model) -> None:
+def test_banks_smoother_in_fast_water() -> None:
     """The speed is in the set; depth and a listed law of depth leave the same trace, and the listed one goes first."""
-    found = searched(model, ["law_bank_speed_step"], 2)
+    found = searched(["law_bank_speed_step"], 2)
     assert {law.law.term.name for law in found.laws} == {"bank"}
     assert "speed" in {law.law.quantity.name for law in found.laws}
     assert set(found.others) <= {"depth_dependent_bank", "bank_vegetation"}
 
 
 @pytest.mark.slow
-def test_a_listed_effect_is_called_by_its_name(model: Model) -> None:
-    found = searched(model, ["bank_trend"], 2)
+def test_a_listed_effect_is_called_by_its_name() -> None:
+    found = searched(["bank_trend"], 2)
     assert found.best is None
     assert max(found.others, key=found.others.__getitem__) == "bank_trend"
     left_out = "law_bank_along_trend"
