@@ -10,10 +10,11 @@ from vegglue.calibration.detection import (
     chance_to_separate,
     detected_length,
     detection_chance,
-    information,
     own_and_shared,
+    possible_measurements,
     single_threshold,
-    trace_distances,
+    squared_distance,
+    trace_lengths,
 )
 from vegglue.calibration.score_test import alarm_level, alarm_p, kind_of_hypotheses, project
 
@@ -84,26 +85,32 @@ def test_the_likelier_of_two_is_true_as_often_as_predicted() -> None:
     )
 
 
-def test_information_adds_up_to_what_projection_leaves(linear: tuple[Array, Array, Array, Array]) -> None:
+def test_measurements_given_others_add_up_to_what_projection_leaves(linear: tuple[Array, Array, Array, Array]) -> None:
     own, slopes, shared, traces = linear
     nuisances = np.hstack([slopes, shared])
-    pieces = [information(own, nuisances, traces, rows) for rows in np.array_split(np.arange(ROWS), 4)]
-    whole = pieces[0] + pieces[1] + pieces[2] + pieces[3]
+    none = possible_measurements(own, nuisances, traces)
     _, white_slopes, white_traces = whitened(linear)
     projected = project(white_slopes, np.zeros(ROWS), np.zeros(SLOPES), white_traces)
-    assert whole.lengths() == pytest.approx(projected.length)
-    assert whole.visible() == pytest.approx(projected.fingerprints.T @ projected.fingerprints)
-    without = information(own, nuisances, traces, np.arange(60))
-    assert (pieces[0] + pieces[1] + pieces[2]).lengths() == pytest.approx(without.lengths())
-    assert (without.lengths() <= whole.lengths() + 1e-9).all(), "a piece never hides anything"
+    step = none
+    for rows in np.array_split(np.arange(ROWS), 4):
+        before, step = step, step.made(rows)
+        assert before.with_each(rows[None])[0] == pytest.approx(step.squares)
+        assert (before.lengths <= step.lengths + 1e-9).all(), "a piece never hides anything"
+    assert step.lengths == pytest.approx(projected.length)
+    assert trace_lengths(own, nuisances, traces) == pytest.approx(projected.length)
+    pieces = np.arange(ROWS).reshape(-1, 4)
+    some = none.made(np.arange(20))
+    expected = [some.made(rows).squares for rows in pieces[5:]]
+    assert some.with_each(pieces[5:]) == pytest.approx(np.array(expected))
 
 
 def test_distances_are_those_of_traces_with_another_one_free() -> None:
     random = np.random.default_rng(4)
-    traces = random.standard_normal((20, 2))
-    gram = traces.T @ traces
-    left = traces[:, 0] - traces[:, 1] * (traces[:, 1] @ traces[:, 0]) / (traces[:, 1] @ traces[:, 1])
-    assert trace_distances(gram)[0, 1] == pytest.approx(float(left @ left))
+    first, second = random.standard_normal((2, 20))
+    left = [a - b * (b @ a) / (b @ b) for a, b in ((first, second), (second, first))]
+    both = first + second
+    found = squared_distance(np.array(first @ first), np.array(second @ second), np.array(both @ both))
+    assert found == pytest.approx(min(one @ one for one in left))
 
 
 def test_many_shared_errors_are_few_with_the_variance_of_each_station() -> None:

@@ -9,7 +9,7 @@ import pytest
 from small_case import SMALL
 
 from vegglue.calibration.candidates import effect_entry
-from vegglue.calibration.detection import information
+from vegglue.calibration.detection import trace_lengths
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Planned
@@ -166,8 +166,25 @@ def test_sections_beside_a_decimetre_are_measured_together_in_another_flow(model
     wide = plan_model(model, planned, table, [], possible_pieces(model, planned, table, []))
     none = np.zeros(len(wide.candidates))
     search = plan_search(wide, EffectsInGeneral(1), planned, needed_evidence(), frozenset(table["experiment"]), none)
-    together = [[wide.pieces[j].x for j in move] for move in search.moves(()) if len(move) > 1]
+    together = [[wide.pieces[j].x for j in move] for move in search.moves() if len(move) > 1]
     assert [9.0, 12.0, 16.0] in together
+
+
+def test_a_set_is_worth_at_least_what_equally_spaced_transects_are(model: Model, wide: PlanModel) -> None:
+    planned, none = model.case.planned, np.zeros(len(wide.candidates))
+    assert planned is not None
+    search = plan_search(wide, EffectsInGeneral(1), planned, needed_evidence(), frozenset(), none)
+    budget, flows = 9.0, frozenset({"low"})
+    chosen = search.best_set(budget)
+    assert 0.0 < search.hours(chosen, frozenset()) <= budget + 1e-6
+    spaced = search._equally_spaced(budget, flows)
+    x = [sorted({wide.pieces[j].x for j in some}) for some in spaced]
+    assert [len(some) for some in x] == list(range(1, len(x) + 1))
+    assert x[1] == pytest.approx(np.array([1, 2]) * model.case.grid.x[1] / 3.0, abs=1.0)
+    assert all(search.worth(chosen) >= search.worth(some) for some in spaced)
+    squares = search.with_each(search.base, [(j,) for j in chosen])
+    alone = [[one.squares for one in search.with_pieces([j])] for j in chosen]
+    assert squares == pytest.approx(np.moveaxis(np.array(alone), 1, 0))
 
 
 def test_a_trace_of_half_a_size_is_as_long_as_the_flow_with_it_says(wide: PlanModel) -> None:
@@ -178,7 +195,6 @@ def test_a_trace_of_half_a_size_is_as_long_as_the_flow_with_it_says(wide: PlanMo
     names = [one.name for one in wide.candidates]
     assert bending[names.index("floor_level_error")] == 0.0
     assert (bending >= 0.0).all()
-    rows = np.arange(len(wide.known))
     variance, nuisances = errors_at(wide, draw, wide.known)
     for name in ("mixing_length", "elder", "bank_vegetation"):
         one = wide.candidates[j := names.index(name)]
@@ -189,7 +205,7 @@ def test_a_trace_of_half_a_size_is_as_long_as_the_flow_with_it_says(wide: PlanMo
         assert point is not None
         first_order = draw.values[wide.known, j] * one.amplitude.gain(value)
         change = (point.prediction - draw.point.prediction)[wide.known]
-        linear, length = information(variance, nuisances, np.column_stack([first_order, change]), rows).lengths()
+        linear, length = trace_lengths(variance, nuisances, np.column_stack([first_order, change]))
         assert length < 0.97 * linear
         assert linear / (1.0 + bending[j] * 0.5**one.amplitude.power) == pytest.approx(length, rel=0.12)
 

@@ -13,8 +13,12 @@ of the parameters, U the columns of all shared errors (covariance D + U U') and 
 
     A = sum over pieces of X' X,   |S_perp|^2 = A_SS - A_SN (1 + A_NN)^-1 A_NS,   N = [J, U],
 
-since parameters and shared errors have standard normal priors (Woodbury's identity). So a piece is added or taken away
-without the measurements themselves.
+since parameters and shared errors have standard normal priors (Woodbury's identity). With L L' = 1 + A_NN all other
+measurements are as if N were N L^-T and S were S - N (1 + A_NN)^-1 A_NS: given what is measured, n of them more add
+
+    S' (1 + N N')^-1 S
+
+to |S_perp|^2, equations as few as they are. So a piece is added without the measurements themselves.
 """
 
 from collections.abc import Callable
@@ -163,34 +167,52 @@ def own_and_shared(own_variance: Array, shared: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class Information:
-    """A = X' X of some measurements (m, m), its first `nuisances` columns those of parameters and shared errors."""
+class PossibleMeasurements:
+    """Measurements at some places, given those that are made: squares (c,) of |S_perp| of those that are made;
+    nuisances (N, q) and traces (N, c) of each, over its own error.
+    """
 
-    matrix: Array
-    nuisances: int
+    squares: Array
+    nuisances: Array
+    traces: Array
 
-    def __add__(self, other: "Information") -> "Information":
-        return Information(self.matrix + other.matrix, self.nuisances)
-
-    def visible(self) -> Array:
-        """S_perp' S_perp (c, c): lengths and cosines of the traces that calibration cannot mimic."""
-        n = self.nuisances
-        known = self.matrix[:n, :n] + np.eye(n)
-        mixed = scipy.linalg.solve_triangular(np.linalg.cholesky(known), self.matrix[:n, n:], lower=True)
-        return np.asarray(self.matrix[n:, n:] - mixed.T @ mixed)
-
+    @property
     def lengths(self) -> Array:
         """|S_perp| of each trace (c,) [standard errors per unit of gain]."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self.visible()), 0.0)))
+        return np.asarray(np.sqrt(np.maximum(self.squares, 0.0)))
+
+    def made(self, rows: np.ndarray) -> "PossibleMeasurements":
+        """With some of them made."""
+        of_errors, of_traces = self.nuisances[rows], self.traces[rows]
+        lower = np.linalg.cholesky(np.eye(of_errors.shape[1]) + of_errors.T @ of_errors)
+        mixed = scipy.linalg.solve_triangular(lower, of_errors.T @ of_traces, lower=True)
+        nuisances = scipy.linalg.solve_triangular(lower, self.nuisances.T, lower=True).T
+        squares = self.squares + (of_traces**2).sum(axis=0) - (mixed**2).sum(axis=0)
+        return PossibleMeasurements(squares, nuisances, self.traces - nuisances @ mixed)
+
+    def with_each(self, pieces: np.ndarray) -> Array:
+        """Squares of |S_perp| with one of some pieces made, each of as many measurements: rows (m, n); (m, c)."""
+        of_errors, of_traces = self.nuisances[pieces], self.traces[pieces]
+        covariance = of_errors @ of_errors.swapaxes(1, 2) + np.eye(pieces.shape[1])
+        return np.asarray(self.squares + (of_traces * np.linalg.solve(covariance, of_traces)).sum(axis=1))
 
 
-def information(own_variance: Array, nuisances: Array, traces: Array, rows: np.ndarray) -> Information:
-    """Of the measurements `rows`: nuisances (n, q) and traces (n, c) in the unit of a station."""
-    columns = np.hstack([nuisances[rows], traces[rows]]) / np.sqrt(own_variance[rows])[:, None]
-    return Information(columns.T @ columns, nuisances.shape[1])
+def possible_measurements(own_variance: Array, nuisances: Array, traces: Array) -> PossibleMeasurements:
+    """None of them made: own_variance (N,), nuisances (N, q) and traces (N, c) in the unit of a station."""
+    error = np.sqrt(own_variance)[:, None]
+    return PossibleMeasurements(np.zeros(traces.shape[1]), nuisances / error, traces / error)
 
 
-def trace_distances(visible: Array) -> Array:
-    """D^2 (c, c) of each trace from what is left when another one may have any size: G_ii - G_ij^2 / G_jj [-]."""
-    own = np.maximum(np.diag(visible), 1e-300)
-    return np.asarray(np.maximum(own[:, None] - visible**2 / own[None], 0.0))
+def trace_lengths(own_variance: Array, nuisances: Array, traces: Array) -> Array:
+    """|S_perp| of each trace (c,) with all measurements made [standard errors per unit of gain]."""
+    possible = possible_measurements(own_variance, nuisances, traces)
+    return possible.made(np.arange(own_variance.size)).lengths
+
+
+def squared_distance(first: Array, second: Array, both: Array) -> Array:
+    """D^2 of two traces S and T if the other may have any size, the less of both: G_SS - G_ST^2 / G_TT or the reverse.
+
+    first, second, both (...,): G_SS, G_TT, and that of S + T [-].
+    """
+    cross = 0.5 * (both - first - second)
+    return np.asarray(np.maximum(first * second - cross**2, 0.0) / np.maximum(np.maximum(first, second), 1e-300))

@@ -13,7 +13,7 @@ from scipy.linalg import hadamard
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import FEWEST_CELLS_ACROSS, START_SPREAD
 from vegglue.calibration.candidates import Candidate, candidates_of, cause_of, effect_entry
-from vegglue.calibration.detection import information, own_and_shared
+from vegglue.calibration.detection import own_and_shared, trace_lengths
 from vegglue.calibration.fingerprints import consecutive_columns
 from vegglue.calibration.fit import prediction_at
 from vegglue.calibration.model_error import BED_RADIUS, FRICTION_RADIUS, gaussian_basis, model_error_columns
@@ -22,7 +22,7 @@ from vegglue.case.gridded_site import build_site, in_experiment
 from vegglue.case.schema import Case, Planned, PlannedDischarge, PlannedGauge, PlannedPoint, PlannedTransect
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.next_measurement import AS_MEASURED, SECTIONS, with_other_discharges
+from vegglue.diagnosis.next_measurement import AS_MEASURED, with_other_discharges
 from vegglue.engine.interface import Cause, Model, Point, linearise, linearise_from, responses
 from vegglue.engine.model import coarser
 from vegglue.errors import InputError
@@ -49,8 +49,9 @@ LEAST_PLANNED_DEPTH = 0.1
 VERTICALS_ACROSS = 10
 # Verticals of a transect from which every second of them is thought of as well.
 FEWEST_DIVIDED = 5
-# Places of transects that are thought of, those at patches among them, and patches in whose middle a vertical is.
-MOST_ADDED_PLACES, MOST_PATCHES = 20, 8
+# Places of transects that are thought of, those at patches among them, and patches in whose middle a vertical is. Along
+# the reach they are twelfths: one, two, three or five transects can be equally spaced.
+TWELFTHS, MOST_ADDED_PLACES, MOST_PATCHES = 12, 20, 8
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,7 @@ def possible_pieces(
     """
     wide = _with_flows(model, LOWER_DISCHARGES)
     low, high = model.case.grid.x
-    along = np.linspace(low, high, SECTIONS + 2)[1:-1]
+    along = np.linspace(low, high, TWELFTHS + 1)[1:-1]
     near = AS_MEASURED * float(along[1] - along[0])
     velocity = at_hand[at_hand["kind"] == STREAMWISE]
     measured: dict[float, tuple[str, ...]] = {}
@@ -219,7 +220,7 @@ def possible_pieces(
                 found.append(replace(piece, y=some, hours=planned.costs.transect + len(some) * planned.costs.vertical))
         if not new:
             middle = 0.5 * (low + high)
-            for x in sorted(places)[::2]:
+            for x in sorted(places):
                 found.append(_piece(wide, planned, PlannedGauge(x=x), experiment))
             found.append(_piece(wide, planned, PlannedDischarge(x=place_along(model.case, middle)), experiment))
             for ends in model.case.plants.patches[:MOST_PATCHES]:
@@ -414,14 +415,18 @@ def relative_lengths(wide: PlanModel) -> Array:
 
     def lengths(draw: PlanDraw) -> Array:
         variance, nuisances = errors_at(wide, draw, rows)
-        return information(variance, nuisances, draw.values[rows], np.arange(rows.size)).lengths()
+        return trace_lengths(variance, nuisances, draw.values[rows])
 
     if len(wide.draws) < 3:
         return np.ones((1, len(wide.candidates)))
-    middle, *around = in_threads(lengths, [(draw,) for draw in wide.draws[1:]])
-    ratio = np.array(around) / np.maximum(middle, 1e-300)
-    # What leaves next to no trace has no ratio.
-    return np.where(middle > 1e-9, np.clip(ratio, 1.0 / LARGEST_LENGTH_RATIO, LARGEST_LENGTH_RATIO), 1.0)
+    return ratios_of_lengths(np.array(in_threads(lengths, [(draw,) for draw in wide.draws[1:]])))
+
+
+def ratios_of_lengths(lengths: Array) -> Array:
+    """Of all but the first (draws, ...) over the first; 1 of what leaves next to no trace there."""
+    middle, around = lengths[0], lengths[1:]
+    ratio = np.clip(around / np.maximum(middle, 1e-300), 1.0 / LARGEST_LENGTH_RATIO, LARGEST_LENGTH_RATIO)
+    return np.asarray(np.where(middle > 1e-9, ratio, 1.0))
 
 
 def _at_plausible_size(draw: PlanDraw, candidates: Sequence[Candidate]) -> Array:
@@ -466,7 +471,7 @@ def bending_of(wide: PlanModel) -> Array:
     amplitudes = [one.amplitude for one in wide.candidates]
     gains = np.array([min(one.scale, one.furthest) ** one.power for one in amplitudes])
     traces = np.hstack([draw.values * gains, *np.moveaxis(np.nan_to_num(wide.at_plausible_size), 2, 0)])
-    lengths = information(variance, nuisances, traces[rows], np.arange(rows.size)).lengths()
+    lengths = trace_lengths(variance, nuisances, traces[rows])
     first_order, *whole = lengths.reshape(3, -1)
     known = np.isfinite(wide.at_plausible_size[0])
     mean = np.sum(whole, axis=0) / np.maximum(known.sum(axis=1), 1)

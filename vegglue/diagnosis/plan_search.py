@@ -1,10 +1,12 @@
 """How often a diagnosis of planned measurements would name an effect, and the search for pieces of field work to add:
-by gain per hour, exchanged one by one while that helps (Fedorov 1972; not checked against it).
+by gain per hour, from nothing and from equally spaced transects, exchanged one by one while that helps (Fedorov 1972;
+not checked against it).
 """
 
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
+from collections.abc import Set as Flows
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from scipy.special import logsumexp
@@ -12,20 +14,20 @@ from scipy.special import logsumexp
 from vegglue.arrays import Array, Mask, Single
 from vegglue.calibration.detection import (
     PLANNED_POWER,
-    Information,
+    PossibleMeasurements,
     chance_over_prior,
     chance_to_separate,
     detection_chance,
-    information,
+    possible_measurements,
     single_threshold,
-    trace_distances,
+    squared_distance,
 )
 from vegglue.calibration.residual_screening import GROUPS
 from vegglue.calibration.score_test import HypothesisKind, Projected, prior_shrinkage, with_more_rows
 from vegglue.case.schema import Planned
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import tempering
-from vegglue.diagnosis.plan_model import DRAWS_AROUND, PlanModel, bending_of, errors_at, place_along
+from vegglue.diagnosis.plan_model import PlanDraw, PlanModel, bending_of, errors_at, place_along, ratios_of_lengths
 from vegglue.effects.definition import Amplitude
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.measurements.observations import section_places
@@ -171,17 +173,21 @@ def chances_named(competition: FirstCompetition, truths: Sequence[Projected]) ->
     return np.array(in_threads(competition.named, list(enumerate(truths))))
 
 
-# Proposals of one kind that are shown, and of all; those that are looked at again in a search, and rounds of exchange.
-OF_A_KIND, ADDITIONS_SHOWN, ADDITIONS_WEIGHED, ADDING_ROUNDS = 2, 8, 12, 2
-# Rise of the answer to a question below which a piece adds nothing [-].
+# Proposals of one kind that are shown, and of all; rounds of exchange.
+OF_A_KIND, ADDITIONS_SHOWN, EXCHANGES = 2, 8, 3
+# Rise of what is maximised below which a piece adds nothing [-].
 LEAST_PLAN_GAIN = 1e-3
-# Places of the prior over which the answer is averaged: the middle, and others around it. Chosen: each costs a third.
-DRAWS_SEARCHED = 3
+# What is maximised: the number of testable effects, smooth as a power of the chance of each, so that one that nearly is
+# counts, and a share of the answer. Chosen: with 1 to 8, and 0.1 to 1, sets of the sites of docs/plan.md are as good.
+NEARLY_TESTABLE, SHARE_OF_ANSWER = 4.0, 0.3
+
+# The measurements that are possible at each draw of the priors.
+AtDraws = tuple[PossibleMeasurements, ...]
 
 
 @dataclass(frozen=True)
 class PlanAnswer:
-    """The answer to a question [-], the mean over all draws and the least of them."""
+    """The answer to a question [-], the mean over all places of the priors and the least of them."""
 
     mean: float
     least: float
@@ -189,10 +195,10 @@ class PlanAnswer:
 
 @dataclass(frozen=True)
 class PlanSearch:
-    """What the search for pieces to add knows: the information of the plan and of each piece at each draw, and of the
-    effects that the question is about their names and amplitudes; present: flows that are measured in anyhow; another:
-    hours of another one; level: of the alarm; beyond: by how much the score of each has to be above that of the alarm
-    to be named [standard errors]; bending (k,), see `bending_of`.
+    """What the search for pieces to add knows: of the effects that the question is about their amplitudes; present:
+    flows that are measured in anyhow; another: hours of another one; level: of the alarm; beyond: by how much the score
+    of each has to be above that of the alarm to be named [standard errors]; bending (k,), see `bending_of`; base: given
+    the plan as it is. Of two effects there are three traces, the third the sum of both.
     """
 
     wide: PlanModel
@@ -200,17 +206,15 @@ class PlanSearch:
     level: float
     present: frozenset[str]
     another: float
-    names: tuple[str, ...]
     amplitudes: tuple[Amplitude, ...]
     beyond: Array
     bending: Array
-    base: tuple[Information, ...]
-    of_pieces: tuple[tuple[Information, ...], ...]
+    base: AtDraws
 
     @cached_property
     def start(self) -> PlanAnswer:
         """The answer without a further piece."""
-        return self.answer(self.base)
+        return self._answer(self._sizes(self._squares(self.base)))
 
     @cached_property
     def sections(self) -> frozenset[float]:
@@ -219,25 +223,36 @@ class PlanSearch:
         velocity = known[known["kind"] == STREAMWISE]
         return frozenset(place_along(self.wide.model.case, x) for x in section_places(velocity).unique())
 
-    def answer(self, known: Sequence[Information]) -> PlanAnswer:
-        """The answer to the question with some information at each draw [-]."""
-        found = np.array([self._answer(one) for one in known])
-        return PlanAnswer(float(found.mean()), float(found.min()))
+    @staticmethod
+    def _squares(known: AtDraws) -> Array:
+        return np.array([one.squares for one in known])
 
-    def _answer(self, known: Information) -> float:
+    def _sizes(self, squares: Array) -> Array:
+        """Lengths of traces at places of the priors (place, ..., k), or the distance of two, of squares at each draw:
+        those around the middle over that in the middle, on the coarsest cells, times that on the cells of the search.
+        """
         if isinstance(self.question, TwoEffects):
-            distance = trace_distances(known.visible())
-            return float(chance_to_separate(min(distance[0, 1], distance[1, 0])))
-        size = known.lengths()
+            squares = squared_distance(*np.moveaxis(squares, -1, 0))[..., None]
+        size = np.sqrt(np.maximum(squares, 0.0))
+        return size[:1] if len(size) < 3 else size[0] * ratios_of_lengths(size[1:])
+
+    def _answers(self, size: Array) -> Array:
+        """The answer at each place of the priors (place, ...)."""
+        if isinstance(self.question, TwoEffects):
+            return chance_to_separate(size[..., 0] ** 2)
         threshold = self._threshold(size)
         if isinstance(self.question, OneEffect):
             amplitude = self.amplitudes[0]
             relative = self._bent(np.array([abs(amplitude.gain(self.question.size)) / amplitude.plausible_gain]))
-            return float(detection_chance(relative * size, threshold, amplitude.only_sign)[0])
-        return float(chance_over_prior(size, threshold).sum())
+            return detection_chance(relative * size, threshold, amplitude.only_sign)[..., 0]
+        return np.asarray(chance_over_prior(size, threshold).sum(axis=-1))
+
+    def _answer(self, size: Array) -> PlanAnswer:
+        found = self._answers(size)
+        return PlanAnswer(float(found.mean()), float(found.min()))
 
     def _threshold(self, size: Array) -> Array:
-        prior = np.full(size.size, -np.log(GROUPS * len(self.wide.candidates)))
+        prior = np.full(size.shape, -np.log(GROUPS * len(self.wide.candidates)))
         return single_threshold(size, prior, self.level) + self.beyond
 
     def _bent(self, relative: Array) -> Array:
@@ -250,45 +265,58 @@ class PlanSearch:
         sizes = [min(2.0 * one.scale, one.furthest) / one.scale for one in self.amplitudes]
         return self._bent(np.array([size**one.power for size, one in zip(sizes, self.amplitudes, strict=True)]))
 
-    def worth(self, known: Sequence[Information]) -> float:
-        """What is maximised: the answer, and of all effects also the expected number that is named at twice a plausible
-        size, each up to PLANNED_POWER, from which it counts as testable.
-        """
-        answer = self.answer(known).mean
-        if not isinstance(self.question, EffectsInGeneral):
-            return answer
-        chances = [
-            detection_chance(self._twice * size, self._threshold(size)) for size in (one.lengths() for one in known)
-        ]
-        return answer + float(np.minimum(np.mean(chances, axis=0), PLANNED_POWER).sum())
+    def _worths(self, squares: Array) -> Array:
+        """What is maximised (...,), of squares at each draw (draw, ..., c): the answer, or of all effects
 
-    def with_pieces(self, known: Sequence[Information], pieces: Sequence[int]) -> list[Information]:
-        """The information with some pieces more, at each draw."""
-        found = list(known)
-        for d, of in enumerate(self.of_pieces):
-            for j in pieces:
-                found[d] = found[d] + of[j]
-        return found
+            sum over effects of min(P / PLANNED_POWER, 1)^NEARLY_TESTABLE + SHARE_OF_ANSWER answer,
+
+        P the chance to be named at twice a plausible size, from PLANNED_POWER of which it is testable.
+        """
+        size = self._sizes(squares)
+        answer = self._answers(size).mean(axis=0)
+        if not isinstance(self.question, EffectsInGeneral):
+            return np.asarray(answer)
+        chance = detection_chance(self._twice * size, self._threshold(size)).mean(axis=0)
+        nearly = np.minimum(chance / PLANNED_POWER, 1.0) ** NEARLY_TESTABLE
+        return np.asarray(nearly.sum(axis=-1) + SHARE_OF_ANSWER * answer)
+
+    def worth(self, pieces: Sequence[int]) -> float:
+        """What is maximised, with some pieces added."""
+        return float(self._worths(self.with_each(self.base, [pieces]))[0])
+
+    def with_pieces(self, pieces: Sequence[int]) -> AtDraws:
+        """Given the plan and some pieces more, at each draw."""
+        rows = np.concatenate([np.zeros(0, dtype=int), *(self.wide.rows[j] for j in pieces)])
+        return tuple(one.made(rows) for one in self.base)
+
+    def with_each(self, known: AtDraws, moves: Sequence[Sequence[int]]) -> Array:
+        """Squares of lengths with one of some moves made (draw, move, c)."""
+        rows = [np.concatenate([np.zeros(0, dtype=int), *(self.wide.rows[j] for j in move)]) for move in moves]
+        numbers = {some.size for some in rows}
+        alike = [[k for k, some in enumerate(rows) if some.size == number] for number in sorted(numbers)]
+
+        def of_draw(one: PossibleMeasurements) -> Array:
+            found = np.empty((len(moves), one.squares.size))
+            for which in alike:
+                found[which] = one.with_each(np.array([rows[k] for k in which]))
+            return found
+
+        return np.array([of_draw(one) for one in known])
 
     def hours(self, pieces: Sequence[int], present: frozenset[str]) -> float:
         """Of some pieces together, beside flows that are measured in anyhow."""
         return hours_of([self.wide.pieces[j] for j in pieces], self.another, present)
 
-    def moves(self, chosen: Sequence[int]) -> list[tuple[int, ...]]:
+    def moves(self) -> list[tuple[int, ...]]:
         """What could be added at once: each piece, and for each flow without measurements the places of the others."""
-        pieces = self.wide.pieces
-        taken = {pieces[j].place for j in chosen}
-        free = [j for j, one in enumerate(pieces) if one.place not in taken]
-        found: list[tuple[int, ...]] = [(j,) for j in free]
-        present = self.present | {pieces[j].experiment for j in chosen}
-        case = self.wide.model.case
-        there = self.sections | {place_along(case, pieces[j].x) for j in chosen if pieces[j].work is Work.TRANSECT}
+        pieces, case = self.wide.pieces, self.wide.model.case
+        found: list[tuple[int, ...]] = [(j,) for j in range(len(pieces))]
         for flow in case.experiments:
-            if flow in present:
+            if flow in self.present:
                 continue
             together = [
-                j for j in free if pieces[j].experiment == flow and pieces[j].work is Work.TRANSECT
-                and place_along(case, pieces[j].x) in there
+                j for j, one in enumerate(pieces) if one.experiment == flow and one.work is Work.TRANSECT
+                and place_along(case, one.x) in self.sections
             ]  # fmt: skip
             # Of a transect and the same with every second vertical the whole one, which stands first.
             together = list({pieces[j].x: j for j in reversed(together)}.values())[::-1]
@@ -300,12 +328,11 @@ class PlanSearch:
         of flows that the case does not have, as far as they add something.
         """
         found = []
-        for move in self.moves(()):
-            known = self.with_pieces(self.base, move)
-            after = self.answer(known)
-            if any(self.wide.pieces[j].new for j in move):  # known at the first draw alone
-                gain = self.answer(known[:1]).mean - self.answer(self.base[:1]).mean
-                after = PlanAnswer(self.start.mean + gain, self.start.least)
+        moves = self.moves()
+        # A flow that the case does not have is known in the middle of the priors: elsewhere traces keep their ratio.
+        size = self._sizes(self.with_each(self.base, moves))
+        for k, move in enumerate(moves):
+            after = self._answer(size[:, k])
             if after.mean - self.start.mean > LEAST_PLAN_GAIN:
                 found.append(self._proposed(move, after))
         found.sort(key=lambda one: -one.per_hour)
@@ -320,58 +347,79 @@ class PlanSearch:
     def extended(self, budget: float) -> ProposedPieces | None:
         """The best set to add for so many hours; None if nothing fits."""
         chosen = self.best_set(budget)
-        return self._proposed(chosen, self.answer(self.with_pieces(self.base, chosen))) if chosen else None
+        after = self._answer(self._sizes(self.with_each(self.base, [chosen])[:, 0]))
+        return self._proposed(chosen, after) if chosen else None
 
     def best_set(self, budget: float) -> list[int]:
-        """Pieces that fit a budget [h]: greedy by gain for an hour, in any flows and in each flow alone, of which the
-        best is exchanged piece by piece while that helps.
-        """
+        """Pieces that fit a budget [h], in the flows that are best: one more as long as that helps."""
+        best, flows = self._best_in(budget, self.present), self.present
+        while True:
+            others = [flows | {one} for one in self.wide.case.experiments if one not in flows]
+            sets = [(self._best_in(budget, more), more) for more in others]
+            found, more = max(sets, key=lambda one: self.worth(one[0]), default=(best, flows))
+            if self.worth(found) <= self.worth(best) + LEAST_PLAN_GAIN:
+                return self._exchanged(budget, best, flows)
+            best, flows = found, more
 
-        def worth(pieces: Sequence[int]) -> float:
-            return self.worth(self.with_pieces(self.base, pieces))
+    def _best_in(self, budget: float, flows: Flows[str]) -> list[int]:
+        """Pieces in some flows by gain per hour, from nothing, or from the best equally spaced transects that fit."""
+        spaced = max(self._equally_spaced(budget, flows), key=self.worth, default=[])
+        return max((self._filled(budget, some, flows) for some in ([], spaced)), key=self.worth)
 
-        flows = [one for one in self.wide.model.case.experiments if one not in self.present]
-        starts = [None, *({*self.present, one} for one in flows if len(flows) > 1)]
-        best = max((self._greedy(budget, [], start) for start in starts), key=worth)
-        before = worth(best)
-        for _ in range(ADDING_ROUNDS):
-            for j in list(best):
-                again = self._greedy(budget, [k for k in best if k != j])
-                if (now := worth(again)) > before + LEAST_PLAN_GAIN:
-                    best, before = again, now
-                    break
-            else:
+    def _exchanged(self, budget: float, best: list[int], flows: Flows[str]) -> list[int]:
+        """Each piece in turn left out, and its hours filled, while that helps."""
+        before = self.worth(best)
+        for _ in range(EXCHANGES):
+            helped = False
+            for j in best:
+                again = self._filled(budget, [k for k in best if k != j], flows)
+                if j in best and (now := self.worth(again)) > before + LEAST_PLAN_GAIN:
+                    best, before, helped = again, now, True
+            if not helped:
                 break
         return best
 
-    def _greedy(self, budget: float, chosen: list[int], flows: Set[str] | None = None) -> list[int]:
-        """flows: in which alone work is done, beside that which is of no flow; None for all."""
-        known = self.with_pieces(self.base, chosen)
-        now = self.worth(known)
-        promised: dict[tuple[int, ...], float] = {}
+    def _left(self, budget: float, pieces: Sequence[int], flows: Flows[str]) -> float:
+        """Hours that are left of a budget in some flows, all of them measured in."""
+        further = len(flows - self.present) - (0 if self.present else 1)
+        return budget - self.another * max(further, 0) - sum(self.wide.pieces[j].hours for j in pieces) + 1e-9
+
+    def _equally_spaced(self, budget: float, flows: Flows[str]) -> list[list[int]]:
+        """Transects at places of equal distance, with a gauge at each, in all of some flows; all that fit."""
+        pieces, (low, high) = self.wide.pieces, self.wide.case.grid.x
+        # Of a transect and the same with every second vertical the whole one, which stands first.
+        there = {one.place: j for j, one in reversed(list(enumerate(pieces)))
+                 if one.work in (Work.TRANSECT, Work.GAUGE) and one.experiment in flows and not one.new}  # fmt: skip
+        places = np.unique([pieces[j].x for j in there.values() if pieces[j].work is Work.TRANSECT])
+        found = []
+        for count in range(1, len(places) + 1):
+            x = {float(places[np.abs(places - to).argmin()]) for to in np.linspace(low, high, count + 2)[1:-1]}
+            some = [j for j in there.values() if pieces[j].x in x]
+            if self._left(budget, some, flows) < 0.0:
+                break
+            found.append(some)
+        return found
+
+    def _filled(self, budget: float, chosen: list[int], flows: Flows[str]) -> list[int]:
+        """More pieces in some flows, or of none, by gain per hour."""
+        pieces = self.wide.pieces
+        known = self.with_pieces(chosen)
         while True:
-            spent = self.hours(chosen, self.present)
+            left, taken = self._left(budget, chosen, flows), {pieces[j].place for j in chosen}
             # A flow that the case does not have cannot be ordered: it is shown, and not planned.
-            moves = [move for move in self.moves(chosen) if not any(self.wide.pieces[j].new for j in move)]
-            if flows is not None:
-                allowed = {*flows, ""}
-                moves = [move for move in moves if all(self.wide.pieces[j].experiment in allowed for j in move)]
-            possible = {move: self.hours([*chosen, *move], self.present) - spent for move in moves}
-            possible = {move: hours for move, hours in possible.items() if spent + hours <= budget + 1e-9}
-            # What a piece adds hardly ever grows: those that added less before are looked at last (lazy greedy).
-            order = sorted(possible, key=lambda move: -promised.get(move, np.inf) / possible[move])
-            best, best_rate = None, LEAST_PLAN_GAIN / budget
-            for looked, move in enumerate(order):
-                if move in promised and (promised[move] / possible[move] <= best_rate or looked >= ADDITIONS_WEIGHED):
-                    break
-                promised[move] = self.worth(self.with_pieces(known, move)) - now
-                if promised[move] / possible[move] > best_rate:
-                    best, best_rate = move, promised[move] / possible[move]
-            if best is None:
+            possible = [j for j, one in enumerate(pieces) if one.hours <= left and not one.new
+                        and one.experiment in {*flows, ""} and one.place not in taken]  # fmt: skip
+            if not possible:
                 return chosen
-            chosen = [*chosen, *best]
-            known = self.with_pieces(known, best)
-            now = self.worth(known)
+            now = float(self._worths(self._squares(known)))
+            gain = self._worths(self.with_each(known, [(j,) for j in possible])) - now
+            rate = gain / np.array([pieces[j].hours for j in possible])
+            best = int(np.argmax(rate))
+            if rate[best] <= LEAST_PLAN_GAIN / budget:
+                return chosen
+            chosen = [*chosen, possible[best]]
+            rows = self.wide.rows[possible[best]]
+            known = tuple(one.made(rows) for one in known)
 
 
 def plan_search(
@@ -389,22 +437,23 @@ def plan_search(
     amplitudes = tuple(wide.candidates[j].amplitude for j in kept)
     bending = bending_of(wide)[kept]
     gains = np.array([one.plausible_gain for one in amplitudes]) / (1.0 + bending)
-    base, pieces = [], []
-    for draw in wide.draws[:: DRAWS_AROUND // 2][:DRAWS_SEARCHED]:
+    measured = np.concatenate([wide.known, wide.surveyed])
+
+    def at(draw: PlanDraw) -> PossibleMeasurements:
         variance, nuisances = errors_at(wide, draw, np.arange(wide.error.size))
-        of_rows = partial(information, variance, nuisances, draw.values[:, kept] * gains)
-        base.append(of_rows(np.concatenate([wide.known, wide.surveyed])))
-        pieces.append(tuple(of_rows(rows) for rows in wide.rows))
+        traces = draw.values[:, kept] * gains
+        if isinstance(question, TwoEffects):
+            traces = np.column_stack([traces, traces.sum(axis=1)])
+        return possible_measurements(variance, nuisances, traces).made(measured)
+
     return PlanSearch(
         wide=wide,
         question=question,
         level=level,
         present=present,
         another=planned.costs.discharge,
-        names=tuple(wide.candidates[j].name for j in kept),
         amplitudes=amplitudes,
         beyond=beyond[kept],
         bending=bending,
-        base=tuple(base),
-        of_pieces=tuple(pieces),
+        base=tuple(in_threads(at, [(draw,) for draw in wide.draws])),
     )
