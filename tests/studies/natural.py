@@ -53,8 +53,11 @@ RATIO, LARGEST = 6.0, 3.0
 LISTED = ("streamlining", "canopy_deflection", "mixing_length", "discharge_error[May]", "discharge_error[October]",
           "inflow_skew", "probe_gain[B]", "probe_gain[D]")  # fmt: skip
 UNLISTED = ("gauge", "pool", "object", "line", "reeds")
-# How near a place has to lie [m], over half the length of what is hidden.
-NEAR = 3.0
+# How near a place has to lie [m], over half the length of what is hidden; from which error the told bed is off [m].
+NEAR, BED_OFF = 3.0, 0.03
+# A pool lies midway between lines at least so far apart [m], which see less than 2 % of its depth: half its length over
+# their distance.
+POOLED, POOL_SHARE = 5.0, 0.25
 
 
 @dataclass(frozen=True)
@@ -230,6 +233,11 @@ def read(field: Field, x: Field, y: Field) -> Field:
     return np.asarray(near * (1 - s) + (field[i + 1, j] * (1 - t) + field[i + 1, j + 1] * t) * s)
 
 
+def surveyed_lines(site: NaturalReach) -> Field:
+    """x of the surveyed lines [m]."""
+    return np.linspace(0.0, LENGTH, max(round(LENGTH / site.spacing), 4) + 1)
+
+
 def write_folder(folder: Path, seed: int, site: NaturalReach, hidden: HiddenThing, flows: Mapping[str, Flow]) -> None:
     """What a field team would hand over."""
     rng = np.random.default_rng([seed, 59])
@@ -255,15 +263,12 @@ def write_folder(folder: Path, seed: int, site: NaturalReach, hidden: HiddenThin
             level = read(flow.h + bed, x, y) + LEVEL_ERROR * rng.standard_normal(x.size)
             level += hidden.amplitude * (hidden.name == "gauge") * np.isclose(x, hidden.x)
             levels += [f"{name},{a},0.0,{value:.4f},{LEVEL_ERROR}" for a, value in zip(GAUGES, level, strict=True)]
-    count = max(round(LENGTH / site.spacing), 4)
     survey = ["section,x,y,z"]
-    lines = np.linspace(0.0, LENGTH, count + 1)
-    wrong = lines[np.abs(lines - hidden.x).argmin()] if hidden.name == "line" else np.nan
-    for x in lines:
+    for x in surveyed_lines(site):
         at = np.arange(-HALF, HALF + 0.01, 0.6)
         i, j = round(x / (FINE[0] / 2)), np.round((at + HALF) / (FINE[1] / 2)).astype(int)
         z = bed_with(site, hidden)[i, j] + SURVEY_ERROR * rng.standard_normal(at.size)
-        z = z + hidden.amplitude * (x == wrong)
+        z = z + hidden.amplitude * (hidden.name == "line" and x == hidden.x)
         survey += [f"P{x:.0f},{x:.2f},{a:.2f},{value:.3f}" for a, value in zip(at, z, strict=True)]
     corners = ["name,x,y,stems"]
     for name, polygon, density in zip(PATCHES, site.told, site.density, strict=True):
@@ -286,7 +291,7 @@ def write_folder(folder: Path, seed: int, site: NaturalReach, hidden: HiddenThin
     (folder / "site.yaml").write_text(yaml.safe_dump(about, sort_keys=False), encoding="utf-8")
 
 
-def sized(seed: int, null: Mapping[str, Any]) -> list[HiddenThing]:
+def sized(seed: int, site: NaturalReach, null: Mapping[str, Any]) -> list[HiddenThing]:
     """One listed effect and one thing that no list has, of a reach with nothing hidden and its diagnosis."""
     rng = np.random.default_rng([seed, 60])
     found = []
@@ -301,16 +306,21 @@ def sized(seed: int, null: Mapping[str, Any]) -> list[HiddenThing]:
         if np.isfinite(size) and size <= LARGEST * one["scale"]:
             found.append(HiddenThing(str(name), float(sign * size)))
             break
-    kind = str(rng.choice(UNLISTED))
+    lines = surveyed_lines(site)
+    apart = float(lines[1])
+    kind = str(rng.choice([one for one in UNLISTED if one != "pool" or apart >= POOLED]))
     if kind == "gauge":
         found.append(
             HiddenThing(kind, float(rng.choice([-1, 1]) * RATIO * LEVEL_ERROR), float(rng.choice(GAUGES[1:4])))
         )
     elif kind == "line":
-        found.append(HiddenThing(kind, float(rng.choice([-1, 1]) * 0.15), float(rng.uniform(20.0, 60.0))))
+        x = float(rng.choice(lines[(lines >= 18.0) & (lines <= 64.0)]))
+        found.append(HiddenThing(kind, float(rng.choice([-1, 1]) * 0.15), x))
     else:
         x, y = float(rng.uniform(20.0, 62.0)), float(rng.uniform(-2.0, 2.0))
-        size, half = {"pool": (0.3, 2.0), "object": (1.0, 1.0), "reeds": (0.8, 3.0)}[kind]
+        size, half = {"pool": (0.3, min(2.0, POOL_SHARE * apart)), "object": (1.0, 1.0), "reeds": (0.8, 3.0)}[kind]
+        if kind == "pool":
+            x = (np.floor(x / apart) + 0.5) * apart
         found.append(HiddenThing(kind, size, x, y, half))
     return found
 
@@ -327,6 +337,12 @@ def told_wrongly(site: NaturalReach) -> set[str]:
     return {name for name, error in off.items() if abs(error) >= TRULY_OFF[name.split("[")[0]]}
 
 
+def truly_off(found: Mapping[str, Any]) -> bool:
+    """Whether the bed is named at a place and truly off there, the same way."""
+    bed_off = found.get("bed_off")
+    return bed_off is not None and abs(bed_off) >= BED_OFF and bed_off * found["where"]["amplitude"] > 0.0
+
+
 def judged(site: NaturalReach, hidden: HiddenThing, found: Mapping[str, Any]) -> dict[str, Any]:
     """What a diagnosis made of it."""
     names, where = set(found["set"]), found["where"]
@@ -338,6 +354,8 @@ def judged(site: NaturalReach, hidden: HiddenThing, found: Mapping[str, Any]) ->
         levelled = (one for one in found["instruments"] if one["kind"] == "line")
         reported = any(abs(one["x"] - hidden.x) <= NEAR + hidden.half_length for one in levelled)
         hit = (on_line or reported) if hidden.name == "line" else near
+    if hidden.name in ("pool", "line"):
+        hit = hit or truly_off(found)
     listed = hidden.name in found["not_excluded"] or any(hidden.name in group for group in found["not_excluded"])
     named = found["verdict"] in ("identified", "one-of", "none-of-these", "instrument")
     place = where and [where["x"], where["y"], where["term"], where["amplitude"]]
@@ -377,7 +395,7 @@ def sets_of(seed: int, runs: Path, done: set[tuple[int, str]]) -> Iterator[dict[
     null = diagnosed(folder / "none", site, HiddenThing())
     if (seed, "none") not in done:
         yield about | {"kind": "none", "hidden": "none", "amplitude": 0.0} | judged(site, HiddenThing(), null)
-    for kind, hidden in zip(("listed", "unlisted"), sized(seed, null), strict=False):
+    for kind, hidden in zip(("listed", "unlisted"), sized(seed, site, null), strict=False):
         if (seed, kind) in done:
             continue
         measured_only = hidden.name == "gauge" or hidden.name == "line" or hidden.name.startswith("probe_gain")
@@ -398,7 +416,7 @@ def figures(records: list[dict[str, Any]]) -> list[str]:
             named = [one for one in own if one["named"]]
             silent = sum(one["verdict"] == "nothing-missing" for one in own)
             true = sum(
-                one["bed_off"] is not None and abs(one["bed_off"]) >= 0.03 and one["bed_off"] * one["where"][3] > 0.0
+                one["bed_off"] is not None and abs(one["bed_off"]) >= BED_OFF and one["bed_off"] * one["where"][3] > 0.0
                 for one in named
             )
             told = sum(one["wrongly_told"] for one in named)
