@@ -52,7 +52,7 @@ VISCOSITY = 0.02
 RATIO, LARGEST = 6.0, 3.0
 LISTED = ("streamlining", "canopy_deflection", "mixing_length", "discharge_error[May]", "discharge_error[October]",
           "inflow_skew", "probe_gain[B]", "probe_gain[D]")  # fmt: skip
-UNLISTED = ("gauge", "pool", "object", "line", "reeds")
+UNLISTED = ("gauge", "pool", "object", "line", "reeds", "water")
 # How near a place has to lie [m], over half the length of what is hidden; from which error the told bed is off [m].
 NEAR, BED_OFF = 3.0, 0.03
 # A pool lies midway between lines at least so far apart [m], which see less than 2 % of its depth: half its length over
@@ -143,7 +143,7 @@ def inside(x: Field, y: Field, corners: Field) -> Field:
 
 
 def reach_of(site: NaturalReach, hidden: HiddenThing, cells: tuple[float, float]) -> Reach:
-    """The reach on cells of this size, with what is hidden."""
+    """The reach on cells of this size, with what is hidden; water [m3/s] enters along one side."""
     (dx, dy), step = cells, round(cells[0] / FINE[0])
     i = np.round(np.arange(dx / 2, LENGTH, dx) / (FINE[0] / 2)).astype(int)
     j = np.round((np.arange(-HALF + dy / 2, HALF, dy) + HALF) / (FINE[1] / 2)).astype(int)
@@ -175,8 +175,12 @@ def reach_of(site: NaturalReach, hidden: HiddenThing, cells: tuple[float, float]
     if hidden.name == "object":
         extra = hidden.amplitude * np.exp(-((x - hidden.x) ** 2) - ((y - hidden.y) / 0.7) ** 2)
     ground = Ground(site.n, 1.0, site.phi, site.hd, site.nu, tuple(stems), effects=effects)
+    source = np.zeros(cover.shape)
+    if hidden.name == "water":
+        at = (np.abs(x - hidden.x) <= hidden.half_length) & (np.abs(y - hidden.y) <= 2 * FINE[1])
+        source = hidden.amplitude * at / (at.sum() * dx * dy)
     return Reach(
-        dx, dy, z[np.ix_(i, j)], z[np.ix_(faces_i, j)], z[np.ix_(i, faces_j)], np.zeros(cover.shape),
+        dx, dy, z[np.ix_(i, j)], z[np.ix_(faces_i, j)], z[np.ix_(i, faces_j)], source,
         closure_of(ground, channel, lie, cells, extra),
     )  # fmt: skip
 
@@ -316,6 +320,9 @@ def sized(seed: int, site: NaturalReach, null: Mapping[str, Any]) -> list[Hidden
     elif kind == "line":
         x = float(rng.choice(lines[(lines >= 18.0) & (lines <= 64.0)]))
         found.append(HiddenThing(kind, float(rng.choice([-1, 1]) * 0.15), x))
+    elif kind == "water":
+        # 3 to 8 % of the discharges, over 5 m.
+        found.append(HiddenThing(kind, 0.2, float(rng.uniform(20.0, 62.0)), float(rng.choice([-3.0, 3.0])), 2.5))
     else:
         x, y = float(rng.uniform(20.0, 62.0)), float(rng.uniform(-2.0, 2.0))
         size, half = {"pool": (0.3, min(2.0, POOL_SHARE * apart)), "object": (1.0, 1.0), "reeds": (0.8, 3.0)}[kind]
@@ -354,6 +361,8 @@ def judged(site: NaturalReach, hidden: HiddenThing, found: Mapping[str, Any]) ->
         levelled = (one for one in found["instruments"] if one["kind"] == "line")
         reported = any(abs(one["x"] - hidden.x) <= NEAR + hidden.half_length for one in levelled)
         hit = (on_line or reported) if hidden.name == "line" else near
+    if hidden.name == "water":
+        hit = "lateral_inflow" in names or (near and where["term"] == "inflow")
     if hidden.name in ("pool", "line"):
         hit = hit or truly_off(found)
     listed = hidden.name in found["not_excluded"] or any(hidden.name in group for group in found["not_excluded"])
