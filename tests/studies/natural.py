@@ -107,7 +107,8 @@ def drawn_reach(seed: int) -> NaturalReach:
     bed = bed + steep * np.maximum(np.abs(across) - 0.5 * WIDTH + 1.0, 0.0)
     for size, (long, wide) in ((BARS[0], (rng.uniform(*BARS[1]), BARS[2])), (TEXTURE[0], (TEXTURE[1], TEXTURE[1]))):
         cells = (long / (x[1] - x[0]) / 2.0, wide / (y[1] - y[0]) / 2.0)
-        noise = gaussian_filter(rng.standard_normal(bed.shape), cells, mode="nearest")
+        # Wrapped: where the outermost value is repeated, bars are three times as high near the ends as between them.
+        noise = gaussian_filter(rng.standard_normal(bed.shape), cells, mode="wrap")
         bed = bed + size * noise / noise.std()
     rough = seed % 2 == 1
     polygons = []
