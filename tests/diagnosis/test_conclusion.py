@@ -26,6 +26,7 @@ from vegglue.diagnosis import conclusion
 from vegglue.diagnosis.candidate_effects import candidate_effects_of
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.conclusion import (
+    cells_too_coarse,
     estimated_errors,
     inflow_develops,
     mapped_places,
@@ -185,6 +186,18 @@ def test_with_a_law_instead_of_a_place_effects_are_those_of_the_model_without_it
     found = conclusion.assemble_diagnosis(first, first, held, with_place, None, lambda: None, silent)
     assert (found.places, found.verdict.places, found.verdict.undecided) == ((), (), ())
     assert {one.name: one for one in found.candidate_effects} == candidate_effects_of(first)
+
+
+def test_cells_with_a_larger_error_than_the_readings_are_a_note() -> None:
+    model, _ = coarse_twin()
+    noise = noise_of(model.station)
+    assert list(cells_too_coarse(noise, model.station)) == []
+    velocity = velocity_rows(model.station.iloc[noise.rows])
+    coarse = replace(noise, grid_error=np.where(velocity, 2.0 * noise.error, 0.0))
+    (found,) = cells_too_coarse(coarse, model.station)
+    assert found.grid_error == pytest.approx(2.0 * found.data_error)
+    # An error of the cells in levels alone is none in velocities.
+    assert list(cells_too_coarse(replace(noise, grid_error=np.where(velocity, 0.0, 1.0)), model.station)) == []
 
 
 def test_a_fault_of_the_probes_near_the_inflow_may_be_an_inflow_that_develops() -> None:

@@ -112,6 +112,7 @@ from vegglue.results.verdict import (
     AmplitudeBeyondPlausible,
     BedCorrected,
     BeyondHandbook,
+    CellsTooCoarse,
     ChiSquare,
     CommandCompared,
     Conclusion,
@@ -242,7 +243,7 @@ N_B, PHI = NamedParameter("n_b", "n_b", "s m^(-1/3)"), NamedParameter("phi", "φ
 VELOCITY = kind_of("velocity")
 NOTES = (
     EstimateAtBound("n_b", 0.0051, "s m^(-1/3)", 0.005, 0.05, True),
-    InflowDevelops("probe_gain[x2.2]", 2.2, 14.9, 76.0),
+    InflowDevelops("probe_gain[x2.2]", 2.2, 14.9, 76.0), CellsTooCoarse(0.027, 0.015),
     BeyondHandbook("n_b", 0.062, "s m^(-1/3)", 0.01, 0.06, "Chow (1959) for streams wider than 30 m"),
     EstimateOffPrior("eddy_viscosity", 0.002, "m2/s", 2.9),
     MisfitTooSmall(61.5, 150), ImplausibleAmplitude("wind", 3.4), EffectsNotExcluded(("wind", "waves"), beside=True),

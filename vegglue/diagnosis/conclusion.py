@@ -55,6 +55,7 @@ from vegglue.results.causes import (
 from vegglue.results.diagnosis import Diagnosis, FirstScreening, Misfit, ParameterEstimates, Predictions
 from vegglue.results.verdict import (
     BedCorrected,
+    CellsTooCoarse,
     EstimatedErrors,
     InflowDevelops,
     MeasuredStretch,
@@ -289,6 +290,7 @@ def _verdict(
     surroundings += measured_stretch(model.case, model.station)
     surroundings += parameter_doubts(base)
     surroundings += inflow_develops(model, found.effects)
+    surroundings += cells_too_coarse(base.noise, model.station)
     if not any(one.x.size for one in last.fingerprints.places):
         surroundings.append(TooShallow(least_depth(model)))
     return make_verdict(
@@ -411,6 +413,14 @@ def inflow_develops(model: Model, accepted: Sequence[str]) -> Iterator[InflowDev
             distance = float(there.mean()) - model.case.grid.x[0]
             if distance < DEVELOPMENT * depth:
                 yield InflowDevelops(name, distance, distance / depth, DEVELOPMENT)
+
+
+def cells_too_coarse(noise: Noise, station: pd.DataFrame) -> Iterator[CellsTooCoarse]:
+    """Cells whose error in velocities is larger than that of the readings: what is named may be theirs."""
+    velocity = velocity_rows(station.iloc[noise.rows])
+    of_cells, of_readings = (root_mean_square(one[velocity]) for one in (noise.grid_error, noise.data_error))
+    if of_cells > of_readings:
+        yield CellsTooCoarse(of_cells, of_readings)
 
 
 def significant_effects(last: Screening, found: SearchState, slack: float = 0.0) -> dict[str, float]:

@@ -64,8 +64,10 @@ ROLES_OF_BED = {"x", "y", "z", "section"}
 # Points of a cross-section without a name lie within so much of the next one along the channel [m], as surveyed in a
 # stream, unless most points share their x: a tape, or a flume.
 SPREAD_OF_SECTION = 1.0
-# Cells across the survey, and how much longer than wide a cell is, as for a straight channel.
-SURVEYED_ROWS, LENGTH_OF_CELLS = 32, 8.0 / 3.0
+# Cells across the survey, and how much longer than wide a cell is. On 32 by 8/3 the error of the cells was 0.019 to
+# 0.027 m/s on three drawn reaches of 84 by 15 m with nothing hidden, larger than that of their readings, and each had a
+# false name; on 50 by 2 it was 0.010 to 0.014 m/s, and none had one. Chosen after these three.
+SURVEYED_ROWS, LENGTH_OF_CELLS = 50, 2.0
 MARK_OF_NO_LEVEL = -9999
 MOST_LEVELS = 10 * MOST_CELLS  # of some eight bytes each; a case reads no larger file
 # Kind and name of the file of a bed: on a straight grid, and along a centreline.

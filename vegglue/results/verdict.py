@@ -324,6 +324,16 @@ class InflowDevelops:
 
 
 @dataclass(frozen=True)
+class CellsTooCoarse:
+    """Error of the cells in velocities that is larger than the error of the readings, both as root mean squares
+    [m/s].
+    """
+
+    grid_error: float
+    data_error: float
+
+
+@dataclass(frozen=True)
 class EstimateOffPrior:
     """A calibrated parameter some standard deviations from the middle of its prior, at `value` [unit]."""
 
@@ -498,6 +508,7 @@ Note = (
     | EstimateAtBound
     | BeyondHandbook
     | InflowDevelops
+    | CellsTooCoarse
     | EstimateOffPrior
     | EffectsNotExcluded
     | EffectsExcluded
