@@ -122,6 +122,21 @@ def test_walls_stand_where_no_water_enters() -> None:
     assert walls.rate == pytest.approx(9.81 * np.array([0.01, 0.02]) ** 2 / 0.075 ** (1.0 / 3.0) / 0.075)
 
 
+@pytest.mark.parametrize(("height", "rough", "there"), [(0.1, True, True), (0.05, True, False), (0.1, False, False)])
+def test_between_walls_a_bed_steeper_than_one_to_one_is_a_step(height: float, rough: bool, there: bool) -> None:
+    """Cells are 0.075 m wide."""
+    tree = ROUGH if rough else TREE
+    case = Case.model_validate(tree)
+    site = build_site(case)
+    bed = site.bed.copy()
+    bed[:, :4] += height
+    problem = build_problem(case, replace(site, bed=bed), "one", {"n_b": np.full(1, 0.02), "n_w": np.full(1, 0.01)})
+    steps = np.zeros((24, 11))
+    steps[:, 3] = -1.0
+    assert np.array_equal(problem.walls.steps, steps) == there
+    assert problem.walls.steps.any() == problem.smallest_shear_depth == there
+
+
 def test_walls_of_a_bend_are_longer_outside() -> None:
     """Radius 2 m to the left: the wall at y = 0 is as long as the line, the cell beside it (2 - 0.0375) / 2 of that."""
     bent = flume().model_copy(update={"grid": GridExtent.model_validate(TREE["grid"] | {"centreline": ROUND})})

@@ -1,6 +1,6 @@
 """Friction of side walls: uniform flow between them against the balance of momentum, row by row and over all rows.
 
-g h S - k h u^2 - (c_w / dy) h u^2 beside a wall + nu h d2u/dy2 = 0,    du/dy = 0 at the walls.
+g h S - k h u^2 - (c_w / dy) r u^2 beside a wall wet over a height r + nu h d2u/dy2 = 0,    du/dy = 0 there.
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ from vegglue.arrays import Array
 from vegglue.flow.closures import wall_rates
 from vegglue.flow.equations import cell_depths, faces, residual
 from vegglue.flow.march import march
-from vegglue.flow.problem import ALONG, LEVEL, Problem, SideWalls, crop, take
+from vegglue.flow.problem import ALONG, LEVEL, SMOOTH_WALLS, Problem, SideWalls, crop, take
 
 WIDTH, DEPTH, SLOPE, ROWS = 3.0, 0.5, 0.001, 6
 DY = WIDTH / ROWS
@@ -68,6 +68,69 @@ def test_each_row_is_in_balance(viscosity: float, south: float, north: float) ->
     assert u == pytest.approx(exact, abs=1e-4)
     assert depth == pytest.approx(DEPTH, abs=1e-4)
     assert discharge(problem, solved(problem)) == pytest.approx(exact.sum() * DEPTH * DY, rel=1e-9)
+
+
+LOW, RISE = 3, 0.3
+
+
+def compound(flow: float, viscosity: float, film: float = 1e-5) -> Problem:
+    """A flume with the bed RISE higher from the row LOW on, the step rough, its sides smooth."""
+    steps = np.zeros((COLUMNS, ROWS - 1))
+    steps[:, LOW - 1] = 1.0
+    walls = SideWalls(np.zeros(COLUMNS), np.zeros(COLUMNS), np.array([WALL / DY]), steps)
+    bed = sloping(COLUMNS * SPACING, COLUMNS, ROWS, SLOPE)
+    bed[:, LOW:] += RISE
+    return make_problem(
+        bed, (SPACING, DY), flow, DEPTH - SLOPE * COLUMNS * SPACING, (2, 45.0), viscosity=np.array([viscosity]),
+        film=film, walls=walls, smallest_shear_depth=True,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("viscosity", [0.0, 0.02])
+def test_a_step_holds_the_water_beside_its_face(viscosity: float) -> None:
+    """g h S - c_f u^2 - c_w RISE u^2 / dy beside the step + nu d(h du/dy)/dy = 0, shear over the depth above it: with
+    no viscosity 0.687 m/s beside it, where the bed alone leaves 1.006.
+    """
+    depth = np.where(np.arange(ROWS) < LOW, DEPTH, DEPTH - RISE)
+    friction = np.full(ROWS, GRAVITY / 45.0**2)
+    friction[LOW - 1] += WALL * RISE / DY
+
+    def left(u: Array) -> Array:
+        sheared = np.minimum(depth[1:], depth[:-1])
+        shear = np.concatenate([[0.0], viscosity * sheared * np.diff(u) / DY, [0.0]])
+        return GRAVITY * SLOPE * depth - friction * u**2 + np.diff(shear) / DY
+
+    exact = np.asarray(fsolve(left, np.sqrt(GRAVITY * SLOPE * depth / friction), xtol=1e-12))
+    u, found = middle(compound(float((exact * depth).sum()) * DY, viscosity))
+    assert u == pytest.approx(exact, abs=1e-3)
+    assert found == pytest.approx(depth, abs=1e-3)
+
+
+def test_cells_beside_a_step_are_even() -> None:
+    """Half of it was taken for a slope within the cells on both its sides: 0.15 m in 0.2 m of water."""
+    problem = compound(0.5, 0.0)
+    assert problem.bed_half_range == pytest.approx(4.0 * problem.film)
+    smooth = replace(problem, walls=SMOOTH_WALLS)
+    assert smooth.bed_half_range[:, LOW].max() == pytest.approx(0.25 * RISE)
+
+
+def test_a_step_keeps_its_wall_where_rows_are_cut_out_beside_it() -> None:
+    problem = compound(0.5, 0.0)
+    state = solved(problem)
+    part = crop(problem, LOW - 1, ROWS)
+    rates = dict(wall_rates(part, cell_depths(part, np.ascontiguousarray(state[:, :, LOW - 1 :]))))
+    whole = dict(wall_rates(problem, cell_depths(problem, state)))
+    assert rates[0] == pytest.approx(whole[LOW - 1])
+    depth = cell_depths(problem, state)[COLUMNS // 2, LOW - 1]
+    assert whole[LOW - 1][COLUMNS // 2] == pytest.approx(WALL / DY * RISE / depth, rel=1e-2)
+
+
+def test_a_step_with_the_higher_bed_to_the_south_is_the_same_turned_round() -> None:
+    problem = compound(0.5, 0.02)
+    turned = replace(
+        problem, bed=problem.bed[:, ::-1].copy(), walls=replace(problem.walls, steps=-problem.walls.steps[:, ::-1])
+    )
+    assert solved(turned)[:, ALONG] == pytest.approx(solved(problem)[:, ALONG, ::-1], abs=1e-5)
 
 
 def test_marching_ends_in_the_same_flow() -> None:

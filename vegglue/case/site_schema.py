@@ -290,7 +290,9 @@ class Friction(Part):
     default: str = Field(description="friction class where no zone applies")
     zones: tuple[Zone, ...] = Field(default=(), description="rules in order, later ones win")
     walls: FrictionClass | None = Field(
-        default=None, description="vertical walls along the south and north side of the grid, smooth when left out"
+        default=None,
+        description="vertical walls along the south and north side of the grid, and on steps of the bed that are "
+        "steeper than 1:1 between two rows of cells; smooth when left out",
     )
 
 

@@ -109,17 +109,27 @@ def _add_plant_drag(problem: Problem, rate: Array, depth: Array, values: tuple[A
 
 
 def wall_rates(problem: Problem, depth: Array) -> tuple[tuple[int, Array], ...]:
-    """k_w = sum(h c_w / dy) / sum h over both cells of the east faces of rows beside rough walls: row, (nx, m) [1/m].
+    """k_w = sum(r c_w / dy) / sum h over both cells of the east faces of rows beside rough walls: row, (nx, m) [1/m].
 
-    A wall of a cell's depth h takes c_w |u| u h dx from the water h dx dy of the cell, so that du/dt = -c_w |u| u / dy:
-    along the wall only, which is why it is no part of k. Faded out in the film on dry land like advection.
+    A wall that is wet over a height r takes c_w |u| u r dx from the water h dx dy of the cell, so that du/dt = -c_w r/h
+    |u| u / dy: along the wall only, which is why it is no part of k. At the sides r = h, on a step h less the depth
+    above it. Faded out in the film on dry land like advection.
     """
-    walls, found = problem.walls, []
+    walls = problem.walls
     if not walls.rate.size:
         return ()
-    for row, stands in ((0, walls.south), (-1, walls.north)):
+    wet = {0: walls.south[:, None] * depth[:, 0]}
+    last = depth.shape[1] - 1
+    wet[last] = wet.get(last, 0.0) + walls.north[:, None] * depth[:, last]
+    for low in np.unique(np.nonzero(walls.steps)[1]) if walls.steps.size else ():
+        length, rise = walls.steps[:, low, None], np.maximum(np.abs(depth[:, low] - depth[:, low + 1]), 0.0)
+        for row, of_row in ((low, np.maximum(length, 0.0)), (low + 1, np.maximum(-length, 0.0))):
+            if of_row.any():
+                wet[row] = wet.get(row, 0.0) + of_row * rise
+    found = []
+    for row, height in wet.items():
         beside = depth[:, row]
-        pulled = stands[:, None] * walls.rate * beside * afloat(beside, 0.5 / problem.film)
+        pulled = walls.rate * height * afloat(beside, 0.5 / problem.film)
         pulled[:-1] += pulled[1:]  # the last face has one cell
         pair = beside.copy()
         pair[:-1] += beside[1:]

@@ -66,12 +66,14 @@ class SideWalls:
     """Rough vertical walls along the south and the north side of the grid; all empty without such walls.
 
     south, north: length of the wall over that of the cell beside it, 0 without a wall (nx,) [-]; rate: c_w / dy (m,)
-    [1/m], see `wall_coefficient`.
+    [1/m], see `wall_coefficient`. steps: walls on steps of the bed between rows j and j + 1, their length over that of
+    the lower cell, positive if the south one is lower, 0 without a step (nx, ny - 1) [-], or empty.
     """
 
     south: Array
     north: Array
     rate: Array
+    steps: Array = field(default_factory=lambda: EMPTY)
 
 
 SMOOTH_WALLS = SideWalls(np.zeros(0), np.zeros(0), np.zeros(0))
@@ -141,7 +143,8 @@ class Problem:
     film
         A tenth of it stays on dry land [m].
     smallest_shear_depth
-        Whether shear acts over the smallest depth of the cells around a point, not the mean.
+        Whether shear acts over the smallest depth of the cells around a point, not the mean: over a step with a wall
+        it acts above the step alone.
     bed_rise
         By how much members' beds lie higher (nx, ny, m) [m], or empty.
     effects
@@ -184,11 +187,16 @@ class Problem:
         """Half the range of the bed across the flow within each cell, (nx, ny) [m], at least four films.
 
         Along x the surface falls with the bed, so that a slope there does not make a cell deep and shallow at once. Of
-        rows cut out it is what it was in the whole, where the cells beside them are known.
+        rows cut out it is what it was in the whole, where the cells beside them are known. A step with a wall lies
+        between cells, and in none.
         """
         if self.half_range.size:
             return self.half_range
         step = np.gradient(self.bed, axis=1) if self.shape[1] > 1 else np.zeros_like(self.bed)
+        if self.walls.steps.any():
+            even = np.pad(self.walls.steps == 0.0, ((0, 0), (1, 1)))
+            rise = np.pad(np.diff(self.bed, axis=1), ((0, 0), (1, 1))) * even
+            step = (rise[:, 1:] + rise[:, :-1]) / np.maximum(even[:, 1:].astype(float) + even[:, :-1], 1.0)
         return np.maximum(0.5 * np.abs(step), 4.0 * self.film)
 
     @property
@@ -286,6 +294,7 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
             walls,
             south=walls.south if south == 0 else np.zeros_like(walls.south),
             north=walls.north if north == problem.shape[1] else np.zeros_like(walls.north),
+            steps=walls.steps[:, south : north - 1] if walls.steps.size else walls.steps,
         ),
         geometry=None if problem.geometry is None else rows_of(problem.geometry, south, north),
         bend=None if problem.bend is None else problem.bend._replace(south=problem.bend.south + south * problem.dy),

@@ -32,6 +32,9 @@ from vegglue.flow.problem import (
 
 # Depth [m] from which on all of what enters somewhere does so; less of it where it is shallower. Chosen, not measured.
 WHERE_WATER_ENTERS = 0.2
+# Rise of the bed between two rows over their distance [-] from which it is a step with a wall, between walls: chosen as
+# what no bank of earth has, after the compound channel A2 of docs/measured.md.
+STEEP_AS_A_WALL = 1.0
 # Pairs of a site and a set of patches of which the cells are kept: those of a model and of its coarser ones.
 PLANTED_KEPT = 8
 
@@ -59,6 +62,7 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
     refuse_ranges_without_cells(case, site.grid)
     site, members = in_experiment(site, experiment), _members(theta)
     classes = [case.friction.classes[name] for name in site.class_names]
+    walls = _walls(case, site, theta)
     return Problem(
         dx=site.grid.dx,
         dy=site.grid.dy,
@@ -72,8 +76,8 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
         plants=_plants(case, site, experiment, theta),
         viscosity=value_of(case.eddy_viscosity, theta, members),
         film=case.numerics.film_depth,
-        smallest_shear_depth=case.numerics.shear_depth == "smallest",
-        walls=_walls(case, site, theta),
+        smallest_shear_depth=case.numerics.shear_depth == "smallest" or bool(walls.steps.any()),
+        walls=walls,
         bend=bend_of(site.grid),
         **_under_effects(case, site, experiment, theta),
     )
@@ -190,7 +194,7 @@ def bend_of(grid: Grid) -> Bend | None:
 
 
 def _walls(case: Case, site: Site, theta: Theta) -> SideWalls:
-    """Rough walls along both sides, none where water enters through them."""
+    """Rough walls along both sides, none where water enters through them, and on steps of the bed."""
     walls, grid = case.friction.walls, site.grid
     if walls is None:
         return SMOOTH_WALLS
@@ -204,7 +208,11 @@ def _walls(case: Case, site: Site, theta: Theta) -> SideWalls:
             lengths[inflow.side][inflow_cells(inflow, grid)] = 0.0
     law, floor = bed_laws.BED_LAWS.index(walls.law), case.numerics.bank_argument_minimum
     drag = bed_laws.wall_coefficient(law, value_of(walls.coefficient, theta, _members(theta)), grid.dy, floor)
-    return SideWalls(**lengths, rate=drag / grid.dy)
+    rise, middle = np.diff(site.bed, axis=1), np.broadcast_to(middle, site.bed.shape)
+    along = 1.0 - curvature[:, None] * (grid.y[:-1] + 0.5 * grid.dy)
+    of_lower = along / np.where(rise > 0.0, middle[:, :-1], middle[:, 1:])
+    steps = np.where(np.abs(rise) > STEEP_AS_A_WALL * grid.dy, np.sign(rise) * of_lower, 0.0)
+    return SideWalls(**lengths, rate=drag / grid.dy, steps=steps if steps.any() else EMPTY)
 
 
 def _plants(case: Case, site: Site, experiment: str, theta: Theta) -> VegetatedCells:
