@@ -27,10 +27,10 @@ NAMES = ("law_bank_speed_step", "law_bank_speed_ramp", "law_floor_along_trend")
 
 
 def suspected(
-    found: SearchState, p: float = 1e-3, rivals: tuple[float, ...] = (0.0,), lost: float = 0.0
+    found: SearchState, p: float = 1e-3, rivals: tuple[float, ...] = (0.0,), lost: float = 0.0, p_last: float = 1e-3
 ) -> CandidateLaws | None:
     """What is reported of three laws of ln evidence 9, 7 and 1, with this alarm, beside kinds of these ln evidences;
-    lost: by how much less they have once they are calibrated.
+    lost: by how much less they have once they are calibrated; p_last: of the alarm beside all that was accepted.
     """
     laws = [SimpleNamespace(law=LAWS[name], candidate=SimpleNamespace(amplitude=LAWS[name].effect.amplitude))
             for name in NAMES]  # fmt: skip
@@ -49,7 +49,10 @@ def suspected(
     base = at_best(CASE_OF_TWINS, stations_of(CASE_OF_TWINS, ("A",), 4), values, slope)
     last: Any = SimpleNamespace(base=base, kinds=tuple(SimpleNamespace(total=one) for one in rivals))
     kept = np.array([9.0, 7.0, 1.0]) - lost
-    return candidate_laws(last, last, found, lambda: screening, lambda *given: ((), kept, given[-1]))
+    beside_last: Any = SimpleNamespace(p=p_last)
+    return candidate_laws(
+        last, last, found, lambda: screening, lambda: beside_last, lambda *given: ((), kept, given[-1])
+    )
 
 
 def test_laws_are_told_that_hold_their_chance_together() -> None:
@@ -66,7 +69,7 @@ def test_where_no_law_has_anything_to_act_on_none_is_told(monkeypatch: pytest.Mo
     last: Any = SimpleNamespace(base=SimpleNamespace(model=SimpleNamespace(case=CASE_OF_TWINS)), fingerprints=None)
     monkeypatch.setattr(candidate_effects, "law_fingerprints", lambda *_: SimpleNamespace(laws=[]))
     beside = partial(laws_beside, last)
-    assert candidate_laws(last, last, SearchState(), beside, lambda *_: ((), np.zeros(0), 0.0)) is None
+    assert candidate_laws(last, last, SearchState(), beside, beside, lambda *_: ((), np.zeros(0), 0.0)) is None
 
 
 def test_laws_compete_with_what_is_listed() -> None:
@@ -90,6 +93,16 @@ def test_a_law_is_named_beside_an_effect_that_is_not_clearly_likelier(
     wind, waves = (Step(name, (name,), (1.0,), ((name,),), 200.0, 5.0, 1e-4) for name in ("wind", "waves"))
     assert (suspected(SearchState(steps=(wind,), prior_weights=weights), lost=lost) is not None) == reported
     assert suspected(SearchState(steps=(waves,), prior_weights=weights), lost=lost) is None
+
+
+@pytest.mark.parametrize(("p_last", "first"), [(1e-3, True), (0.3, False)])
+def test_a_law_goes_before_an_effect_only_if_the_effect_leaves_it_something(p_last: float, first: bool) -> None:
+    """In a smooth flume friction at one depth led friction by a power of it, beside which nothing was left."""
+    wind = Step("wind", ("wind",), (1.0,), (("wind",),), 200.0, 5.0, 1e-4)
+    laws = suspected(SearchState(steps=(wind,)), p_last=p_last)
+    assert laws is not None
+    assert laws.chance > 0.95
+    assert laws.clear == laws.needed == first
 
 
 def test_a_place_is_compared_with_laws_by_what_it_explained() -> None:

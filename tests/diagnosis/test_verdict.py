@@ -448,6 +448,8 @@ def test_a_law_and_a_listed_effect_are_one_competition(chance: float, kind: str)
     laws = replace(LIKELY, chance=chance)
     found = verdict_on(step("a"), laws=laws)
     assert (found.kind, found.laws, [one.name for one in found.effects]) == (kind, laws, ["a"])
+    beside = verdict_on(step("a"), laws=replace(laws, needed=False))
+    assert (beside.kind, beside.conclusion) == ("one-of", "law_or_effects"), "beside a nothing is left for it"
     doubted = verdict_on(step("a"), laws=laws, strained=("k_s", 4.5))
     assert (doubted.kind, doubted.laws) == ("cannot-tell", None)
 

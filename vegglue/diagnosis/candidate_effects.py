@@ -10,6 +10,7 @@ the same trace as an accepted effect is that effect.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,18 +137,20 @@ def candidate_laws(
     last: Screening,
     found: SearchState,
     beside_first: Callable[[], LawScreening | None],
+    beside_last: Callable[[], LawScreening | None],
     refitted: Callable[[LawScreening, Sequence[str], float, float], tuple[Sequence[Hypothesis], Array, float]],
 ) -> CandidateLaws | None:
     """Laws that are significant in the last model, or in the first one if something was accepted; else None.
 
-    Beside accepted effects they are reported if these are not strong_odds times as likely as they are.
+    Beside accepted effects they are reported if these are not strong_odds times as likely as they are, and go before
+    these only if they are significant with these in the model, too.
 
-    beside_first: `laws_beside` the first screening, begun before it is known whether it is needed; refitted:
-    `laws_beside_accepted`.
+    beside_first, beside_last: `laws_beside` either screening, the first begun before it is known whether it is needed;
+    refitted: `laws_beside_accepted`.
     """
     if found.implausible:
         return None
-    screening = beside_first() if found.accepted or last is first else laws_beside(last)
+    screening = beside_first() if found.accepted or last is first else beside_last()
     if screening is None or screening.p >= constants().law_alarm_rate:
         return None
     # What laws are compared with: what was accepted, else what was calibrated, else all that was tested.
@@ -191,6 +194,9 @@ def candidate_laws(
             )
         )
     suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), tuple(laws), bool(strengths))
+    if found.steps and suspected.clear:
+        beside = beside_last()
+        suspected = replace(suspected, needed=beside is not None and beside.p < constants().law_alarm_rate)
     return suspected if not found.steps or may_be_laws(suspected.chance) else None
 
 

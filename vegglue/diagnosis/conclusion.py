@@ -24,7 +24,7 @@ from vegglue.case.grid import centreline_in, on_map
 from vegglue.case.gridded_site import cells_at
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, not_excluded
+from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, laws_beside, not_excluded
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.comparison import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.competition import tempering
@@ -151,7 +151,8 @@ def assemble_diagnosis(
     watch: Watch,
 ) -> Diagnosis:
     """The diagnosis; effects: every candidate by its name; held_out: the model at measurements no calibration uses."""
-    laws = candidate_laws(first, last, found, laws_beside_first, partial(laws_beside_accepted, watch=watch))
+    refitted = partial(laws_beside_accepted, watch=watch)
+    laws = candidate_laws(first, last, found, laws_beside_first, partial(laws_beside, last), refitted)
     if found.places and not found.steps and not found.instruments and laws is not None and laws.clear:
         # What competed after the place did so in the flow with it.
         found = replace(found, places=(), prior_weights=(), of_shape=0.0, undecided=None)

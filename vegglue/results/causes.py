@@ -254,6 +254,9 @@ class CandidateLaws:
         Those that hold 95 % of it, the most probable first.
     calibrated
         Whether the probabilities are those of calibrated laws, else to first order.
+    needed
+        Whether laws are significant beside the accepted effects, too: calibrated together with these. Else these and
+        the laws explain the same.
     """
 
     p: float
@@ -261,6 +264,7 @@ class CandidateLaws:
     chance: float
     laws: tuple[CandidateLaw, ...]
     calibrated: bool = False
+    needed: bool = True
 
     @property
     def likelier(self) -> bool:
@@ -269,8 +273,8 @@ class CandidateLaws:
 
     @property
     def clear(self) -> bool:
-        """Whether laws are strong_odds times as likely as all else together."""
-        return self.chance > constants().strong_odds * (1.0 - self.chance)
+        """Whether laws are strong_odds times as likely as all else together, and needed beside it."""
+        return self.needed and self.chance > constants().strong_odds * (1.0 - self.chance)
 
     @property
     def alike(self) -> tuple[CandidateLaw, ...]:
