@@ -296,6 +296,15 @@ def test_a_name_comes_with_what_its_model_still_asks_for() -> None:
     assert ranked.remainder
 
 
+@pytest.mark.parametrize("parts", [{"steps": (step("a"),)}, {"places": (an_anomaly(),)}])
+def test_no_name_stands_beside_errors_many_times_as_large_as_stated(parts: dict[str, Any]) -> None:
+    """In the wake of a turbine two names were told beside errors six times as large as stated."""
+    steps = parts.pop("steps", ())
+    found = verdict_on(*steps, errors=replace(AS_STATED, scale=6.0), **parts)
+    assert (found.kind, found.reasons) == ("cannot-tell", (ErrorsLargerThanStated(6.0),))
+    assert found.conclusion == "best_explanation"
+
+
 @pytest.mark.parametrize(
     "parts",
     [

@@ -178,6 +178,8 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
     ratio = inputs.misfit.value / max(inputs.misfit.freedom, 1)
     if ratio > constants().absurd_misfit:
         return verdict.MisfitBeyondErrors(math.sqrt(ratio))
+    if inputs.errors.scale > constants().absurd_errors:
+        return verdict.ErrorsLargerThanStated(inputs.errors.scale)
     if far > constants().far_off_prior:
         return verdict.ParameterFarFromPrior(parameter, far)
     names = {step.accepted for step in inputs.steps}
