@@ -160,6 +160,12 @@ class DecisionConstants:
         "size over a plausible one beyond which an effect or a place does; after river-f, whose place of a wrong kind "
         "has 4.4; places of the open cases have at most 1.2",
     )  # fmt: skip
+    implausible_size: float = _constant(
+        3.0, "-", CHOSEN, "size of an effect over a plausible one above which it is told as too large to be believed, "
+        "and not accepted if these data could not show it at plausible sizes; as the former since before the open "
+        "cases, as the latter after the compound channel A2 of docs/measured.md (4.8); true effects of 300 drawn "
+        "natural reaches that were accepted so had 1.4 to 2.6",
+    )  # fmt: skip
     largest_scale: float = _constant(
         1.25, "-", CHOSEN, "errors over stated ones above which they, not the model, explain the misfit: stated errors "
         "are good to a quarter",

@@ -14,11 +14,24 @@ from vegglue.calibration.fingerprints import Places
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.calibration.residual_screening import Screening, screen
+from vegglue.case.channel_geometry import site_scales
 from vegglue.case.parameter_space import z_of
-from vegglue.diagnosis.competition import found_place, promising_spots
-from vegglue.diagnosis.refits import RefitTrial, refits_of, start_with
+from vegglue.decision_constants import constants, using
+from vegglue.diagnosis.competition import (
+    Hypothesis,
+    cannot_be,
+    chances_of,
+    found_place,
+    hypotheses_of,
+    possible_change,
+    promising_spots,
+    window_around,
+)
+from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
+from vegglue.diagnosis.search_state import rivals_in, undecided_of
 from vegglue.effects.library import library
-from vegglue.engine.interface import linearise
+from vegglue.engine.interface import flow_at_centres, linearise
+from vegglue.progress import silent
 
 # Between the spots, which stand 0.5 m and 0.45 m apart: drag below zero pushes, as a jet does.
 OBJECT = library()["unlisted_object"]
@@ -75,3 +88,74 @@ def test_nothing_more_is_looked_for_where_something_acts_already() -> None:
     for case, spots in ((CASE, [0, 2]), (with_effect(CASE, acting, {}), [1, 3])):
         screening: Any = SimpleNamespace(kinds=(kind,), search=SimpleNamespace(model=SimpleNamespace(case=case)))
         assert promising_spots(screening, places, 10.0) == spots
+
+
+def test_a_bed_moves_by_the_depth_at_most_and_no_more_enters_than_flows() -> None:
+    """A tidal reach lay 7 m lower in 3.6 m of water, and a flume of 2 m had a bed 2.8 m higher."""
+    model, point = coarse_twin()
+    scales, grid = site_scales(model.case, model.site), model.site.grid
+    depth = np.max([flow_at_centres(model, point, name).depth for name in point.flows], axis=0)
+    i, j = grid.x.size // 2, grid.y.size // 2
+    x, y = float(grid.x[i]), float(grid.y[j])
+    assert depth[i, j] > scales.mean_depth
+    assert possible_change(model, point, "bed", x, y) == pytest.approx((-depth[i, j], depth[i, j]))
+    on_bank = float(grid.y[np.flatnonzero(depth[i] > 0.01)[0]])
+    assert possible_change(model, point, "bed", x, on_bank)[1] == pytest.approx(scales.mean_depth)
+    assert possible_change(model, point, "inflow", x, y) == (-scales.discharge, scales.discharge)
+    assert possible_change(model, point, "viscosity", x, y) == (-0.01, np.inf)
+    assert possible_change(model, point, "friction", x, y) == (-1.0, np.inf)
+    assert possible_change(model, point, "drag", x, y) == (-np.inf, np.inf)
+
+
+@pytest.mark.parametrize(("interval", "impossible"), [
+    ((-9.0, -4.9), True), ((2.1, 3.5), True), ((-9.0, -3.5), False), ((1.9, 3.5), False), ((-1.0, 1.0), False),
+])  # fmt: skip
+def test_what_cannot_be_lies_outside_with_its_whole_interval(interval: tuple[float, float], impossible: bool) -> None:
+    assert cannot_be(interval, (-3.6, 2.0)) is impossible
+
+
+def refit_of(amplitude: float, error: float) -> Refit:
+    place = {"x": 14.0, "y": 0.0, "length": 0.5, "width": 0.45}
+    candidate = place_candidate(library()["unlisted_bed"], place, 0.3)
+    around = (amplitude - 2.0 * error, amplitude + 2.0 * error)
+    return Refit(candidate, place, None, 30.0, amplitude, around)  # type: ignore[arg-type]
+
+
+def test_what_cannot_be_has_no_chance_and_is_not_told() -> None:
+    hypotheses = [
+        Hypothesis("drag", "a", 3.0, 0, refit_of(0.2, 0.1)),
+        Hypothesis("bed", "b", -np.inf, 0, refit_of(4.0, 0.1)),
+    ]
+    assert list(chances_of(hypotheses)) == [1.0, 0.0]
+    assert [one.name for one in rivals_in(undecided_of(hypotheses, (), np.array([])))] == ["a"]
+
+
+@pytest.mark.slow
+def test_effects_that_no_plausible_size_would_show_are_not_accepted_at_sizes_that_are_not() -> None:
+    """In a compound channel banks that grow rougher with depth were accepted at 4.8 plausible sizes, where the data
+    show them from 3.5 on.
+    """
+    screening = measured_with({"x": 14.3, "y": 0.2, "length": 0.5, "width": 0.45}, 0.3)
+    names = [one.name for one in screening.fingerprints.candidates]
+    untestable = {name for j, name in enumerate(names) if not screening.testable(screening.best_column(j))}
+    with using(replace(constants(), implausible_size=0.0)):
+        found = {one.name: one.log_evidence for one in hypotheses_of(screening, silent) if one.kind == "effect"}
+    assert found
+    assert {name for name, evidence in found.items() if np.isinf(evidence)} == untestable & set(found)
+
+
+@pytest.mark.slow
+def test_something_near_the_outlet_moves_no_further_than_spots_stand() -> None:
+    """A bed 7 m lower lay in the last column of cells, where it only changed how the water left."""
+    end = CASE.grid.x[1]
+    screening = measured_with({"x": end - 0.3, "y": 0.2, "length": 0.5, "width": 0.45}, 0.3)
+    search, kind = search_model(screening.base), next(one for one in screening.kinds if one.name == "drag")
+    places = next(one for one in screening.fingerprints.places if one.term == "drag")
+    last = float(places.x[places.length == places.length.min()].max())
+    spot = int(np.flatnonzero((places.length == places.length.min()) & (places.x == last))[0])
+    shapes = {**places.shapes(spot), "y": 0.2}
+    candidate = place_candidate(OBJECT, shapes, places.plausible)
+    (refit,) = refits_of(search, [RefitTrial(candidate, shapes, (start_with(candidate, search.point.z, 0.1),))])
+    assert refit is not None
+    assert window_around(search, places, refit).x.max() <= last + 0.005
+    assert found_place(search, places, kind, spot, refit).refit.shapes["x"] <= last + 0.005

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import log_evidence
-from vegglue.calibration.detection import detected_length
 from vegglue.calibration.fit import objective
 from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
 from vegglue.calibration.residual_screening import Screening
@@ -44,10 +43,6 @@ UNDETECTED_LENGTHS = (2.0, 3.0, 4.0)
 NOT_EXCLUDED_CHANCE = 0.9
 # Standard deviations of an effect's prior beyond which its size is not taken to be possible.
 LARGEST_POSSIBLE = 3.0
-# Chance with which an effect of the smallest size is detected [-].
-DETECTED = 0.95
-# Standard deviations of its prior within which an effect must be detectable to be testable, and within its support.
-TESTABLE = 2.0
 
 
 def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
@@ -57,12 +52,7 @@ def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
     F - T^2 a^2 / (1 + a^2), F under the errors as they are now: the prior of the amplitude is in all of them, as in
     those of a refit.
     """
-    threshold, base, kind = (
-        screening.effects.threshold(constants().effect_alarm_rate),
-        screening.base,
-        screening.kinds[0],
-    )
-    detected = float(detected_length(np.array(threshold), DETECTED))
+    base, kind = screening.base, screening.kinds[0]
     projected, prints = screening.projected, screening.fingerprints
     least_squares = objective(base.noise, base.fitted.point)
 
@@ -75,7 +65,6 @@ def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
         amplitude, gain = prints.amplitudes[column], float(kind.gain[column])
         reach = NORMAL95 * amplitude.plausible_gain / float(np.hypot(1.0, kind.size[column]))
         taken = float(screening.effects.scores[column] ** 2 * prior_shrinkage(kind.size[column]))
-        smallest = amplitude.size(detected / max(float(projected.length[column]), 1e-300))
         confounder, cosine = "", 0.0  # the parameter whose slope is most like the fingerprint
         if base.model.names:
             cosines = unit(screening.whitened_fingerprints[:, column]) @ unit(screening.whitened_slopes)
@@ -98,8 +87,8 @@ def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
             test=ScoreTest(score, screening.effects.p_of(score)),
             detectability=Detectability(
                 visibility=float(projected.visible[column]),
-                smallest=smallest,
-                testable=smallest < min(TESTABLE * amplitude.scale, amplitude.furthest),
+                smallest=screening.smallest_shown(column),
+                testable=screening.testable(column),
                 confounder=confounder,
                 cosine=cosine,
             ),

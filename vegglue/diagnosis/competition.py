@@ -26,6 +26,11 @@ strong_odds is taken as it is: nothing is followed beside it.
 An alarm names nothing by itself: it is sounded at its rate by errors alone. Only where all hypotheses together lead
 nothing by missing_odds is any taken.
 
+What cannot be has no evidence: a bed that would move by more than the water is deep, water that would enter by more
+than flows (`possible_change`), and a listed effect beyond implausible_size that these data could not show at a
+plausible one. Something at a place keeps from the ends of the grid as the spots of
+the screening do, since nearer it only changes how the water enters or leaves.
+
 Smooth fields of a term (`field_scan`) are so free that they explain much of whatever is missing. They do not compete
 with a single cause, but with all that was accepted in the end.
 """
@@ -46,14 +51,18 @@ from vegglue.calibration.fit import interval95
 from vegglue.calibration.model_error import EFFECT_AT_PLACE
 from vegglue.calibration.residual_screening import Screening, conditional_screenings, refit_start
 from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors
-from vegglue.case.case_effects import effect_named
+from vegglue.case.case_effects import effect_named, effect_of, value_of
 from vegglue.case.channel_geometry import channel_geometry, patches_present, site_scales
+from vegglue.case.gridded_site import cells_at
+from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Parameter
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.refits import Refit, RefitTrial, Relevelled, refits_of, relevelled
 from vegglue.effects.unlisted import rectangle
+from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.engine.newton import problem_at
 from vegglue.flow.closures import bed_drag, drag
+from vegglue.flow.local_changes import Term
 from vegglue.normal_range import NORMAL95
 from vegglue.progress import Progress, Watch
 from vegglue.results.causes import PatchOutline
@@ -131,7 +140,7 @@ class FoundPlace:
 
 def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot: int, refit: Refit) -> FoundPlace:
     """Something refitted at a spot, moved to where it explains most."""
-    moved, window = refit, _window(search, places, refit)
+    moved, window = refit, window_around(search, places, refit)
     for _ in range(MOST_MOVES):
         best = int(np.argmax(window.log_factor))
         if window.log_factor[best] < moved.log_factor + LEAST_RISE:
@@ -146,7 +155,7 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
         (there,) = refits_of(search, [RefitTrial(candidate, shapes, (start,))])
         if there is None or there.log_factor < moved.log_factor + LEAST_RISE:
             break
-        moved, window = there, _window(search, places, there)
+        moved, window = there, window_around(search, places, there)
     # Spots of the size of that one which the window has seen again are replaced by it.
     half = SHARE_OF_SPACING * np.array([places.length[spot], places.width[spot]])
     within = (places.x >= window.x.min() - half[0]) & (places.x <= window.x.max() + half[0])
@@ -167,6 +176,29 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
         np.sqrt(away**2 @ chance).tolist() for chance in (tempered_probabilities(weight), np.exp(weight - total))
     )
     return FoundPlace(moved, total, tuple(errors), tuple(spread))
+
+
+def possible_change(model: Model, point: Point, term: Term, x: float, y: float) -> tuple[float, float]:
+    """The range in which a term can change at a place [m, m3/s, m2/s or -]: a bed by the depth there, or by the mean
+    depth where that is more; water by all that flows; viscosity and friction down to none.
+    """
+    scales, most = site_scales(model.case, model.site), np.inf
+    if term == "bed":
+        i, j = cells_at(model.site, np.array([x]), np.array([y]))
+        there = [flow_at_centres(model, point, name).depth[i, j] for name in point.flows]
+        most = max(scales.mean_depth, float(np.max(there)))
+    elif term == "inflow":
+        most = scales.discharge
+    elif term == "friction":
+        return -1.0, most
+    elif term == "viscosity" and not any(effect_of(model.case, key).stage == "exchange" for key in model.case.effects):
+        return -float(value_of(model.case.eddy_viscosity, theta_at(model.case, point.z), 1)[0]), most
+    return -most, most
+
+
+def cannot_be(interval: tuple[float, float], possible: tuple[float, float]) -> bool:
+    """Whether a change lies outside what is possible with its whole 95 % interval."""
+    return interval[0] > possible[1] or interval[1] < possible[0]
 
 
 # Plants that are not on the map: standard deviations of ln length and ln width around the medians of the patches on it
@@ -273,22 +305,26 @@ def found_patch(
     )
 
 
-def _window(search: SearchModel, places: Places, refit: Refit) -> Window:
+def window_around(search: SearchModel, places: Places, refit: Refit) -> Window:
     """Places around a refit, to first order in the flow with it."""
     point, noise, place = refit.fitted.point, search.noise, refit.shapes
     model = replace(search.model, case=with_effect(search.model.case, refit.candidate, place))
     around = places_around(model, point, places.term, place, SHARE_OF_SPACING)
-    traces = noise.whiten(noise.used(around.fingerprints))
-    own = int(np.argmin(np.hypot(around.x - place["x"], around.y - place["y"])))
+    alike = np.abs(places.length - place["length"])
+    ends = np.append(places.x[alike == alike.min()], place["x"])
+    kept = np.flatnonzero((around.x >= ends.min()) & (around.x <= ends.max()))
+    x, y = around.x[kept], around.y[kept]
+    traces = noise.whiten(noise.used(around.fingerprints[:, kept]))
+    own = int(np.argmin(np.hypot(x - place["x"], y - place["y"])))
     # What it does where it is is taken away, and put elsewhere.
     residual = noise.whiten(noise.residual(point.prediction)) + traces[:, own] * refit.amplitude
     slope = noise.whiten(noise.used(point.slope[:, :-1]))
     projected = score_test.project(slope, residual, point.z[:-1], traces)
     size = projected.length * places.plausible
-    score = score_test.scores(projected, around.only_sign)
+    score = score_test.scores(projected, around.only_sign[kept])
     gain = expected_gain(score, projected.length, size)
     first_order = log_factors(score, size)
-    return Window(around.x, around.y, first_order - first_order[own] + refit.log_factor, gain)
+    return Window(x, y, first_order - first_order[own] + refit.log_factor, gain)
 
 
 # Listed effects that are refitted in one round at most, and how far below the best one's evidence a hypothesis may lie
@@ -301,9 +337,11 @@ START_SHARES = (1.0, 0.3)
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A hypothesis with its evidence E [-]. kind: effect, a term at a place, or an instrument's kind; column: of its
-    fingerprint among those of its kind; what: its refit, or the instrument; errors, spread: of x and y of a
-    place [m], and outline, see `FoundPlace`; without: of a surveyed line the model without its level.
+    """A hypothesis with its evidence E [-], -inf for what cannot be.
+
+    kind: effect, a term at a place, or an instrument's kind; column: of its fingerprint among those of its kind; what:
+    its refit, or the instrument; errors, spread: of x and y of a place [m], and outline, see `FoundPlace`; without: of
+    a surveyed line the model without its level.
     """
 
     kind: str
@@ -382,6 +420,9 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
                 if prints.candidates[j].free:  # whichever part of it the amplitude is, the model is the same
                     others_add = float(np.log(some.size))
                 total = refit.log_factor + (float(kind.log_prior[columns[j]]) + others_add)
+                size = abs(refit.amplitude - refit.candidate.amplitude.off) / refit.candidate.amplitude.scale
+                if size > constants().implausible_size and not screening.testable(columns[j]):
+                    total = -np.inf
                 found.append(Hypothesis("effect", refit.candidate.name, total, columns[j], refit))
         for one, _ in places:
             of_term = zip(spots, refits[len(effects) :], strict=True)
@@ -391,9 +432,9 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
                 spot, refit = max(ended, key=lambda end: end[1].log_factor)
                 there = found_place(search, one, its_kind, spot, refit)
                 name = there.refit.candidate.name
-                found.append(
-                    Hypothesis(its_kind.name, name, there.log_evidence, spot, there.refit, there.errors, there.spread)
-                )
+                possible = possible_change(search.model, search.point, one.term, *(there.refit.shapes[k] for k in "xy"))
+                total = -np.inf if cannot_be(there.refit.interval95, possible) else there.log_evidence
+                found.append(Hypothesis(its_kind.name, name, total, spot, there.refit, there.errors, there.spread))
         if spots and PATCH not in tried:
             names.append(PATCH)
             found = with_patch(screening, found)

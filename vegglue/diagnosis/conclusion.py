@@ -27,8 +27,8 @@ from vegglue.decision_constants import constants
 from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, laws_beside, not_excluded
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.comparison import HeldOutErrors, held_out_errors, largest_error_between
-from vegglue.diagnosis.competition import tempering
-from vegglue.diagnosis.field_scan import best_field, free_of_prior, log_density_of_residual, map_of_field
+from vegglue.diagnosis.competition import cannot_be, possible_change, tempering
+from vegglue.diagnosis.field_scan import fields_by_evidence, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.handbook import parameter_doubts
 from vegglue.diagnosis.law_search import laws_beside_accepted
 from vegglue.diagnosis.search_state import SearchState, rivals_in
@@ -482,32 +482,38 @@ def _field(
 ) -> tuple[FieldFound, FieldMapKept] | tuple[None, None]:
     """A smooth field of one term and its map, where it explains the misfit of the first model better than all that was
     accepted, or closes a misfit in which nothing was; None where there is nothing to explain, or where a place of the
-    same term explains it with fewer numbers.
+    same term explains it with fewer numbers. A field that cannot be where it is clearest is passed over.
     """
     if found.implausible or (not (found.accepted or found.undecided) and misfit.p >= constants().poor_fit_chance):
         return None, None
     screening = first if found.accepted else last
-    best, responses = best_field(screening.search, half_width(screening.base.model.site))
+    search = screening.search
+    fields, responses = fields_by_evidence(search, half_width(screening.base.model.site))
     gained = found.gained(log_evidence(first.base), log_evidence(last.base)) if found.accepted else 0.0
     undecided = found.undecided.hypotheses if found.undecided else ()
     gained = max([gained, *(one.log_evidence for one in undecided)])
     told_as_place = {"friction" if place.term == "drag" else place.term for place in found.places}
-    if not field_goes_first(best.log_factor, gained) or best.term in told_as_place:
-        return None, None
-    mapped, grid = map_of_field(screening.search, responses, best), responses.grid
-    i, j = np.unravel_index(int(np.argmax(np.abs(mapped.value) / np.maximum(mapped.error, 1e-300))), mapped.value.shape)
-    most = FieldFound(
-        term=best.term,
-        size=best.size,
-        length=best.over.length,
-        width=best.over.width,
-        log_factor=best.log_factor,
-        value=float(mapped.value[i, j]),
-        error=float(mapped.error[i, j]),
-        x=float(grid.x[i]),
-        y=float(grid.y[j]),
-    )
-    return most, FieldMapKept(grid.x, grid.y, mapped.value, mapped.error)
+    for best in fields:
+        if not field_goes_first(best.log_factor, gained) or best.term in told_as_place:
+            break
+        mapped, grid = map_of_field(search, responses, best), responses.grid
+        clearest = int(np.argmax(np.abs(mapped.value) / np.maximum(mapped.error, 1e-300)))
+        i, j = np.unravel_index(clearest, mapped.value.shape)
+        most = FieldFound(
+            term=best.term,
+            size=best.size,
+            length=best.over.length,
+            width=best.over.width,
+            log_factor=best.log_factor,
+            value=float(mapped.value[i, j]),
+            error=float(mapped.error[i, j]),
+            x=float(grid.x[i]),
+            y=float(grid.y[j]),
+        )
+        half, possible = NORMAL95 * most.error, possible_change(search.model, search.point, best.term, most.x, most.y)
+        if not cannot_be((most.value - half, most.value + half), possible):
+            return most, FieldMapKept(grid.x, grid.y, mapped.value, mapped.error)
+    return None, None
 
 
 def field_goes_first(log_factor: float, gained: float) -> bool:

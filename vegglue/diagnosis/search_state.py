@@ -47,6 +47,8 @@ def rivals_in(undecided: Undecided) -> tuple[Rival, ...]:
     """The hypotheses as values with their probabilities, the likeliest first."""
     rivals = []
     for one, chance in zip(undecided.hypotheses, undecided.chances, strict=True):
+        if np.isinf(one.log_evidence):  # what cannot be
+            continue
         if isinstance(one.what, Instrument):
             rivals.append(Rival(one.name, one.what.kind, chance, one.what.x, one.what.y))
         elif one.kind == "effect":
@@ -328,7 +330,7 @@ def with_rivals_again(
         screening = screen(less, flagged)
         hypotheses = hypotheses_of(screening, watch)
         listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
-        if step.accepted not in [hypotheses[j].name for j in listed]:
+        if step.accepted not in [hypotheses[j].name for j in listed] or np.isinf(hypotheses[listed[0]].log_evidence):
             continue
         best = hypotheses[listed[0]].what
         assert isinstance(best, Refit)

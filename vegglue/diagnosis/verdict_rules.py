@@ -51,8 +51,6 @@ TERMS_OF_DISCHARGES, OF_DEVICES = ("inflow", "bed"), ("device_gain", "zero_offse
 # Share of a plausible size within which an amplitude lies at an end of its support: as far off as refits start at
 # least, see `candidates.START_OFF_ENDS`.
 AT_BOUND = 0.01
-# Amplitude over a plausible one, above which it is noted as too large to be believed. Chosen, not measured.
-IMPLAUSIBLE = 3.0
 
 
 @dataclass(frozen=True)
@@ -294,7 +292,7 @@ def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
         yield verdict.MisfitTooSmall(misfit.value, misfit.freedom)
     by_name = {one.name: one for one in inputs.candidates}
     for name in accepted:
-        if (times := by_name[name].amplitude.relative_size) > IMPLAUSIBLE:
+        if (times := by_name[name].amplitude.relative_size) > constants().implausible_size:
             yield verdict.ImplausibleAmplitude(name, times)
     hidden = tuple(name for group in inputs.not_excluded for name in group)
     if hidden and misfit.p >= constants().poor_fit_chance:

@@ -9,9 +9,9 @@ import numpy as np
 from vegglue.calibration.baseline import Baseline, baseline, for_prediction
 from vegglue.calibration.candidates import Candidate
 from vegglue.calibration.detection import detected_length
+from vegglue.calibration.residual_screening import DETECTED
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
-from vegglue.diagnosis.candidate_effects import DETECTED
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
 from vegglue.diagnosis.comparison import excluded_by
 from vegglue.diagnosis.next_measurement import Explanation, MeasurementWorth, worth_of_measurements
