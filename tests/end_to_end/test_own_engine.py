@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import built_in, by_server, served
-from reach import COARSE, ROOT, write_reach
-from reach import vegglue as shell
+from reach import COARSE, ROOT, here, write_reach
 
 import vegglue
 from vegglue.case.schema import Case
@@ -85,22 +84,21 @@ def test_draws_give_the_same_posterior(pair: Pair, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.slow
-def test_the_page_is_true(pair: Pair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its config and its script, in a few members from the shell; without --trust nothing runs."""
-    monkeypatch.chdir(tmp_path)
+def test_the_page_is_true(pair: Pair, tmp_path: Path) -> None:
+    """Its config and its script, in a few members; without --trust nothing runs."""
     write_reach(tmp_path, COARSE, SMALL, WITH_ERROR)
     pattern = r"^```yaml\n(# brook_by_command\.yaml\n.*?)^```"
     shown = re.search(pattern, PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     assert shown
     (tmp_path / "brook_by_command.yaml").write_text(shown[1], encoding="utf-8")
     shutil.copy(PAGE.parent / "examples" / "solver_as_command.py", tmp_path)
-    refused = shell(tmp_path, "check", "brook_by_command.yaml", succeed=False)
+    refused = here(tmp_path, "check", "brook_by_command.yaml", succeed=False)
     assert refused.returncode == 2
     assert "which runs as code" in refused.stderr
     assert not (tmp_path / "runs").exists()
-    checked = " ".join(shell(tmp_path, "check", "brook_by_command.yaml", "--trust").stdout.split())
+    checked = " ".join(here(tmp_path, "check", "brook_by_command.yaml", "--trust").stdout.split())
     assert re.search(r"The command of `engine` took [\d.]+ s at the medians of the priors: velocity 0\.\d+ to", checked)
-    said = shell(tmp_path, "simulate", "brook_by_command.yaml", "--trust", "--members", 2, "--jobs", 2).stdout
+    said = here(tmp_path, "simulate", "brook_by_command.yaml", "--trust", "--members", 2, "--jobs", 2).stdout
     assert "2 members, run by the command, 0 failed" in said
     found = read_ensemble(tmp_path / "runs" / "brook_by_command" / "ensemble.h5")
     inside = vegglue.simulate(pair.inside, runs=tmp_path / "inside", members=2, jobs=1)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import SMOOTH, commanded
-from reach import COARSE, begin, said_to
+from reach import COARSE, begin, here, said_to
 from reach import vegglue as shell
 
 import vegglue
@@ -85,7 +85,7 @@ def test_where_all_fail_it_is_said_why(
         "brook.yaml: the command of `engine` failed at the medians of the priors: the command ended with exit" in said
     )
     assert "its last line: no licence; its files lie in runs/brook/engine." in said
-    done = shell(tmp_path, "simulate", "brook.yaml", "--trust", succeed=False)
+    done = here(tmp_path, "simulate", "brook.yaml", "--trust", succeed=False)
     assert "8 members, run by the command, 8 failed; 8 of them: the command ended with exit code 1" in done.stdout
     assert done.returncode == 2
     assert "brook.yaml: expected members with a solution, got none of 8; 8 of them: the command ended" in done.stderr
@@ -103,15 +103,15 @@ def test_members_that_failed_are_run_again_with_force_and_no_other(tmp_path: Pat
     marks = slow_brook(tmp_path, 0.0)
     model = tmp_path / "model.py"
     model.write_text(model.read_text(encoding="utf-8") + asks, encoding="utf-8")
-    first = shell(tmp_path, "simulate", "brook.yaml", "--trust").stdout
+    first = here(tmp_path, "simulate", "brook.yaml", "--trust").stdout
     failed = int(re.search(r"(\d) failed", first)[1])  # type: ignore[index]
     assert 0 < failed < MEMBERS == len(lines_of(marks))
     licence.touch()
-    assert "is up to date" in shell(tmp_path, "simulate", "brook.yaml", "--trust").stdout
-    again = shell(tmp_path, "simulate", "brook.yaml", "--trust", "--force").stdout
+    assert "is up to date" in here(tmp_path, "simulate", "brook.yaml", "--trust").stdout
+    again = here(tmp_path, "simulate", "brook.yaml", "--trust", "--force").stdout
     assert f"{MEMBERS} members, run by the command, 0 failed" in again
     assert len(lines_of(marks)) == MEMBERS + failed
-    assert "is up to date" in shell(tmp_path, "simulate", "brook.yaml", "--trust", "--force").stdout
+    assert "is up to date" in here(tmp_path, "simulate", "brook.yaml", "--trust", "--force").stdout
 
 
 @pytest.mark.slow
@@ -176,7 +176,7 @@ def test_verbs_that_need_the_built_in_engine_say_so(tmp_path: Path) -> None:
 def test_a_cluster_is_refused_in_a_sentence(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     commanded(tmp_path, SMOOTH, "", COARSE, SMALL)
-    done = shell(tmp_path, "simulate", "brook.yaml", "--trust", "--cluster", "local:1", succeed=False)
+    done = here(tmp_path, "simulate", "brook.yaml", "--trust", "--cluster", "local:1", succeed=False)
     assert done.returncode == 2
     assert "--cluster: brook runs the command of its `engine`, on this machine only" in done.stderr
 
