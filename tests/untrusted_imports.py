@@ -17,6 +17,7 @@ from matlab_files import profiler_mat, qrev_mat, riversurveyor_mat
 from result_files import GridFlow, write_flow_fm, write_hec_ras, write_selafin, write_trim
 from scipy.io import savemat
 
+from vegglue.importers.confluence import OF_THE_SET
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.finished_results import read_result
 from vegglue.importers.instruments import reader_of
@@ -127,7 +128,7 @@ IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("qrev.mat", _made(lambda path: qrev_mat(path, transects=1)), _measured),
     ("profiler.mat", _made(lambda path: profiler_mat(path, np.full(2, 0.3))), _measured),
     ("summary.xml", SUMMARY, _measured),
-    ("maps.mat", _matlab(), lambda path: load_matlab(path, "a file of the set", ("X", "Y"))),
+    ("maps.mat", _matlab(), lambda path: load_matlab(path, OF_THE_SET, ("X", "Y"))),
     ("mill.csv", AQUACALC, _measured),
     ("patches.prj", PRJ, _beside),
     ("tracker.dis", flowtracker(PLACES, DEPTHS, VELOCITIES).encode(), _measured),

@@ -7,6 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from vegglue.wording.numbers import shown_path as shown_path
+from vegglue.wording.sentences import macros
+
 # Signs that end a line or steer a terminal; files of strangers may hold them, and sentences quote files.
 _STEERING = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
@@ -16,10 +19,26 @@ def _in_one_line(sentence: str) -> str:
 
 
 class InputError(ValueError):
-    """Something handed in is wrong: where, what was expected, what came, and what to do."""
+    """Something handed in is wrong: where, what was expected, what came, and what to do.
+
+    Parameters
+    ----------
+    kind : str
+        The macro of `wording/templates/refusals.j2` that words the values; without values the sentence itself.
+    **values : object
+        Numbers in SI, names, rows and paths, kept as `values`.
+    """
+
+    def __init__(self, kind: str, /, **values: object) -> None:
+        super().__init__(kind)
+        self.kind, self.values = kind, values
 
     def __str__(self) -> str:
-        return _in_one_line(super().__str__())
+        if not self.values:
+            return _in_one_line(self.kind)
+        shown = {name: _in_one_line(one) if isinstance(one, str) else one for name, one in self.values.items()}
+        lines = macros()[self.kind](shown).strip("\n").split("\n")
+        return _in_one_line(" ".join(line.strip() for line in lines))
 
     def _render_traceback_(self) -> list[str]:  # IPython shows these lines in place of a traceback
         return [f"{type(self).__name__}: {self}"]
@@ -35,14 +54,6 @@ class StorageError(OSError):
 
     def _render_traceback_(self) -> list[str]:  # IPython shows these lines in place of a traceback
         return [f"{type(self).__name__}: {self}"]
-
-
-def shown_path(path: Path) -> str:
-    """The path as sentences name it: relative to where the user stands; as it is on another drive of Windows."""
-    try:
-        return os.path.relpath(path)
-    except ValueError:
-        return str(path)
 
 
 def path_from(folder: Path, path: Path) -> str:

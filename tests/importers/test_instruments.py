@@ -19,6 +19,7 @@ from vegglue.errors import InputError
 from vegglue.importers import instruments
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.gaugings import read_flowtracker2, read_gauging
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.instruments import read_matlab, reader_of
 from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.nortek import read_nortek, read_vector
@@ -161,8 +162,8 @@ def test_a_raw_transect_gives_the_stations_of_its_ascii_output(tmp_path: Path) -
     for role, off in (("x", 0.08), ("y", 0.08), ("east_velocity", 0.02), ("north_velocity", 0.02)):
         assert raw.numbers[role] == pytest.approx(text.numbers[role], abs=off), role
     assert np.median(raw.numbers["u_se"]) == pytest.approx(np.median(text.numbers["u_se"]), rel=0.5)
-    assert "Rio Grande 0.2 m" in raw.notes[0]
-    assert "151 ensembles" in raw.notes[0]
+    assert raw.notes[0] == ImportNote(Noted.ADCP_AT, pytest.approx(0.2), ("Rio Grande",))
+    assert ImportNote(Noted.ENSEMBLES, 151) in raw.notes
 
 
 def test_a_compass_is_turned_to_true_north(tmp_path: Path) -> None:
@@ -298,7 +299,7 @@ def test_a_transect_of_a_riversurveyor_becomes_stations(tmp_path: Path, unit: st
     riversurveyor_mat(tmp_path / "t.mat", unit)
     assert reader_of(tmp_path / "t.mat") is read_matlab
     taken = read_matlab(tmp_path / "t.mat", START)
-    assert "36 ensembles" in taken.notes[0]
+    assert ImportNote(Noted.ENSEMBLES, 36) in taken.notes
     assert taken.numbers["east_velocity"] == pytest.approx(0.64, abs=0.03)
     assert taken.numbers["north_velocity"] == pytest.approx(-0.48, abs=0.03)
     assert np.allclose(taken.numbers["x"] - 100.0, 0.75 * (taken.numbers["y"] - 200.0), atol=1e-6)
@@ -311,14 +312,15 @@ def qrev(tmp_path: Path, transects: int) -> MeasuredRows:
 
 def test_transects_there_and_back_lie_on_one_another(tmp_path: Path) -> None:
     taken = qrev(tmp_path, 2)
-    assert "2 transects, 118 ensembles, 2 " in taken.notes[0]
+    assert taken.notes[1:3] == (ImportNote(Noted.TRANSECTS, 2), ImportNote(Noted.ENSEMBLES, 118))
+    assert taken.notes[3].number == 2
     assert taken.size == 15
     assert taken.numbers["x"].min() == pytest.approx(100.0, abs=0.2)
     assert taken.numbers["x"].max() == pytest.approx(100.0 + 59 * 0.06, abs=0.2)
     assert np.allclose(taken.numbers["y"] - 200.0, (taken.numbers["x"] - 100.0) / 0.75, atol=1e-6)
     assert taken.numbers["east_velocity"] == pytest.approx(0.64, abs=0.02)  # without the cells that were filled up
     assert taken.numbers["north_velocity"] == pytest.approx(-0.48, abs=0.02)
-    assert "1 transect, 59 ensembles" in qrev(tmp_path, 1).notes[0]
+    assert qrev(tmp_path, 1).notes[1:3] == (ImportNote(Noted.TRANSECTS, 1), ImportNote(Noted.ENSEMBLES, 59))
 
 
 @pytest.mark.parametrize("beams", [False, True])

@@ -19,6 +19,7 @@ from vegglue.case.gridded_site import build_site
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.gaugings import read_flowtracker2, read_gauging
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.instruments import reader_of
 from vegglue.importers.measured_rows import Placement, read_rows
 from vegglue.importers.teledyne import read_pd0, read_winriver
@@ -83,8 +84,12 @@ def test_lost_bottom_track_costs_its_ensemble_only(tmp_path: Path) -> None:
     whole.write_bytes(pd0(*BOAT, 2.0, (0.64, -0.48), 0.0))
     marked.write_bytes(pd0(*BOAT, 2.0, (0.64, -0.48), 0.0, lost=(40, 41), unranged=(90,)))
     a, b = read_pd0(whole, START), read_pd0(marked, START)
-    assert "151 ensembles" in a.notes[0], "the last one, too"
-    assert all(part in b.notes[0] for part in ("148 ensembles", "1 without velocities", "2 without a place"))
+    assert ImportNote(Noted.ENSEMBLES, 151) in a.notes, "the last one, too"
+    assert b.notes[-3:] == (
+        ImportNote(Noted.ENSEMBLES, 148),
+        ImportNote(Noted.ENSEMBLES_LACKING, 1, ("velocities",)),
+        ImportNote(Noted.ENSEMBLES_LACKING, 2, ("a place",)),
+    )
     for role in ("x", "y", "east_velocity", "north_velocity"):
         assert b.numbers[role] == pytest.approx(a.numbers[role], abs=0.05 if role in "xy" else 0.005), role
 
@@ -106,7 +111,7 @@ def test_any_mark_of_winriver_is_as_good_as_no_ensemble(tmp_path: Path, ensemble
     without = read_winriver(path, START)
     for role, values in without.numbers.items():
         assert marked.numbers[role] == pytest.approx(values, abs=1e-9), role
-    assert "1 without" in marked.notes[0]
+    assert [(note.kind, note.number) for note in marked.notes] == [(Noted.ENSEMBLES, 150), (Noted.ENSEMBLES_LACKING, 1)]
 
 
 @pytest.mark.parametrize(("reference", "leap"), [("NONE", 0.0), ("BT", 400.0)])

@@ -3,6 +3,7 @@
 `PYTHONPATH=tests python tests/wording/test_rendered.py` writes the files beside this one anew.
 """
 
+import re
 import textwrap
 from collections.abc import Callable
 from contextlib import redirect_stdout
@@ -42,12 +43,18 @@ from vegglue.cli.printed import (
 from vegglue.diagnosis.comparison import MEASUREMENT
 from vegglue.diagnosis.stepwise_choice import HeldOutErrorsDidNotFall, UnclearFall
 from vegglue.effects.library import SHIPPED
+from vegglue.errors import InputError
 from vegglue.importers.import_notes import (
+    BanksOfBed,
+    ConfluenceAssumptions,
     CountedStems,
     ImportNote,
     Noted,
+    PatchesRead,
+    RepeatsAveraged,
     SiteAssumptions,
     ThickStems,
+    UnitsAssumed,
     UnreadHoldout,
     UnreadKeys,
 )
@@ -413,9 +420,68 @@ IMPORTED = [
     SiteAssumptions("site.yaml", 2.0, 0.8, True, False), SiteAssumptions("site.yaml", None, None, False, True),
     UnreadKeys("site.yaml", ("weather", "patches[0].diameter"), True), ThickStems(), CountedStems(),
     UnreadHoldout("holdout.csv", "site.yaml"), UnreadHoldout("holdout.xlsx", "site.yaml", "holdout.csv"),
+    RepeatsAveraged(1, at=(2.0, 0.5), copied=True, needed=3),
+    RepeatsAveraged(12, together=2.2, apart=4.1, worst=(2.0, 0.5)),
+    BanksOfBed(0.25, 3.1, 3.0), BanksOfBed(0.25, None, 3.0),
+    PatchesRead(2, ("Density",), (), (), ("d_mm",), ()), PatchesRead(1, (), ("x", "y"), (), ("stems",), ("stems",)),
+    UnitsAssumed(("x", "y"), ("stems",)), ConfluenceAssumptions(0.02, 0.01, 0.001, 0.011, 0.15),
+]  # fmt: skip
+CSV = Path("adv.csv")
+AT_ROW = {"file": CSV, "row": 3}
+OF_SITE = {"known": ("low", "high"), "site": "site.yaml", "key": "experiments"}
+REFUSED = [
+    InputError("unreadable", file=CSV, why="No such file or directory"),
+    *(
+        InputError("unreadable", file=Path("brook"), why="Is a directory", advice=one, by=Path("reed.yaml"))
+        for one in ("path", "extends", "import", "site", "twin")
+    ),
+    InputError("not_there", folder=Path("brook"), key="files", name="b.csv"),
+    InputError("file_too_large", file=CSV, most=1_000_000, got=2_000_000, result=False),
+    InputError("file_too_large", file=Path("map.nc"), most=1_000_000, got=2_000_000, result=True),
+    InputError("library_missing", file=Path("a.xlsx"), library="openpyxl", extra="field", instead="CSV"),
+    InputError("unreadable_as", file=Path("a.xlsx"), kind="workbook", why="File is not a zip file"),
+    InputError("other_structures", file=Path("a.mat"), kind="QRev", why="no transects"),
+    InputError("binary_record", file=Path("a.vec"), nortek=True, ending=".vec"),
+    InputError("binary_record", file=Path("a.r00"), nortek=False, ending=".r00"),
+    InputError("no_table", file=CSV), InputError("no_sheet", file=Path("a.xlsx"), sheet="May", got=["April", "June"]),
+    InputError("no_number", **AT_ROW, column="u", got="x", why="correct or remove the row"),
+    InputError("no_number", **AT_ROW, column="u", got="u", why=""),
+    InputError("no_name", **AT_ROW, column="case", got=""),
+    InputError("unprintable_name", **AT_ROW, column="case", got="\x1b"),
+    InputError("unknown_name", **AT_ROW, column="experiment", known=["low", "high"], got="mid"),
+    InputError("out_of_bounds", **AT_ROW, column="u_std", got=0.0, above=0.0),
+    InputError("out_of_bounds", **AT_ROW, column="u_se", got=-0.1, least=0.0),
+    InputError("out_of_bounds", **AT_ROW, column="u", got=1e12, most=1e9),
+    InputError("odd_error", **AT_ROW, column="u_se", got=1e-12, least=1e-9, most=1e9),
+    InputError("other_x", **AT_ROW, column="x", case="low/S1", first=2.0, got=2.5),
+    InputError("other_width", **AT_ROW, fields=4, got=5, headed=True, commas=True),
+    InputError("other_width", **AT_ROW, fields=4, got=5, headed=False, commas=False),
+    InputError("places_in_degrees", where="adv.csv, column 'lon'", role="x"),
+    InputError("wide_table", where="adv.csv:", experiments=("low", "high"), got=["u low", "u high"]),
+    InputError("unknown_experiment", where="adv.csv, row 3", name="mid", elsewhere=False, option=False, **OF_SITE),
+    InputError("unknown_experiment", where="adv.csv, row 3", name="", elsewhere=False, option=False, **OF_SITE),
+    InputError("unknown_experiment", where="adv.csv", name="flood", elsewhere=True, option=True, **OF_SITE),
+    InputError("no_measurements", where="brook", files=["velocities.csv", "levels.csv"]),
+    InputError(
+        "no_column_of_measurements", where="brook", tables=[{"name": "adv.csv", "taken": "x from x; 3 rows"}],
+        usual=[("velocities", ("u", "velocity")), ("levels", ("level", "stage"))],
+    ),
+    InputError("no_polygon", file=Path("plants.geojson"), feature=2, got="Point"),
+    InputError("no_polygon", file=Path("plants.geojson"), feature=2, got=""),
+    InputError("no_bed_columns", file=CSV, got=("x", "y", "depth"), deep=True),
+    InputError("no_bed_columns", file=CSV, got=("Chainage", "Station", "Elevation"), deep=False),
+    InputError("not_computed", file=Path("a.hdf"), areas=True),
+    InputError("not_computed", file=Path("a.hdf"), areas=False),
+    InputError("not_on_mesh", file=Path("map.nc"), missing=["u", "v"], layers=True),
+    InputError("no_roughness", file=Path("map.nc"), lawless=True),
+    InputError("flow_off_grid", file=Path("map.nc"), most=15.0, got=40.2, x=3.2, straight=True),
+    InputError("unlike_flow", file=Path("a.yaml"), quantity="level", limit=0.05, got=0.1, beyond=0.0, spread=0.2),
+    InputError("unlike_flow", file=Path("a.yaml"), quantity="area", limit=0.05, got=0.1, beyond=0.08, spread=0.0),
+    InputError("unlike_flow", file=Path("a.yaml"), quantity="velocity", limit=0.15, got=0.2, beyond=0.0, spread=0.0),
 ]  # fmt: skip
 RENDERED: dict[str, Callable[[], str]] = {
     "imports": lambda: wrapped(IMPORTED),
+    "refusals": lambda: wrapped(map(str, REFUSED)),
     "files": lambda: wrapped((*YAML, *EXTENSIONS, *BUDGET)),
     "verdicts": lambda: "\n\n".join(
         "\n".join([f"## {name}", *verdict_lines(found, COMMAND, 13), "", wrapped([found.verdict])])
@@ -450,6 +516,15 @@ def test_a_verdict_is_short_and_a_command_is_whole() -> None:
 
 def test_each_conclusion_is_among_the_examples() -> None:
     assert {found.verdict.conclusion for found in VERDICTS.values()} == set(get_args(Conclusion))
+
+
+def test_each_refusal_has_a_template_and_an_example() -> None:
+    package = HERE.parents[1] / "vegglue"
+    template = (package / "wording" / "templates" / "refusals.j2").read_text(encoding="utf-8")
+    worded = set(re.findall(r"macro (\w+)\(v\)", template))
+    code = "".join(path.read_text(encoding="utf-8") for path in package.rglob("*.py"))
+    raised = set(re.findall(r'InputError\(\s*"(\w+)",|refuse_rows\(.*?"(\w+)",', code))
+    assert {one or other for one, other in raised} == worded == {one.kind for one in REFUSED}
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from vegglue.case.site_schema import (
 from vegglue.case.size_limits import LARGEST_CONFIG, LARGEST_DATA, LONGEST_CHAIN
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
+from vegglue.wording.sentences import phrase
 
 # Keys whose value is a path, relative to the file it is written in.
 PATHS = ("file", "raster", "points", "effect_file")
@@ -134,12 +135,9 @@ def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
 
 def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
     """Keys and values of a YAML file; above: the files whose `extends` led to it. Errors: InputError."""
-    advice = "check the path"
-    if above:
-        advice = f"it is named by `extends` in {shown_path(above[-1])}, check the path"
-    elif any(os.path.isfile(path / name) for name in SITE_FILES):  # which no name is too long for
-        advice = f"`vegglue import {shown_path(path)}` makes a config of that folder"
-    text = read_text(path, LARGEST_CONFIG, advice)
+    is_site = any(os.path.isfile(path / name) for name in SITE_FILES)  # which no name is too long for
+    advice = "extends" if above else "import" if is_site else "path"
+    text = read_text(path, LARGEST_CONFIG, advice, above[-1] if above else None)
     try:
         tree = safe_yaml(text)
     except yaml.YAMLError as error:
@@ -400,11 +398,9 @@ def _agree_on_values(case: Case) -> None:
             raise CaseError(("finished_result", "files"), f"expected the flow of {name}, got none: add its file")
         for name, path in result.files.items():
             if name not in known:
-                complaint = f"expected an experiment among {', '.join(sorted(known))}: correct its name"
-                raise CaseError(("finished_result", "files", name), complaint)
+                raise CaseError(("finished_result", "files", name), phrase("unknown_experiment_here", sorted(known)))
             if not os.path.isfile(path):
-                complaint = f"expected an existing file, got {shown_path(path)}: put it there or correct the path"
-                raise CaseError(("finished_result", "files", name), complaint)
+                raise CaseError(("finished_result", "files", name), phrase("no_file_here", path))
         for name in result.parameters:
             _declared(("finished_result", "parameters", name), name, case.parameters, "parameter")
     if case.engine is None:

@@ -9,6 +9,7 @@ from typing import Any, get_args, get_origin
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import Part
 from vegglue.case.text_files import case_name
+from vegglue.wording.sentences import phrase
 
 MOST_NAMED = 30  # words that one sentence lists; no part of a case has more keys
 OF_A_PAIR = 2  # numbers in a range, or in a place
@@ -39,24 +40,24 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     advice = ""
     if isinstance(got, str) and "number" in expected:
         if re.fullmatch(r"[-+]?\d+,\d+.*", got):
-            advice = "; write decimals with a point"
+            advice = "comma"
         elif re.fullmatch(r"[-+]?[\d.]+\s*[A-Za-z%].*", got):
-            advice = "; write the number alone: a case is in SI units"
+            advice = "unit"
         elif re.fullmatch(r"[-+\d.eE]+", got):
-            advice = "; write numbers without quotes"
+            advice = "quoted"
     if kind == "string_pattern_mismatch":  # of the name of a case, which is that of a folder
         return CaseError(place, f"expected {_meaning(place)[2:-1]} alone, got {_shown(got)}; write {case_name(got)}")
     if kind == "string_type":
-        expected, advice = "a text", "; write it in quotes" if isinstance(got, int | float) else ""
-    return CaseError(place, f"{_meaning(place)} expected {expected}, got {_shown(got)}{advice}".lstrip())
+        expected, advice = "a text", "unquoted" if isinstance(got, int | float) else ""
+    return CaseError(place, phrase("unexpected_value", _meaning(place), expected, _shown(got), advice))
 
 
 def expected_in_words(problem: Mapping[str, Any]) -> str:
     """What one of pydantic's problems expected, without its opening words and the names of our types."""
     if problem["type"] == "too_long" and problem["ctx"]["max_length"] == OF_A_PAIR:
-        return "two numbers (with a decimal point, as a comma parts them)"
+        return phrase("expected_pair")
     if problem["type"] == "tuple_type":
-        return "a list of values in square brackets"
+        return phrase("expected_list")
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     return re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
 
@@ -85,7 +86,7 @@ def nearest(word: str, known: Iterable[str]) -> str:
 def nearest_effect(word: str, known: Iterable[str]) -> str:
     """The end of a sentence about an unknown effect: the known one most like it, else where they are listed."""
     near = _most_like(word, list(known))
-    return f"did you mean `{near}`?" if near else "`vegglue effects` lists them."
+    return f"did you mean `{near}`?" if near else phrase("effects_listed")
 
 
 def _most_like(word: str, known: list[str]) -> str:

@@ -28,6 +28,7 @@ from vegglue.case.site_schema import (
 )
 from vegglue.case.size_limits import MOST_MEMBERS
 from vegglue.wording.numbers import in_short, so_many
+from vegglue.wording.sentences import phrase
 
 # What a word of the command may name in braces beside the files: the Python that runs vegglue.
 PYTHON = "python"
@@ -107,20 +108,20 @@ def unusable(distribution: str, numbers: Mapping[str, float | None]) -> str | No
     """
     given = {name: value for name, value in numbers.items() if value is not None}
     if any(value and not SMALLEST_IN_PRIOR <= abs(value) <= LARGEST_IN_PRIOR for value in given.values()):
-        return f"numbers between {SMALLEST_IN_PRIOR:g} and {LARGEST_IN_PRIOR:g}"
+        return phrase("usable_prior", "size", (SMALLEST_IN_PRIOR, LARGEST_IN_PRIOR))
     if distribution == "lognormal":
         spread = given["log_sd"]
-        return None if THINNEST < spread < WIDEST_LOG else f"a `log_sd` between {THINNEST:g} and {WIDEST_LOG:g}"
+        return None if THINNEST < spread < WIDEST_LOG else phrase("usable_prior", "log_sd", (THINNEST, WIDEST_LOG))
     if distribution != "normal":
         width, size = given["high"] - given["low"], max(abs(given["low"]), abs(given["high"]))
-        return None if width > THINNEST * size else "a range wider than the last digits; write a number instead"
+        return None if width > THINNEST * size else phrase("usable_prior", "range")
     mean, sd, low, high = given["mean"], given["sd"], given.get("low", -math.inf), given.get("high", math.inf)
     if sd < THINNEST * abs(mean):
-        return "an `sd` wider than the last digits of the mean; write a number instead"
+        return phrase("usable_prior", "sd")
     if low > mean + FARTHEST_BOUND * sd or high < mean - FARTHEST_BOUND * sd:
-        return f"bounds within {FARTHEST_BOUND:g} `sd` of the mean"
+        return phrase("usable_prior", "bounds", (FARTHEST_BOUND,))
     if high - low < THINNEST * sd:
-        return "an `sd` nearer to the width between the bounds; write a uniform prior instead"
+        return phrase("usable_prior", "uniform")
     return None
 
 

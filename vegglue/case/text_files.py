@@ -19,10 +19,11 @@ LONGEST_IN_FILES = 50  # letters of a name in that of a file, which has room for
 UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
 
 
-def read_text(path: Path, most: int, otherwise: str = "check the path") -> str:
+def read_text(path: Path, most: int, advice: str = "path", by: Path | None = None) -> str:
     """The text of a file in UTF-8, with or without its mark, of at most so many bytes; no more is ever read.
 
-    Errors: InputError when it is no file, cannot be read, is larger, or is not in UTF-8.
+    advice, by: how to get such a file, see the macro `unreadable`. Errors: InputError when it is no file, cannot be
+    read, is larger, or is not in UTF-8.
     """
     try:
         content = None
@@ -30,11 +31,11 @@ def read_text(path: Path, most: int, otherwise: str = "check the path") -> str:
             with path.open("rb") as file:
                 content = file.read(most + 1)
     except OSError as error:
-        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; {otherwise}.") from None
+        raise InputError("unreadable", file=path, why=error.strerror, advice=advice, by=by) from None
     except ValueError:  # a NUL in the name
-        raise InputError(f"{str(path)!a} cannot be read: no file has such a name; {otherwise}.") from None
+        raise InputError("unreadable", file=path, why="no file has such a name", advice=advice, by=by) from None
     if content is None:
-        raise InputError(f"{shown_path(path)} cannot be read: it is not a file; {otherwise}.")
+        raise InputError("unreadable", file=path, why="it is not a file", advice=advice, by=by)
     if len(content) > most:
         raise InputError(f"{shown_path(path)}: expected at most {most:,} bytes, got more: make it smaller.")
     try:

@@ -30,6 +30,7 @@ from vegglue.cli.terminal import (
 )  # fmt: skip
 from vegglue.errors import InputError, shown_path
 from vegglue.wording.commands import DEMO, HELP
+from vegglue.wording.sentences import phrase
 
 
 def check_command(
@@ -81,7 +82,7 @@ def simulate_command(
 
         print_object(object_of(case, runs, ensemble) | {"up_to_date": current})
     elif current:
-        print(f"{runs / case.name / 'ensemble.h5'} is up to date.")
+        print(phrase("up_to_date", runs / case.name / "ensemble.h5"))
     else:
         print_result(case, runs, ensemble, as_object)
     refuse_useless(case, ensemble)

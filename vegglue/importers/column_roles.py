@@ -27,7 +27,7 @@ from vegglue.importers.file_options import FileOptions
 from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.table_parser import MOST_ROWS_NAMED, ParsedTable, is_number
 from vegglue.measurements.plausibility import MARKS_OR_VALUES, is_mark_anywhere, is_of_nines
-from vegglue.wording.numbers import listed, so_many
+from vegglue.wording.numbers import listed
 
 # Words of a heading that mean across; V alone means none, and may be the velocity.
 WORDS_FOR_ACROSS = {"vy", "uy", "y", "transverse", "lateral", "cross"}
@@ -55,7 +55,6 @@ VALUES_OF = {
 }
 # What a place has one of.
 MEASURED_ROLES = {"x", "y", "u", "v", "east_velocity", "north_velocity", "speed", "direction", "level", "discharge"}
-NO_DEGREES = "degrees; convert longitudes and latitudes to metres on a map, such as UTM or the national grid."
 NAMES_OF_EAST = {"e", "east", "easting", "rechtswert", "utm x", "utm e"}
 # Headings of a flag, and what in it marks a row as no measurement; by numbers, those of IOC and QARTOD: 3 suspect, 4
 # failed, 9 missing. Of 0 and 1 the heading decides which is good.
@@ -185,8 +184,8 @@ def without_flagged(path: Path, table: ParsedTable, columns: Mapping[str, int]) 
             yes = {"yes", "y", "true", "1", "ja", "oui", "si"} if set(words.split()) & MEANS_BAD else set()
             flagged = {i for i, text in enumerate(texts) if BAD.match(text) or text.lower() in no | yes}
         if flagged and len(flagged) < len(texts):
-            rows = listed([str(table.row_numbers[i]) for i in sorted(flagged)[:MOST_ROWS_NAMED]])
-            return table.without(flagged, f"{so_many(len(flagged), 'row')} flagged in {heading} left out (row {rows})")
+            rows = (str(table.row_numbers[i]) for i in sorted(flagged)[:MOST_ROWS_NAMED])
+            return table.without(flagged, ImportNote(Noted.FLAGGED, len(flagged), (heading, *rows)))
     return table
 
 
@@ -200,7 +199,7 @@ def unit_of_column(path: Path, table: ParsedTable, columns: Mapping[str, int], r
         return unit_named(options.units[role], quantity) or options.units[role]
     heading = table.headings[place]
     if role in ("x", "y") and is_in_degrees(heading):
-        raise InputError(f"{shown_path(path)}: expected lengths in column {heading!r} for {role}, got {NO_DEGREES}")
+        raise InputError("places_in_degrees", where=f"{shown_path(path)}, column {heading!r}", role=role)
     stated = _stated_unit(table, place, quantity)
     if not stated:
         values = next((one for one in VALUES_OF.get(role, ()) if one in columns), None)

@@ -30,8 +30,10 @@ from vegglue.importers.config_parts import (
     validated,
     wall_prior,
 )
+from vegglue.importers.import_notes import ConfluenceAssumptions
 from vegglue.importers.library_files import load_matlab
 from vegglue.measurements.csv_table import read_table
+from vegglue.wording.remedies import ANOTHER_PLACE
 
 EXPERIMENT = "measured"
 # Length of a cell, and about its width [m].
@@ -49,19 +51,12 @@ WALL = 0.011
 BLOCKS, LEVEL_ERROR = 3, 0.001
 # Spread of the priors of what integration of the sections gives [-], and of the level at the outlet [m].
 UPSTREAM, SIDE, OUTLET = 0.05, 0.5, 0.002
-MAPS_OF_THE_SET, OF_THE_SET = "topo_water_level_maps.mat", "a file of the set"
+MAPS_OF_THE_SET, OF_THE_SET = "topo_water_level_maps.mat", "confluence"
 # Folders within folders that are looked through: its archive unpacks to two. Not all: it may be a whole disk.
 DEEPEST_FOLDER = 2
 # Of the map of the bed every fourth value along x [-]: it is stored each centimetre, and was measured each 5 cm.
 THINNED = 4
-ANOTHER_PLACE = "give another place by --to"
-# What `import` prints of the set.
-NOT_STATED = (
-    "The set states no discharges, no errors, no walls and no width of the side channel, and so is assumed: discharges "
-    f"by integration of sections, {100 * RULE:.0f} % and {BESIDES:g} m/s for velocities, {1000 * LEVEL_ERROR:.0f} mm "
-    f"for levels, n = {WALL:g} s m^(-1/3) for walls, {CONFLUENCE_WIDTH:g} m for the side channel.",
-    "Every second section is held out, to judge a model by. A second config, `-flat`, has a plane for the bed.",
-)
+NOT_STATED = ConfluenceAssumptions(RULE, BESIDES, LEVEL_ERROR, WALL, CONFLUENCE_WIDTH)
 
 
 def holds_confluence(folder: Path) -> bool:

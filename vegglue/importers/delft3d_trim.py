@@ -11,6 +11,7 @@ import numpy as np
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.model_result import (
     ModelResult,
     NetcdfVariable,
@@ -119,7 +120,7 @@ def _before(field: Array, axis: int) -> Array:
     return moved
 
 
-def _turned_as_the_grid(x: Array, y: Array, active: Mask, angle: Array) -> tuple[tuple[str, ...], Array]:
+def _turned_as_the_grid(x: Array, y: Array, active: Mask, angle: Array) -> tuple[tuple[ImportNote, ...], Array]:
     """The angle with the sign with which it runs along the line from one centre to the next, and a note."""
     pairs = active[1:] & active[:-1]
     dx, dy = np.diff(x, axis=0)[pairs], np.diff(y, axis=0)[pairs]
@@ -131,5 +132,5 @@ def _turned_as_the_grid(x: Array, y: Array, active: Mask, angle: Array) -> tuple
         return float(np.mean((np.cos(own) * dx + sign * np.sin(own) * dy) / np.maximum(np.hypot(dx, dy), 1e-12)))
 
     if along(-1.0) > along(1.0) + 1e-6:
-        return ("ALFAS counts clockwise, as the grid lines show",), -angle
+        return (ImportNote(Noted.CLOCKWISE),), -angle
     return (), angle

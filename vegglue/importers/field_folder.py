@@ -303,7 +303,7 @@ def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -
             found.append(one)
             continue
         if not (folder / one.file).is_file():
-            raise InputError(f"{shown_path(folder)}: `patches` names {one.file}, which is not there; correct it.")
+            raise InputError("not_there", folder=folder, key="patches", name=one.file)
         polygons = planted_polygons(folder / one.file, frame, one.columns)
         imported.append(record(folder / one.file, None, summary_of_plants(polygons)))
         for polygon in polygons:

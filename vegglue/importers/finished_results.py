@@ -51,15 +51,12 @@ def read_result(path: Path) -> ModelResult:
     try:
         state = path.stat()
     except OSError as error:
-        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
+        raise InputError("unreadable", file=path, why=error.strerror) from None
     if state.st_size > LARGEST_RESULT:
-        raise InputError(
-            f"{shown_path(path)}: expected at most {LARGEST_RESULT:,} bytes, got {state.st_size:,}; "
-            "keep the last time alone."
-        )
+        raise InputError("file_too_large", file=path, most=LARGEST_RESULT, got=state.st_size, result=True)
     why = why_unreadable(path.absolute(), min(state.st_size, 10**9), state.st_mtime_ns, by=IN_ITS_PROCESS)
     if why is not None:
-        raise InputError(f"{shown_path(path)} cannot be read as a result of a model: {why}; write it anew.")
+        raise InputError("unreadable_as", file=path, kind="result", why=why)
     return _read(path)
 
 
@@ -73,7 +70,7 @@ def _read(path: Path) -> ModelResult:
             f"{shown_path(path)}: expected a result of HEC-RAS (.hdf), TELEMAC (.slf), D-Flow FM, Delft3D-4 or "
             "UGRID (.nc), got another file."
         )
-    with read_by_library(path, "a result of a model", limit=LARGEST_RESULT):
+    with read_by_library(path, "result", limit=LARGEST_RESULT):
         with netcdf_variables(path) as variables:
             names = set(variables)
             mesh = any(one.text("cf_role") == "mesh_topology" for one in variables.values())

@@ -29,7 +29,6 @@ from vegglue.importers.library_files import read_by_library, readable_text, read
 from vegglue.importers.measured_rows import MeasuredRows, on_the_tape, rows_of_table
 from vegglue.importers.table_parser import Line, ParsedTable, is_number
 from vegglue.measurements.plausibility import is_mark_anywhere
-from vegglue.wording.sentences import sentence
 
 ZIP_BEGINS = b"PK\x03\x04"
 DATA_FILE = "datafile.json"
@@ -76,18 +75,14 @@ def read_flowtracker2(path: Path, options: FileOptions) -> MeasuredRows:
     ----------
     FlowTracker2 User's Manual (SonTek, January 2019), section 12.1.
     """
-    with (
-        read_by_library(path, "a FlowTracker2 file, a ZIP with DataFile.json and its Stations"),
-        ZipFile(path) as packed,
-    ):
+    with read_by_library(path, "FlowTracker2"), ZipFile(path) as packed:
         (entry,) = [one for one in packed.infolist() if one.filename.lower() == DATA_FILE]
         refuse_larger(path, entry.file_size)
         tree = json.loads(packed.read(entry).decode("utf-8-sig"))
         stations = next(value for key, value in tree.items() if key.partition(" (")[0] == "Stations")
     if not isinstance(stations, list) or not stations:
         raise InputError(f"{shown_path(path)}: expected a list of Stations in DataFile.json, got none; check the file.")
-    advice = "export it as CSV from the maker's program"
-    with reading_structures(path, "stations with Location, Depth and Calculations", advice):
+    with reading_structures(path, "FlowTracker2"):
         rows = [_station(path, station) for station in stations]
     tape, depth, u, own, measured = np.array(rows, dtype=np.float64).reshape(-1, 5).T
     columns = {"tape": "Location", "depth": "Depth", "u": "MeanVelocityInVertical.X", "u_se": "VelocityStandardError.X"}
@@ -236,10 +231,9 @@ def _table(headings: tuple[str, ...], units: tuple[str, ...], rows: list[Line], 
         if fields and (is_number(fields[0]) or 2 * sum(map(is_number, fields)) >= len(headings))
     ]
     kept = [(number, fields) for number, fields in there if len(fields) == len(headings)]
-    other = sentence(ImportNote(Noted.OTHER_WIDTH, len(there) - len(kept)))
-    form += f", {other}" if len(there) > len(kept) else ""
+    other = [ImportNote(Noted.OTHER_WIDTH, len(there) - len(kept))] if len(there) > len(kept) else []
     texts, numbers = tuple(fields for _, fields in kept), tuple(number for number, _ in kept)
-    return ParsedTable(headings, units, texts, numbers, decimal_comma=False, form=form)
+    return ParsedTable(headings, units, texts, numbers, decimal_comma=False, form=(form, *other))
 
 
 def _wet_verticals(taken: MeasuredRows, measured: Mask) -> MeasuredRows:

@@ -13,7 +13,8 @@ import h5py
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.model_result import (
     DRY_DEPTH,
     FOOT,
@@ -56,18 +57,15 @@ def read_hec_ras(path: Path) -> ModelResult:
         held = geometry or ()
         names = [name for name in results or () if f"{name}/Cells Center Coordinate" in held]
         if not names:
-            what = "results" if geometry is not None and results is None else "2D flow areas with their geometry"
-            raise InputError(
-                f"{shown_path(path)}: expected a computed plan of HEC-RAS 2D, got no {what}; compute it anew."
-            )
+            raise InputError("not_computed", file=path, areas=geometry is not None and results is None)
         system, projection = text_of(file.attrs.get("Units System")), text_of(file.attrs.get("Projection"))
         customary = system != "" and "SI" not in system.upper()
         horizontal = 1.0 if not customary else US_SURVEY_FOOT if "FOOT_US" in projection.upper() else FOOT
         parts = [_area(geometry[name], results[name], FOOT if customary else 1.0, horizontal) for name in names]
         stamps = file.get(f"{SERIES}/Time Date Stamp")
         time = text_of(stamps[-1]) if stamps is not None and len(stamps) else ""
-        notes = [f"{sum(part['ghosts'] for part in parts)} cells without a bed left out, as ghost cells are"]
-        notes += ["feet turned into metres"] if customary else []
+        notes = [ImportNote(Noted.WITHOUT_BED, sum(part["ghosts"] for part in parts))]
+        notes += [ImportNote(Noted.FEET)] if customary else []
         joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key != "ghosts"}
         rough = joined.pop("roughness")
         return model_result(

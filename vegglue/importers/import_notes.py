@@ -1,37 +1,74 @@
 """What was taken from a file, left out or assumed, as values; their words stand in `wording/templates/imports.j2`."""
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum, auto
 
 
-class Noted(Enum):
+class Noted(StrEnum):
     """What a note is about; the comment gives its `number` and `names`."""
 
-    NO_UNIT = "no unit stated"  # roles
-    HEIGHT_FROM_DEPTHS = "height above the bed from both depths"
-    EDGES = "edges without a depth"  # how many
-    ON_TAPE = "places along a tape"  # its length [m]
-    SAME_X = "x of all rows"  # [m]
-    COMPONENTS = "components from speed and direction"
-    SPEED_TWICE = "speed beside its components"
-    INTO_CHANNEL = "places turned from the map"  # number: 1 along a centreline
-    VELOCITIES_TURNED = "velocities turned with their places"
-    OF_PROBE = "x and y of the probe"
-    KEPT_NINES = "a number of nines kept"  # the number as written, the heading
-    MARKS = "marks for no value"  # how many; the heading
-    EMPTY = "empty cells"  # how many; the heading
-    LACKING = "rows without a value"  # how many; roles
-    UNNAMED_SECTIONS = "rows without a section"  # how many
-    ON_AXIS = "no column of y"
-    BESIDE_POINTS = "values beside points in the vertical"  # the kind in words
-    NEAR_AVERAGE = "heights at which a log law has its average"  # share of the depth [-]
-    HEIGHTS_UNUSED = "few places with several heights"  # the role of the heights
-    SHARES = "shares of the discharge"  # how many
-    LEVEL_ONCE = "a level that all rows of a section repeat"  # sections
-    OTHER_WIDTH = "rows of another width"  # how many
-    UNMEASURED = "rows without a measurement"  # how many
-    ERRORS_UNKNOWN = "errors not stated"  # how many
-    LEVELS_FROM_DEPTHS = "levels from depths"  # whose bed
+    NO_UNIT = auto()  # roles
+    HEIGHT_FROM_DEPTHS = auto()
+    EDGES = auto()  # how many
+    ON_TAPE = auto()  # its length [m]
+    SAME_X = auto()  # [m]
+    COMPONENTS = auto()
+    SPEED_TWICE = auto()
+    INTO_CHANNEL = auto()  # number: 1 along a centreline
+    VELOCITIES_TURNED = auto()
+    OF_PROBE = auto()
+    KEPT_NINES = auto()  # the number as written, the heading
+    MARKS = auto()  # how many; the heading
+    EMPTY = auto()  # how many; the heading
+    LACKING = auto()  # how many; roles
+    UNNAMED_SECTIONS = auto()  # how many
+    ON_AXIS = auto()
+    BESIDE_POINTS = auto()  # the kind in words
+    NEAR_AVERAGE = auto()  # share of the depth [-]
+    HEIGHTS_UNUSED = auto()  # the role of the heights
+    SHARES = auto()  # how many
+    LEVEL_ONCE = auto()  # sections
+    OTHER_WIDTH = auto()  # how many
+    UNMEASURED = auto()  # how many
+    ERRORS_UNKNOWN = auto()  # how many
+    LEVELS_FROM_DEPTHS = auto()  # whose bed
+    MOVED = auto()  # at most [m]
+    # Of a table.
+    DECIMAL_COMMA = auto()
+    COMMENTS = auto()  # how many
+    TYPES = auto()
+    UNITS = auto()
+    ROW_NAMES = auto()
+    UNHEADED = auto()
+    LONE_FIELDS = auto()  # how many lines
+    SUMMARIES = auto()  # how many rows; the first of them
+    FLAGGED = auto()  # how many rows; the column, and the first of them
+    COPIES = auto()  # how many rows
+    ONE_SHEET = auto()  # that sheet, and the others
+    HIDDEN = auto()  # how many rows; the first of them
+    # Of an instrument.
+    ADCP_AT = auto()  # its draft [m]; its model
+    DECLINATION = auto()  # [degrees]
+    DAMAGED = auto()  # how many ensembles
+    SURFACE_LAYER = auto()
+    ENSEMBLES = auto()  # how many
+    ENSEMBLES_LACKING = auto()  # how many; what they lack
+    TRANSECTS = auto()  # how many
+    QREV_SUMMARY = auto()  # standard error [m3/s]
+    # Of another model's result.
+    PLACES_LOST = auto()  # how many
+    PLACES_DRY = auto()  # how many
+    GHOSTS = auto()  # how many
+    WITHOUT_BED = auto()  # how many cells
+    FEET = auto()
+    BELOW_BED = auto()  # how many depths
+    OFFSETS = auto()  # both [m]
+    CUT_FRAME = auto()
+    CLOCKWISE = auto()
+    NOTHING = auto()
+    # Of a map.
+    BEYOND_BED = auto()  # share of the grid [-]
+    LAST_FIRST = auto()
 
 
 @dataclass(frozen=True)
@@ -43,8 +80,70 @@ class ImportNote:
     names: tuple[str, ...] = ()
 
 
-# A note, or the few words of a reader on the form of its file.
+# A note, or the name of the format of the file.
 FileNote = ImportNote | str
+
+
+@dataclass(frozen=True)
+class RepeatsAveraged:
+    """Repeats of one place. at: x, y of a single one [m], copied: whether it has the same value; together: neighbours
+    in a row that count as one; needed: repeats for a standard error, 0 if there are enough; apart: by how many times
+    their stated errors they differ at `worst` (x, y) [m], 0 if by no more than chance.
+    """
+
+    repeats: int
+    at: tuple[float, float] | None = None
+    copied: bool = False
+    together: float = 1.0
+    needed: int = 0
+    apart: float = 0.0
+    worst: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class BanksOfBed:
+    """Cells steeper than half the stated slope are banks; floor: the mean width of the others, None without banks, and
+    the stated one [m].
+    """
+
+    slope: float
+    floor: float | None
+    stated: float
+
+
+@dataclass(frozen=True)
+class PatchesRead:
+    """Patches of a file. stems: columns of their density; lengths, densities: what has no unit; unread: columns;
+    alike: of these what may be the density.
+    """
+
+    patches: int
+    stems: tuple[str, ...]
+    lengths: tuple[str, ...]
+    densities: tuple[str, ...]
+    unread: tuple[str, ...]
+    alike: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class UnitsAssumed:
+    """Columns of polygons without a unit: lengths taken as m, densities as 1/m2."""
+
+    lengths: tuple[str, ...]
+    densities: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ConfluenceAssumptions:
+    """What the set of the confluence does not state: errors of velocities [-, m/s] and levels [m], Manning's n of the
+    walls, and the width of the side channel [m].
+    """
+
+    share: float
+    velocity: float
+    level: float
+    wall: float
+    width: float
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def reader_of(path: Path) -> FileReader:
         with path.open("rb") as file:
             begin = file.read(LONGEST_PREAMBLE)
     except OSError as error:
-        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
+        raise InputError("unreadable", file=path, why=error.strerror) from None
     known = next((reader for mark, reader in BY_BEGINNING.items() if begin.startswith(mark)), None)
     if known is not None:
         return known
@@ -77,11 +77,7 @@ def reader_of(path: Path) -> FileReader:
         return read_pd0
     nortek = begin.startswith(NORTEK_BEGINS)
     if nortek or path.suffix.lower() in BINARY_ENDINGS:
-        got = "a binary record of a Nortek instrument" if nortek else f"a record {path.suffix}"
-        raise InputError(
-            f"{shown_path(path)}: expected an export as text, got {got}, which is not read; convert it to ASCII in the "
-            "maker's program (Nortek: .dat with .hdr, MIDAS: .mat; WinRiver: classic ASCII output)."
-        )
+        raise InputError("binary_record", file=path, nortek=nortek, ending=path.suffix)
     text = readable_text(path)
     if is_winriver(text):
         return read_winriver

@@ -24,13 +24,13 @@ from scipy.io.matlab import mat_struct
 
 from vegglue.arrays import Array
 from vegglue.case.size_limits import LARGEST_DATA
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError
 from vegglue.sandboxed_reader import why_unreadable
 
 COMPRESSED, AT_ONCE_UNPACKED = 15, 1 << 20  # type of an element of a MATLAB file; [bytes]
 LONGEST_COMPLAINT = 200  # letters of a library's complaint; some quote the file
 MATLAB_READER = f"{__name__}:unpack_matlab"  # as the process of its own knows it
-MATLAB_5 = "a MATLAB file of version 5"
+MATLAB_5 = "MATLAB 5"
 
 
 def readable_text(path: Path) -> str:
@@ -39,7 +39,7 @@ def readable_text(path: Path) -> str:
         size = path.stat().st_size
         raw = path.read_bytes() if size <= LARGEST_DATA else b""
     except OSError as error:
-        raise InputError(f"{shown_path(path)} cannot be read: {error.strerror}; check the path.") from None
+        raise InputError("unreadable", file=path, why=error.strerror) from None
     refuse_larger(path, size)
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16", errors="replace")
@@ -52,16 +52,14 @@ def readable_text(path: Path) -> str:
 def refuse_larger(path: Path, size: int) -> None:
     """InputError if what a file holds, packed or unpacked, is more than a file of data may be [bytes]."""
     if size > LARGEST_DATA:
-        raise InputError(f"{shown_path(path)}: expected at most {LARGEST_DATA:,} bytes, got {size:,}; make it smaller.")
+        raise InputError("file_too_large", file=path, most=LARGEST_DATA, got=size, result=False)
 
 
 @contextmanager
-def read_by_library(
-    path: Path, kind: str, logger: str = "", advice: str = "save it anew", limit: int = LARGEST_DATA
-) -> Iterator[None]:
+def read_by_library(path: Path, kind: str, logger: str = "", limit: int = LARGEST_DATA) -> Iterator[None]:
     """Within, a library reads a file: its warnings and its log are not shown, all its errors are one InputError.
 
-    kind: what the file should be; advice: how the message ends; limit: of its size [bytes].
+    kind: what the file should be; limit: of its size [bytes].
     """
     log = logging.getLogger(logger) if logger else None
     before = None if log is None else log.disabled
@@ -82,25 +80,22 @@ def read_by_library(
     except Exception as error:  # on damaged files libraries raise anything
         lines = str(error).splitlines() or [type(error).__name__]
         complaint = lines[0][:LONGEST_COMPLAINT]
-        raise InputError(f"{shown_path(path)} cannot be read as {kind}: {complaint}; {advice}.") from None
+        raise InputError("unreadable_as", file=path, kind=kind, why=complaint) from None
     finally:
         if log is not None and before is not None:
             log.disabled = before
 
 
 @contextmanager
-def importing(library: str, path: Path, what: str, extra: str, instead: str) -> Iterator[None]:
+def importing(library: str, path: Path, extra: str, instead: str) -> Iterator[None]:
     """Within, a library of an extra is imported. InputError, which names the extra, if it is not installed.
 
-    what: files it reads; instead: what else may be done.
+    instead: as what else the file may be saved.
     """
     try:
         yield
     except ImportError:
-        raise InputError(
-            f"{shown_path(path)}: {what} are read by {library}, which is not installed; run "
-            f"`pip install 'vegglue[{extra}]'`, or {instead}."
-        ) from None
+        raise InputError("library_missing", file=path, library=library, extra=extra, instead=instead) from None
 
 
 def load_matlab(path: Path, kind: str = MATLAB_5, names: Sequence[str] | None = None) -> dict[str, Any]:
@@ -193,14 +188,14 @@ def unpack_matlab(path: str) -> None:
 
 
 @contextmanager
-def reading_structures(path: Path, kind: str, advice: str) -> Iterator[None]:
-    """Within, structures of a file are read: whatever they lack is one InputError. kind: what was expected."""
+def reading_structures(path: Path, kind: str) -> Iterator[None]:
+    """Within, structures of a file are read: whatever they lack is one InputError. kind: whose structures."""
     try:
         yield
     except InputError:
         raise
     except (AttributeError, IndexError, ValueError, TypeError, KeyError) as error:
-        raise InputError(f"{shown_path(path)}: expected {kind}, got others ({error}); {advice}.") from None
+        raise InputError("other_structures", file=path, kind=kind, why=str(error)) from None
 
 
 def numbers_of_variable(values: Any) -> Array:
@@ -208,14 +203,14 @@ def numbers_of_variable(values: Any) -> Array:
     return np.atleast_1d(np.asarray(values, dtype=np.float64))
 
 
-def open_raw(path: Path, instead: str, most: int | None = None, named: Path | None = None) -> Any:
+def open_raw(path: Path, program: str, most: int | None = None, named: Path | None = None) -> Any:
     """The dataset that mhkit, which carries on dolfyn, makes of a raw file.
 
-    instead: what else may be exported; most: samples that the file can hold, where the reader's own guess is too small;
-    named: the file that it is a copy of. InputError without mhkit, and for what it cannot read.
+    program: that of the maker, which can export ASCII; most: samples that the file can hold, where the reader's own
+    guess is too small; named: the file that it is a copy of. InputError without mhkit, and for what it cannot read.
     """
     named = named or path
-    with importing("mhkit", named, "raw files of instruments", "instruments", f"export {instead}"):
+    with importing("mhkit", named, "instruments", f"ASCII by {program}"):
         from mhkit import dolfyn
-    with redirect_stdout(io.StringIO()), read_by_library(named, "a raw file of an instrument", "", f"export {instead}"):
+    with redirect_stdout(io.StringIO()), read_by_library(named, program):
         return dolfyn.read(str(path), userdata=False, nens=most)

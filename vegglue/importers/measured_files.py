@@ -99,16 +99,9 @@ def held_out_measurements(
 def _nothing_measured(found: MeasuredFiles, where: str) -> InputError:
     """An error about a folder without measurements: what its tables hold, if there are any."""
     if not found.imported:
-        files = ", ".join(kind.file for kind in KINDS.values())
-        return InputError(f"{where}: expected one of {files}, or other tables, got none; add measurements.")
-    held = " ".join(f"{one['name']}: {one['taken']}." for one in found.imported)
-    headings = "; ".join(
-        f"{kind.words} as {', '.join(ROLES[kind.column].names[:HEADINGS_SHOWN])}" for kind in KINDS.values()
-    )
-    return InputError(
-        f"{where}: expected a column of measurements, got none. {held} Name it, such as `columns: {{u: ...}}` of its "
-        f"file in `files`, or head it as usual: {headings}."
-    )
+        return InputError("no_measurements", where=where, files=[kind.file for kind in KINDS.values()])
+    usual = [(kind.words, ROLES[kind.column].names[:HEADINGS_SHOWN]) for kind in KINDS.values()]
+    return InputError("no_column_of_measurements", where=where, tables=found.imported, usual=usual)
 
 
 def texts_of_tables(target: Path, tables: Sequence[StationTable]) -> dict[Path, str]:
@@ -140,7 +133,7 @@ def _options(folder: Path, site: FieldSite) -> dict[Path, FileOptions]:
     found = {}
     for name, given in site.files.items():
         if not (folder / name).is_file():
-            raise InputError(f"{shown_path(folder)}: `files` names {name}, which is not there; correct it.")
+            raise InputError("not_there", folder=folder, key="files", name=name)
         if not (folder / name).resolve().is_relative_to(folder.resolve()):
             raise InputError(
                 f"{shown_path(folder)}: `files` names {name}, which leads out of the folder; copy the file into it."

@@ -199,7 +199,7 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
     numbers: dict[str, Array] = {}
     units: dict[str, str] = {}
     assumed = taken_as_si(table, columns, options)
-    notes: list[FileNote] = [*([ImportNote(Noted.NO_UNIT, names=tuple(assumed))] if assumed else []), table.form]
+    notes: list[FileNote] = [*([ImportNote(Noted.NO_UNIT, names=tuple(assumed))] if assumed else []), *table.form]
     for role, place in columns.items():
         if ROLES[role].quantity:
             units[role] = unit_of_column(path, table, columns, role, options)

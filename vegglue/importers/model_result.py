@@ -16,6 +16,7 @@ from scipy.io import netcdf_file
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 
 RoughnessKind = Literal["manning", "strickler", "chezy", "nikuradse", "not-stated"]
 # Depth below which a point counts as dry [m]. Chosen: codes keep films of up to some millimetres on dry land, TELEMAC
@@ -67,7 +68,7 @@ class ModelResult:
     roughness_kind: RoughnessKind = "not-stated"
     crs: str = ""
     time: str = ""
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[FileNote, ...] = field(default=())
 
     @property
     def wet(self) -> Mask:
@@ -105,9 +106,9 @@ def model_result(
     wet = ~unknown & ~stated_dry
     lost = placed & wet & ~np.isfinite(level + depth + u + v)
     known = placed & ~lost
-    notes = [f"{int(lost.sum())} places without level, depth or velocity left out"] if lost.any() else []
+    notes = [ImportNote(Noted.PLACES_LOST, int(lost.sum()))] if lost.any() else []
     if unstated := int((placed & unknown).sum()):
-        notes.append(f"{unstated} places without level and depth taken as dry")
+        notes.append(ImportNote(Noted.PLACES_DRY, unstated))
     more["notes"] = (*more.get("notes", ()), *notes)
     roughness = more.pop("roughness", None)
     return ModelResult(

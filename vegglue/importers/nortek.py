@@ -131,7 +131,7 @@ def read_vector(path: Path, options: FileOptions) -> MeasuredRows:
     """
     _refuse_without_position(path, options)
     most = path.stat().st_size // BYTES_OF_A_SAMPLE
-    data = open_raw(path, "ASCII data from Nortek's program, the .dat and the .hdr", most)
+    data = open_raw(path, "Nortek", most)
     axes = str(data.attrs.get("coord_sys"))
     if axes != "inst" or not {"vel", "corr"} <= set(data):
         raise InputError(
@@ -204,7 +204,7 @@ def rows_of_profiler(path: Path, parts: dict[str, Any], options: FileOptions) ->
         values = [numbers_of_variable(getattr(data, f"Profiles_{name}")) for name in names]
         return np.stack([one if one.ndim == 2 else one.reshape(-1, cells) for one in values], axis=2)
 
-    with reading_structures(path, "the structures of a Vectrino Profiler", "export it anew from MIDAS"):
+    with reading_structures(path, "Vectrino Profiler"):
         away, rate = numbers_of_variable(data.Profiles_Range).ravel(), float(config.sampleRate)
         if int(config.coordSystem) != BEAMS:
             velocity = samples("VelX", "VelY", "VelZ1")

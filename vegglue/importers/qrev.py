@@ -16,11 +16,11 @@ import numpy as np
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import si_factor
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.library_files import numbers_of_variable, readable_text, reading_structures
 from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.transects import BoatProfile, stations_of_transect
 from vegglue.measurements.plausibility import is_mark_anywhere
-from vegglue.wording.numbers import so_many
 
 QREV_VARIABLE = "meas_struct"  # of such a file
 STANDARD_ERRORS = 2.0  # in an uncertainty of 95 %, as QRev has it
@@ -30,10 +30,10 @@ ENTITIES = re.compile(r"<!(DOCTYPE|ENTITY)")  # QRev writes none, and some unpac
 
 def stations_of_qrev(path: Path, parts: dict[str, Any], options: FileOptions) -> MeasuredRows:
     """Stations of all transects together that QRev used for the discharge. InputError."""
-    with reading_structures(path, "the transects of a measurement saved by QRev", "save it anew in QRev"):
+    with reading_structures(path, "QRev"):
         used = [one for one in np.atleast_1d(parts[QREV_VARIABLE].transects) if bool(one.checked)]
         profiles = [profile for one in used for profile in _profiles(path, one, str(used[0].startEdge))]
-    return stations_of_transect(path, options, profiles, f"QRev, {so_many(len(used), 'transect')}")
+    return stations_of_transect(path, options, profiles, "QRev", ImportNote(Noted.TRANSECTS, len(used)))
 
 
 def _profiles(path: Path, transect: Any, first_bank: str) -> list[BoatProfile]:
@@ -128,5 +128,5 @@ def read_qrev_summary(path: Path, options: FileOptions) -> MeasuredRows:
     x, y = options.start
     numbers = {"x": x, "y": y, "discharge": discharge, "discharge_se": standard_error}
     columns, units = {"discharge": "ChannelSummary/Discharge/Total"}, {"discharge": unit}
-    note = (f"QRev summary, standard error {standard_error:.2g} m3/s",)
+    note = (ImportNote(Noted.QREV_SUMMARY, standard_error),)
     return MeasuredRows({role: np.array([one]) for role, one in numbers.items()}, {}, columns, units, note)

@@ -5,6 +5,7 @@ others: sums of squares of residuals have no mean with two degrees of freedom. S
 """
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from math import sqrt
 from typing import Any
 
@@ -14,6 +15,7 @@ from scipy.special import fdtrc
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
+from vegglue.importers.import_notes import RepeatsAveraged
 from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.wording.numbers import listed
 
@@ -103,21 +105,19 @@ def autocorrelation_time(series: Iterable[Sequence[float]]) -> float:
     return 1.0 + 2.0 * float(rho[1:until].sum())
 
 
-def note_on_repeats(gathered: Gathered) -> str:
+def note_on_repeats(gathered: Gathered) -> RepeatsAveraged:
     """How many values were averaged, if they are too few for a standard error that is missing, and if they differ by
     more than the errors that are stated.
     """
     unstated = {place: values for place, values in gathered.items() if not _stated(values)}
-    repeats = sum(len(values) - 1 for values in gathered.values())
-    note = f", {repeats} repeats averaged" if repeats > 1 else ""
-    if repeats == 1:
+    note = RepeatsAveraged(sum(len(values) - 1 for values in gathered.values()))
+    if note.repeats == 1:
         place, values = next((place, values) for place, values in gathered.items() if len(values) > 1)
-        copied = " (the same value: take the row out if it was written twice)" if values[0][0] == values[1][0] else ""
-        note = f", 1 repeat averaged at x = {place[2]:g}, y = {place[3]:g} m{copied}"
-    elif repeats and (tau := autocorrelation_time([one for one, _ in values] for values in unstated.values())) > 1.0:
-        note += f", {tau:.2g} in a row as one, as neighbours are alike"
+        note = replace(note, at=(place[2], place[3]), copied=values[0][0] == values[1][0])
+    elif note.repeats:
+        note = replace(note, together=autocorrelation_time([one for one, _ in some] for some in unstated.values()))
     if 0 < sum(len(values) - 1 for values in unstated.values()) < LEAST_OF_FILE:
-        note += f", too few for a standard error: {LEAST_OF_FILE} are needed"
+        note = replace(note, needed=LEAST_OF_FILE)
 
     def times_error(values: Sequence[RepeatedValue]) -> float:
         """Root of sum ((u - mean u) / se)^2 / (n - 1) [-]."""
@@ -127,10 +127,7 @@ def note_on_repeats(gathered: Gathered) -> str:
     several = {place: times_error(some) for place, some in gathered.items() if len(some) > 1 and _stated(some)}
     place = max(several, key=several.__getitem__, default=None)
     if place is not None and several[place] > BEYOND_ERRORS:
-        note += (
-            f", which differ by {several[place]:.2g} times their stated errors at x = {place[2]:g}, y = {place[3]:g} m"
-            ": see whether they are repeats"
-        )
+        note = replace(note, apart=several[place], worst=(place[2], place[3]))
     return note
 
 
@@ -150,7 +147,7 @@ TOGETHER: Mapping[str, Callable[[Array], float]] = {
 
 def without_repeats(
     points: MeasuredRows, keys: Sequence[tuple[object, ...]], errors: Array
-) -> tuple[MeasuredRows, str]:
+) -> tuple[MeasuredRows, RepeatsAveraged]:
     """Each point once, and a note; rows of equal `keys` (rows,) are one. errors (rows,) [m/s].
 
     u is the mean with its error, see `means_of_repeats`; v and w are means, u_std is the root of the mean square, and
@@ -160,7 +157,7 @@ def without_repeats(
     for row, key in enumerate(keys):
         rows.setdefault(key, []).append(row)
     if len(rows) == points.size:
-        return points, ""
+        return points, RepeatsAveraged(0)
     u = points.numbers["u"]
     gathered = {key: [(float(u[row]), float(errors[row])) for row in some] for key, some in rows.items()}
     value, error = np.array(means_of_repeats(gathered)).T

@@ -31,6 +31,7 @@ from vegglue.importers.terrain import Ground, Terrain, ascii_grid, grid_of_keys,
 from vegglue.importers.vector_files import drawn_centreline
 from vegglue.measurements.their_flow import TheirFlow, text_of_flow
 from vegglue.wording.numbers import in_digits, so_many
+from vegglue.wording.sentences import sentences
 
 # Name of the experiment of a result if the site file names none.
 ONLY_EXPERIMENT = "run"
@@ -164,7 +165,7 @@ def ground_of_result(target: Path, found: SiteOfResult) -> GroundOfResult:
         flow = {**found.site.experiments, **found.site.holdout}[experiment]
         taken += f", {in_digits(flow.discharge_m3_s)} m3/s, outlet level {in_digits(flow.downstream_level_m, 4)} m"
         notes = [taken, *one.result.notes] + ([words] if experiment == name else [])
-        imported.append(record(found.paths[experiment], None, "; ".join(notes)))
+        imported.append(record(found.paths[experiment], None, "; ".join(sentences(notes))))
     ground = ground_on_grid(target, found.terrain, found.grid, friction, found.place)
     ground = Ground(ground.tree, imported, {**ground.texts, **texts}, ground.level)
     key = {"code": placed.result.code, "files": files, "parameters": values | dict(found.stated.parameters)}
@@ -198,7 +199,7 @@ def _result_files(folder: Path, given: Mapping[str, Any], stated: ResultEntry) -
         named = {experiments[0] if experiments else ONLY_EXPERIMENT: there[0]}
     for one in named.values():
         if not one.is_file():
-            raise InputError(f"{shown_path(folder)}: `result` names {one.name}, which is not there; correct it.")
+            raise InputError("not_there", folder=folder, key="result", name=one.name)
     return named
 
 
@@ -233,11 +234,7 @@ def _placed(path: Path, result: ModelResult, place: Placement, stated: ResultEnt
     corners = np.column_stack(place.to_channel(*result.corners.T))
     manning = result.manning(stated.law) if stated.manning is None else np.full(result.x.size, stated.manning)
     if manning is None or not np.isfinite(manning).any():
-        held = "of which the law is not stated" if result.roughness is not None else "without one"
-        raise InputError(
-            f"{shown_path(path)}: expected the roughness of the bed, got a result {held}; write "
-            "`result: {law: strickler}` (manning, chezy, nikuradse) or `result: {manning: 0.03}` into the site file."
-        )
+        raise InputError("no_roughness", file=path, lawless=result.roughness is not None)
     there = np.isfinite(along) & np.isfinite(across)
     flow = TheirFlow(*(one[there] for one in (along, across, result.bed, result.depth, u, v)))
     if not (flow.depth > 0.0).any():
@@ -265,11 +262,8 @@ def _boundary(path: Path, flow: TheirFlow, grid: Grid, straight: bool) -> tuple[
     along, across = flow.discharge(grid, inner)
     off = np.degrees(np.abs(np.arctan2(across, along)))
     if not (off <= MOST_OFF_AXIS).all():
-        hint = "draw the channel by `grid.centreline`" if straight else "correct `grid.centreline`"
-        raise InputError(
-            f"{shown_path(path)}: expected a flow within {MOST_OFF_AXIS:g} degrees of the grid, got "
-            f"{off.max():.0f} degrees at x = {inner[off.argmax()]:.4g} m; {hint}."
-        )
+        x = float(inner[off.argmax()])
+        raise InputError("flow_off_grid", file=path, most=MOST_OFF_AXIS, got=off.max(), x=x, straight=straight)
     spread = float(np.std(along) / np.mean(along))
     if spread > MOST_SPREAD:
         raise InputError(

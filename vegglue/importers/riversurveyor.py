@@ -46,7 +46,7 @@ def stations_of_riversurveyor(path: Path, parts: dict[str, Any], options: FileOp
     InputError
         For other coordinates than ENU, and a boat that leaps.
     """
-    with reading_structures(path, "the structures of a MATLAB export of RiverSurveyor Live", "export it anew"):
+    with reading_structures(path, "RiverSurveyor Live"):
         setup, summary, system, water = (parts[name] for name in RIVERSURVEYOR_VARIABLES)
         if int(setup.coordinateSystem) != EAST_NORTH_UP or int(setup.trackReference) not in OVER_GROUND:
             raise InputError(

@@ -15,6 +15,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.model_result import (
     ModelResult,
     bed_level_depth,
@@ -112,13 +113,13 @@ def _result(path: Path, file: BinaryIO, order: str) -> ModelResult:
             "them to VARIABLES FOR GRAPHIC PRINTOUTS."
         )
     bed, level, depth = bed_level_depth(found)
-    notes: list[str] = []
+    notes: list[ImportNote] = []
     if (negative := int((depth < 0.0).sum())) > 0:
-        notes.append(f"{negative} negative depths taken as dry")
+        notes.append(ImportNote(Noted.BELOW_BED, negative))
     if parameters[2] or parameters[3]:
-        notes.append(f"places moved by the offsets {parameters[2]}, {parameters[3]} m of the header")
+        notes.append(ImportNote(Noted.OFFSETS, names=tuple(map(str, parameters[2:4]))))
     if size - begin != frames * frame:
-        notes.append("the last frame is cut off, the one before it is read")
+        notes.append(ImportNote(Noted.CUT_FRAME))
     return model_result(
         "TELEMAC", x, y, bed, level, depth, found["u"], found["v"], roughness=found.get("friction"),
         corners=np.column_stack([x, y]), time=f"{date + ' + ' if date else ''}{seconds:g} s", notes=tuple(notes),

@@ -404,7 +404,7 @@ def read_keys(path: Path) -> Any:
     """Keys and values of a site file, not checked. InputError."""
     if path.suffix == ".yaml":
         return read_tree(path)
-    text = read_text(path, LARGEST_CONFIG, "a folder to import has one")
+    text = read_text(path, LARGEST_CONFIG, "site")
     try:
         return json.loads(text)
     except RecursionError:

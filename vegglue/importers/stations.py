@@ -11,7 +11,6 @@ from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
 from vegglue.errors import InputError
 from vegglue.importers.column_names import is_in_degrees, unit_stated, words_of
-from vegglue.importers.column_roles import NO_DEGREES
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.import_notes import FileNote, ImportNote, Noted
@@ -24,10 +23,9 @@ from vegglue.importers.repeats import (
     refuse_confounded_replicates,
     without_repeats,
 )
-from vegglue.importers.site_file import HELD_OUT
 from vegglue.importers.table_parser import numbers_of
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
-from vegglue.wording.numbers import listed, so_many
+from vegglue.wording.numbers import so_many
 from vegglue.wording.sentences import sentences
 
 EXPERIMENTS = "experiments"
@@ -76,17 +74,15 @@ class KnownExperiments:
         """InputError for the first of the names (rows,) that is not known, with the file and its row."""
         for row, name in zip(rows, names, strict=True):
             if name not in self.names:
-                raise InputError(f"{file}, row {row}: {self.remedy(name)}.")
+                raise self.refusal(file, name, row)
 
-    def remedy(self, name: str) -> str:
-        """What is wrong with a name that is not known, and what to do."""
-        if not name:
-            return f"expected an experiment, one of {', '.join(self.names)}, got nothing; fill it in"
-        if name in self.others:
-            held = self.key == EXPERIMENTS
-            other, place = (HELD_OUT, "a file called `holdout`") if held else (EXPERIMENTS, "another file")
-            return f"experiment `{name}` is under `{other}` in {self.site}: put its rows into {place}, or take them out"
-        return f"experiment `{name}` is not in {self.site}: add it under `{self.key}`, or take its rows out"
+    def refusal(self, file: str, name: str, row: int = 0) -> InputError:
+        """The error about a name that is not known; row: 0 for that of the options of the file."""
+        elsewhere = name in self.others
+        return InputError(
+            "unknown_experiment", where=f"{file}, row {row}" if row else file, name=name, known=self.names,
+            site=self.site, key=self.key, elsewhere=elsewhere, option=not row,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -110,8 +106,9 @@ class StationTables:
     @property
     def taken(self) -> str:
         """What was made of the rows."""
-        made = [table.taken for table in self.tables] or ["no measurement, left out"]
-        return ", ".join([*made, *sentences(self.left_out)])
+        made = [table.taken for table in self.tables]
+        nothing = [] if made else [ImportNote(Noted.NOTHING)]
+        return ", ".join(sentences([*made, *nothing, *self.left_out]))
 
 
 def station_tables(
@@ -129,7 +126,7 @@ def station_tables(
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else (ImportNote(Noted.ON_AXIS),)
     if options.experiment is not None and options.experiment not in known.names:
-        raise InputError(f"{file}: {known.remedy(options.experiment)}; or correct `experiment` of this file.")
+        raise known.refusal(file, options.experiment)
     if kinds and taken.lines:
         measured = taken.only(np.any([np.isfinite(taken.numbers[kind.column]) for kind in kinds], axis=0))
         known.refuse_unknown(file, measured.lines, measured.texts["experiment"])
@@ -170,14 +167,11 @@ def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str]
     # Headings that hold the name of an experiment: `12 mei`, `level low`, `12 mei [m+NAP]`.
     words = [name for one in experiments if (name := words_of(one))]
     wide = [heading for heading in taken.others if any(f" {name} " in f" {words_of(heading)} " for name in words)]
-    written_long = InputError(
-        f"{where} expected a column of experiments ({', '.join(experiments)}) and one of values, got a column for "
-        f"each, {listed(wide)}; write them below one another (gauges: gauge, x, y, experiment, level)."
-    )
+    written_long = InputError("wide_table", where=where, experiments=experiments, got=wide)
     if "x" not in place:
         headings = ", ".join(taken.headings)
         if any(map(is_in_degrees, taken.others)):
-            raise InputError(f"{where} expected a column of x in metres, got places in {NO_DEGREES}")
+            raise InputError("places_in_degrees", where=where.removesuffix(":"), role="x")
         if [kind.column for kind in KINDS.values() if kind.column in taken.numbers] == ["discharge"]:
             raise InputError(
                 f"{where} expected a column of x beside the discharges, got none in {headings}; add it, or `x: 12 m` "
@@ -417,8 +411,8 @@ def _points(taken: MeasuredRows, stem: str, options: FileOptions) -> StationTabl
         x[here] = np.median(x[here])
     moved = float(np.abs(x - kept.numbers["x"]).max(initial=0.0))
     kept = kept.having({"x": x})
-    kept, note = without_repeats(kept, _heights(kept), errors_of_rows(kept, KINDS[STREAMWISE], options))
-    note += f", moved to the middle x of their section by up to {moved:.2g} m" if moved > NEAR_LINE else ""
+    kept, repeats = without_repeats(kept, _heights(kept), errors_of_rows(kept, KINDS[STREAMWISE], options))
+    notes = [repeats, *([ImportNote(Noted.MOVED, moved)] if moved > NEAR_LINE else [])]
     # Beside u: v and w if any has it, standard errors with 0 for unknown, and what all have.
     numbers = kept.numbers
     optional = {role: numbers[role] for role in ("v", "w") if role in numbers and np.isfinite(numbers[role]).any()}
@@ -445,8 +439,8 @@ def _points(taken: MeasuredRows, stem: str, options: FileOptions) -> StationTabl
         tree = {"kind": "adv", "file": file, "experiment": experiment, "section": section, "case": name}
         observations.append({**tree, "average": "profile", **levels, **({"across": True} if name in across else {})})
     heading = ("case", "device", "x", "y", upward, "u", *optional)
-    points = f"{len(rows)} points of {so_many(len(observations), 'section')}{note}"
-    return StationTable(file, heading, rows, tuple(observations), points)
+    points = f"{len(rows)} points of {so_many(len(observations), 'section')}"
+    return StationTable(file, heading, rows, tuple(observations), ", ".join([points, *sentences(notes)]))
 
 
 def _stations(taken: MeasuredRows, stem: str, options: FileOptions, kind: Kind, channel: Placement) -> StationTable:
@@ -467,8 +461,8 @@ def _stations(taken: MeasuredRows, stem: str, options: FileOptions, kind: Kind, 
     ]
     file = f"{stem}-{kind.name}.csv"
     heading = ("experiment", "section", "x", "y", kind.column, kind.error_column)
-    taken_in_words = f"{len(rows)} of {kind.words}{note_on_repeats(gathered)}"
-    return StationTable(file, heading, rows, (observed(kind.name, file),), taken_in_words)
+    made = ", ".join([f"{len(rows)} of {kind.words}", *sentences([note_on_repeats(gathered)])])
+    return StationTable(file, heading, rows, (observed(kind.name, file),), made)
 
 
 def _place(length: float) -> str:

@@ -15,10 +15,10 @@ from zipfile import ZipFile
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError
 from vegglue.importers.column_names import is_unit, role_of
+from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_larger
-from vegglue.wording.numbers import listed, so_many
 
 WORKBOOKS = (".xlsx", ".xlsm")
 COMMENTS = ("#", "%", "//", "!", "$")
@@ -110,7 +110,7 @@ def numbers_of(texts: Sequence[str]) -> Array | None:
 @dataclass(frozen=True)
 class ParsedTable:
     """Headings (columns,), units (columns,) with '' if none is stated, rows of texts (rows, columns) and the number of
-    each in the file (rows,). decimal_comma: whether numbers have one; form: how the table was read.
+    each in the file (rows,). decimal_comma: whether numbers have one; form: notes on how the table was read.
     """
 
     headings: tuple[str, ...]
@@ -118,7 +118,7 @@ class ParsedTable:
     rows: tuple[Sequence[str], ...]
     row_numbers: tuple[int, ...]
     decimal_comma: bool
-    form: str
+    form: tuple[FileNote, ...]
 
     def texts(self, column: int) -> list[str]:
         """The fields of a column (rows,)."""
@@ -131,24 +131,25 @@ class ParsedTable:
             try:
                 number = number_in(text, self.decimal_comma)
             except ValueError as error:
-                again = (
-                    "the heading stands there again: put what is said above each block, such as its place, in a column"
-                )
                 raise InputError(
-                    f"{shown_path(path)}, row {self.row_numbers[i]}: expected a number in column "
-                    f"{self.headings[column]}, got {text!r}; {again if text == self.headings[column] else error}."
+                    "no_number",
+                    file=path,
+                    row=self.row_numbers[i],
+                    column=self.headings[column],
+                    got=text,
+                    why=str(error),
                 ) from None
             values[i] = np.nan if number is None else number
         return values
 
-    def without(self, left_out: set[int], why: str) -> "ParsedTable":
+    def without(self, left_out: set[int], why: ImportNote) -> "ParsedTable":
         """The table without the rows at some places, and why, in its form."""
         kept = [place for place in range(len(self.rows)) if place not in left_out]
         return replace(
             self,
             rows=tuple(self.rows[place] for place in kept),
             row_numbers=tuple(self.row_numbers[place] for place in kept),
-            form=f"{self.form}, {why}",
+            form=(*self.form, why),
         )
 
 
@@ -168,8 +169,7 @@ def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
         If the file cannot be read, or holds no table of numbers with two columns or more.
     """
     if path.suffix.lower() in WORKBOOKS:
-        fields, form = _lines_of_sheet(path, sheet)
-        return _without_summaries(_table(path, fields, form, "", False))
+        return _without_summaries(_table(path, *_lines_of_sheet(path, sheet), "", False))
     there = [(number, text) for number, text in enumerate(readable_text(path).splitlines(), 1) if text.strip(" \t;,")]
     lines = [
         (number, text)
@@ -182,11 +182,11 @@ def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
     separator = _separator([text for _, text in lines])
     fields = [(number, _fields(text, separator)) for number, text in lines]
     comma = separator != "," and has_decimal_comma(field for _, row in fields for field in row)
-    words = [SEPARATORS[separator], *(["decimal comma"] if comma else [])]
-    words += [so_many(comments, "comment line")] if comments else []
-    words += ["a row of types"] if typed else []
+    form: list[FileNote] = [SEPARATORS[separator], *([ImportNote(Noted.DECIMAL_COMMA)] if comma else [])]
+    form += [ImportNote(Noted.COMMENTS, comments)] if comments else []
+    form += [ImportNote(Noted.TYPES)] if typed else []
     quoted = all(text.lstrip().startswith('"') for _, text in lines)
-    return _without_summaries(_table(path, fields, ", ".join(words), separator, comma, quoted, typed))
+    return _without_summaries(_table(path, fields, form, separator, comma, quoted, typed))
 
 
 def _separator(lines: Sequence[str]) -> str:
@@ -234,8 +234,9 @@ def _without_empty_end(fields: list[str]) -> list[str]:
 
 
 def _table(
-    path: Path, whole: list[Line], form: str, separator: str, decimal_comma: bool, quoted: bool = False, typed: int = 0
-) -> ParsedTable:
+    path: Path, whole: list[Line], form: list[FileNote], separator: str, decimal_comma: bool, quoted: bool = False,
+    typed: int = 0,
+) -> ParsedTable:  # fmt: skip
     """The longest stretch of rows of numbers, with the heading and the units above it.
 
     quoted: whether all lines begin with a quotation mark, as names of rows in tables of R do; typed: number of the line
@@ -244,10 +245,7 @@ def _table(
     lines = [(number, _without_empty_end(fields)) for number, fields in whole]
     numeric = [number > typed for number, _ in lines] if typed else _rows_of_numbers(lines, separator)
     if not any(numeric):
-        raise InputError(
-            f"{shown_path(path)}: expected a table of numbers, got none; check the file, or move it out of the folder "
-            "if it holds no measurements."
-        )
+        raise InputError("no_table", file=path)
     width = _usual_width(lines, numeric)
     first = next(i for i, (_, fields) in enumerate(lines) if numeric[i] and len(fields) == width)
     begin = first - next((i for i, row in enumerate(reversed(numeric[:first])) if not row), first)
@@ -255,24 +253,24 @@ def _table(
         first = begin
     head, of_units = first - 1, False
     if head > 0 and not numeric[head] and all(map(is_unit, lines[head][1])):
-        form, head, of_units = f"{form}, a row of units", head - 1, True
+        form, head, of_units = [*form, ImportNote(Noted.UNITS)], head - 1, True
     named = head >= 0 and len(lines[head][1]) >= min(width, 2) and not numeric[head]
     rows = [line for line in lines[first:] if len(line[1]) > 1]
     if named and _has_row_names([fields for _, fields in rows], len(lines[head][1]), separator, quoted):
         lines[head], whole[head] = ((number, ["", *fields]) for number, fields in (lines[head], whole[head]))
-        form = f"{form}, names of rows without a heading"
+        form = [*form, ImportNote(Noted.ROW_NAMES)]
     room = len(whole[head][1]) if named else width
     for number, fields in rows if named else lines[begin:]:
         # A comma may be that of a number, wherever it stands; elsewhere words behind the last column are a remark.
         if len(fields) > room and (separator == "," or any(map(is_number, fields[room:]))):
-            advice = (
-                "if numbers have a decimal comma, part fields by semicolons or tabs, and put text with commas in quotes"
-                if separator == ","
-                else "mend the row, or give each of its fields a heading"
-            )
             raise InputError(
-                f"{shown_path(path)}, row {number}: expected {room} fields as in {'the heading' if named else 'others'}"
-                f", got {len(fields)}; {advice}."
+                "other_width",
+                file=path,
+                row=number,
+                fields=room,
+                got=len(fields),
+                headed=named,
+                commas=separator == ",",
             )
     width = max(width, min(room, max(len(fields) for _, fields in rows)))
 
@@ -281,14 +279,15 @@ def _table(
 
     headings = padded(lines[head][1]) if named else [str(number) for number in range(1, width + 1)]
     lone = len(lines) - first - len(rows)
-    form += ("" if named else ", no heading") + (f", {so_many(lone, 'line')} of one field left out" if lone else "")
+    form = [*form, *([] if named else [ImportNote(Noted.UNHEADED)])]
+    form += [ImportNote(Noted.LONE_FIELDS, lone)] if lone else []
     return ParsedTable(
         headings=tuple(headings),
         units=tuple(padded(lines[first - 1][1] if of_units else [])),
         rows=tuple(padded(fields) for _, fields in rows),
         row_numbers=tuple(number for number, _ in rows),
         decimal_comma=decimal_comma,
-        form=form,
+        form=tuple(form),
     )
 
 
@@ -317,8 +316,8 @@ def _without_summaries(table: ParsedTable) -> ParsedTable:
     }
     if not found or len(found) == len(table.rows):
         return table
-    rows = listed([str(table.row_numbers[place]) for place in sorted(found)[:MOST_ROWS_NAMED]])
-    return table.without(found, f"{so_many(len(found), 'row')} of means or totals left out (row {rows})")
+    rows = tuple(str(table.row_numbers[place]) for place in sorted(found)[:MOST_ROWS_NAMED])
+    return table.without(found, ImportNote(Noted.SUMMARIES, len(found), rows))
 
 
 def _rows_of_numbers(lines: Sequence[Line], separator: str) -> list[bool]:
@@ -363,21 +362,20 @@ def _is_half_numbers(fields: Sequence[str]) -> bool:
     return sum(numbers) * 2 >= last > 1
 
 
-def _lines_of_sheet(path: Path, name: str | None) -> tuple[list[Line], str]:
+def _lines_of_sheet(path: Path, name: str | None) -> tuple[list[Line], list[FileNote]]:
     """The rows of a sheet that hold something, and which of several it is."""
-    with importing("openpyxl", path, "workbooks", "field", "save the sheet as CSV"):
+    with importing("openpyxl", path, "field", "CSV"):
         import openpyxl
-    with read_by_library(path, "a workbook"), ZipFile(path) as packed:
+    with read_by_library(path, "workbook"), ZipFile(path) as packed:
         refuse_larger(path, sum(part.file_size for part in packed.infolist()))
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         with closing(book):
             if name is not None and name not in book.sheetnames:
-                raise InputError(f"{shown_path(path)}: expected the sheet {name!r}, got {', '.join(book.sheetnames)}.")
+                raise InputError("no_sheet", file=path, sheet=name, got=book.sheetnames)
             shown = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"] or book.worksheets
             chosen = book[name] if name is not None else shown[0]
             others = [sheet.title for sheet in shown if sheet.title != chosen.title]
             hidden = _hidden_rows(packed, chosen)
-            only = f" (only sheet {chosen.title}; measurements of {listed(others)} need a file of their own)"
             lines, size, skipped = [], 0, []
             for number, row in enumerate(chosen.iter_rows(values_only=True), 1):
                 if number in hidden and any(cell is not None for cell in row):
@@ -393,11 +391,11 @@ def _lines_of_sheet(path: Path, name: str | None) -> tuple[list[Line], str]:
                         elif isinstance(cell, str) and is_number(texts[place]) and "." not in texts[place]:
                             texts[place] = texts[place].replace(",", ".")
                     lines.append((number, texts))
-            form = "workbook" + (only if others and name is None else "")
+            form: list[FileNote] = ["workbook"]
+            form += [ImportNote(Noted.ONE_SHEET, names=(chosen.title, *others))] if others and name is None else []
             if skipped:
                 more = [f"{len(skipped) - MOST_ROWS_NAMED} more"] if len(skipped) > MOST_ROWS_NAMED else []
-                rows = listed([*skipped[:MOST_ROWS_NAMED], *more])
-                form += f", {so_many(len(skipped), 'hidden row')} left out (row {rows})"
+                form.append(ImportNote(Noted.HIDDEN, len(skipped), (*skipped[:MOST_ROWS_NAMED], *more)))
             return lines, form
 
 
@@ -439,4 +437,4 @@ def without_copies(table: ParsedTable) -> ParsedTable:
             places = list(stretch)
             if shift and len(places) >= FEWEST_IN_A_ROW:
                 copied.update(places)
-    return table.without(copied, f"{len(copied):,} rows are copies of others and count once") if copied else table
+    return table.without(copied, ImportNote(Noted.COPIES, len(copied))) if copied else table

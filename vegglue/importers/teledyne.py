@@ -17,6 +17,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.library_files import open_raw, read_by_library, readable_text
 from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.transects import DEEPEST_RIVER, FASTEST, BoatProfile, refuse_leaps, stations_of_transect
@@ -26,7 +27,6 @@ PD0_BEGINS, LEAST_ENSEMBLE = b"\x7f\x7f", 100
 # How blocks begin: the fixed leader, and those of the surface layer of a RiverPro or a StreamPro.
 FIXED_LEADER = b"\x00\x00"
 SURFACE_BLOCKS = {bytes([0x10, number]) for number in range(6)}
-INSTEAD = "classic ASCII output from WinRiver"
 # What marks no value in the output of WinRiver, whatever the unit.
 NO_VALUE = -32768.0
 # By the unit of the file: metres in one of depth, and in one of velocity (cm/s or ft/s).
@@ -83,7 +83,7 @@ def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
         with TemporaryDirectory() as folder:
             copy = Path(folder) / path.name
             copy.write_bytes(b"".join([*group, group[-1]]))
-            data = open_raw(copy, INSTEAD, named=path)
+            data = open_raw(copy, "WinRiver", named=path)
         if missing := {"vel", "vel_bt", "dist_bt"} - set(data):
             raise InputError(
                 f"{shown_path(path)}: expected velocities and bottom track, got none of {', '.join(sorted(missing))}; "
@@ -98,7 +98,7 @@ def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
         if data.attrs["coord_sys"] != "earth":
             from mhkit import dolfyn  # which has opened the file
 
-            with read_by_library(path, "velocities to be turned to the earth", "", "export them in earth coordinates"):
+            with read_by_library(path, "turned"):
                 data = dolfyn.rotate2(data, "earth", inplace=False)
         own, beams, bottom, water, cells = (
             np.asarray(data[name].values, dtype=np.float64) for name in ("depth", "dist_bt", "vel_bt", "vel", "range")
@@ -136,11 +136,11 @@ def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
         east, north = next(places)
         profiles.append(BoatProfile((east, north), depth, depth - deep - one.cells[good], velocity[good]))
     refuse_leaps(path, profiles)
-    form = f"PD0 of a {model} {float(np.median(draft)):.3g} m below the surface"
-    form += f", turned by a declination of {options.declination:g} degrees" if options.declination else ""
-    form += f", {damaged} damaged left out" if damaged else ""
-    form += ", cells of the surface layer left out" if of_surface else ""
-    return stations_of_transect(path, options, profiles, form)
+    form = [ImportNote(Noted.ADCP_AT, float(np.median(draft)), (model,))]
+    form += [ImportNote(Noted.DECLINATION, options.declination)] if options.declination else []
+    form += [ImportNote(Noted.DAMAGED, damaged)] if damaged else []
+    form += [ImportNote(Noted.SURFACE_LAYER)] if of_surface else []
+    return stations_of_transect(path, options, profiles, *form)
 
 
 def _sound_ensembles(content: bytes) -> tuple[list[list[bytes]], int, bool]:

@@ -31,14 +31,16 @@ from vegglue.importers.column_names import UNITS, role_of, unit_named, words_of
 from vegglue.importers.config_parts import MANNING_BED, even
 from vegglue.importers.coordinate_systems import StatedSystem, refuse_other_system, system_of_wkt
 from vegglue.importers.file_options import FileOptions, read_file_options
+from vegglue.importers.import_notes import BanksOfBed, FileNote, ImportNote, Noted
 from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_larger
 from vegglue.importers.measured_files import data_folder, record
 from vegglue.importers.measured_rows import Placement, in_the_channel, read_rows
 from vegglue.importers.site_file import FieldSite, FileOfSite, SiteGrid
 from vegglue.importers.stations import ONE_PLACE
 from vegglue.importers.table_parser import parse_table
-from vegglue.importers.vector_files import note_on_units, read_polygons
-from vegglue.wording.numbers import in_digits, listed, so_many
+from vegglue.importers.vector_files import read_polygons, units_assumed
+from vegglue.wording.numbers import listed, so_many
+from vegglue.wording.sentences import sentences
 
 # Endings of files of levels on a grid.
 RASTERS = (".tif", ".tiff", ".asc", ".grd")
@@ -140,9 +142,8 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
             "covariances": [one.model_dump() for one in terrain.survey.covariances],
             "left_out": terrain.survey.left_out.model_dump(),
         }
-    taken = f"bed: {terrain.taken}"
-    if beyond > 0.0:
-        taken += f"; {100.0 * beyond:.0f} % of the grid lies beyond it, with the nearest level"
+    notes: list[BanksOfBed | FileNote] = [f"bed: {terrain.taken}"]
+    notes += [ImportNote(Noted.BEYOND_BED, beyond)] if beyond > 0.0 else []
     friction, imported = mapped_classes(folder, site, place)
     steeper = slope_of_banks(site)
     if steeper is not None and site.channel is not None and BANK not in friction["classes"]:
@@ -150,17 +151,11 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
         at = (part.ravel() for part in np.meshgrid(cells.x, cells.y, indexing="ij"))
         level = filled(terrain, *at).reshape(cells.x.size, cells.y.size)
         banks = beyond_slope_break(slope(level, cells) > steeper, level)
-        if banks.any():
-            floor = float(np.mean((~banks).sum(axis=1)) * cells.dy)
-            friction = with_banks(friction, steeper)
-            taken += (
-                f"; banks lie beyond a slope of {steeper:g}, half the stated one, and leave a floor of "
-                f"{in_digits(floor)} m ({in_digits(site.channel.bottom_width_m)} m stated)"
-            )
-        else:
-            taken += f"; no bank, as it is nowhere steeper than {steeper:g}, half the stated slope of the banks"
+        floor = float(np.mean((~banks).sum(axis=1)) * cells.dy) if banks.any() else None
+        friction = with_banks(friction, steeper) if banks.any() else friction
+        notes.append(BanksOfBed(steeper, floor, site.channel.bottom_width_m))
     tree = {"grid": grid, "bed": [layer], "friction": friction}
-    return Ground(tree, [record(path, None, taken), *imported], texts, terrain.level)
+    return Ground(tree, [record(path, None, "; ".join(sentences(notes))), *imported], texts, terrain.level)
 
 
 def ground_on_grid(target: Path, terrain: Terrain, grid: Tree, friction: Tree, place: Placement) -> Ground:
@@ -185,8 +180,8 @@ def mapped_classes(folder: Path, site: FieldSite, place: Placement) -> tuple[Tre
         own = {"law": "manning", "n": f"{coefficient}_class" if coefficient in TAKEN_NAMES else coefficient}
         friction["classes"].setdefault(name, own)
         zones.append({"class": name, "polygon": [list(corner) for corner in polygon.corners]})
-    note = "; ".join([f"friction classes: {so_many(len(zones), 'polygon')}", *note_on_units(polygons)])
-    return friction | {"zones": zones}, [record(path, None, note)]
+    notes = sentences([f"friction classes: {so_many(len(zones), 'polygon')}", units_assumed(polygons)])
+    return friction | {"zones": zones}, [record(path, None, "; ".join(notes))]
 
 
 def slope_of_banks(site: FieldSite) -> float | None:
@@ -324,7 +319,7 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         scaled = ""
         beside = path.with_name(f"{path.name}.aux.xml")  # what GDAL keeps of a format that has no room for it
         if ending not in (".tif", ".tiff") and beside.is_file():
-            with read_by_library(beside, "what GDAL keeps beside a grid"):
+            with read_by_library(beside, "GDAL"):
                 stated = dict(re.findall(r"<(Scale|Offset)>([^<]+)<", readable_text(beside)))
                 scale, offset = float(stated.get("Scale", 1.0)), float(stated.get("Offset", 0.0))
             raster = replace(raster, values=raster.values * scale + offset)
@@ -455,9 +450,9 @@ def read_geotiff(path: Path, frame: Frame | None = None) -> Raster:
     ----------
     OGC GeoTIFF 1.1 (19-008).
     """
-    with importing("tifffile", path, "GeoTIFFs", "field", "save it as an ESRI ASCII grid"):
+    with importing("tifffile", path, "field", "an ESRI ASCII grid"):
         import tifffile
-    with read_by_library(path, "a GeoTIFF", "tifffile"), tifffile.TiffFile(path) as file:
+    with read_by_library(path, "GeoTIFF", "tifffile"), tifffile.TiffFile(path) as file:
         codecs = tifffile.tifffile.imagecodecs
         for name, decoder in (("lzw_decode", lzw_decode), ("floatpred_decode", floatpred_decode)):
             if not hasattr(codecs, name):  # as without the library imagecodecs
@@ -555,14 +550,7 @@ def _points(path: Path, place: Placement, options: FileOptions) -> tuple[Array, 
         headings = taken.headings
         roles = {known[0] for heading in headings if (known := role_of(heading)) is not None}
         deep = {"depth", "below"} & roles or any("depth" in words_of(heading).split() for heading in headings)
-        advice = (
-            "take depths off the level of the water above them, and call that z (or off the datum that they count from)"
-            if deep and "z" not in roles
-            else "name them in its entry of the site file, `bed: {file: ..., columns: {x: Chainage, y: Station, z: "
-            "Elevation}}` (1, 2 and 3 where there is no heading), with `flip: [x, y]` and `zero: [40, 5]` where x "
-            "counts upstream from an end at 40 m and y from a left bank 5 m off the axis"
-        )
-        raise InputError(f"{shown_path(path)}: expected columns of x, y and z, got {', '.join(headings)}; {advice}.")
+        raise InputError("no_bed_columns", file=path, got=headings, deep=deep and "z" not in roles)
     taken = in_the_channel(taken, place, options)
     points = np.column_stack([taken.numbers[role] for role in "xyz"])
     there: Mask = np.asarray(np.isfinite(points).all(axis=1))

@@ -9,6 +9,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.measured_rows import MeasuredRows
 
 # Exponent of the profile by which measured cells are carried on to bed and surface, the one of the maker's programs.
@@ -33,7 +34,9 @@ class BoatProfile:
     velocity: Array
 
 
-def stations_of_transect(path: Path, options: FileOptions, profiles: Sequence[BoatProfile], form: str) -> MeasuredRows:
+def stations_of_transect(
+    path: Path, options: FileOptions, profiles: Sequence[BoatProfile], *form: FileNote
+) -> MeasuredRows:
     """Stations along the straight line that fits the transect, each the mean of the ensembles around it.
 
     `start` of the file, in the coordinates of the site, is where the boat started. InputError.
@@ -60,12 +63,12 @@ def stations_of_transect(path: Path, options: FileOptions, profiles: Sequence[Bo
     x, y, mean, error = _along_the_section(places, velocities)
     numbers = {"x": x, "y": y, "east_velocity": mean[:, 0], "north_velocity": mean[:, 1]}
     numbers |= {"u_se": error[:, 0], "v_se": error[:, 1]}
-    note = f"{form}, {len(used)} ensembles"
+    notes = [*form, ImportNote(Noted.ENSEMBLES, len(used))]
     for dropped, what in ((len(placed) - len(used), "velocities"), (len(profiles) - len(placed), "a place")):
-        note += f", {dropped} without {what} left out" if dropped else ""
+        notes += [ImportNote(Noted.ENSEMBLES_LACKING, dropped, (what,))] if dropped else []
     columns = {"x": "distance east", "y": "distance north", "east_velocity": "east", "north_velocity": "north"}
     units = dict.fromkeys(columns, "m") | {"east_velocity": "m/s", "north_velocity": "m/s"}
-    return MeasuredRows(numbers, {}, columns, units, (note,))
+    return MeasuredRows(numbers, {}, columns, units, tuple(notes))
 
 
 def refuse_leaps(path: Path, profiles: Sequence[BoatProfile]) -> None:

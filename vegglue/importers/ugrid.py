@@ -14,6 +14,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.model_result import (
     ModelResult,
     NetcdfVariable,
@@ -73,8 +74,7 @@ def read_ugrid(path: Path) -> ModelResult:
         given = {key: one for key, one in fields.items() if one is not None}
         if missing := lacking_fields(given):
             layers = any(len(one.shape) == 3 and faces in one.shape[:-1] for one in variables.values())
-            hint = "write depth means (ucxa, ucya)" if layers else "add them to the output"
-            raise InputError(f"{shown_path(path)}: expected {', '.join(missing)} on the mesh, got none; {hint}.")
+            raise InputError("not_on_mesh", file=path, missing=missing, layers=layers)
         at_faces = given["u"].size == faces
         centre = _mean_of_corners(nodes, corners)
         if (named := topology.text("face_coordinates").split()) and at_faces and set(named[:2]) <= variables.keys():
@@ -84,7 +84,8 @@ def read_ugrid(path: Path) -> ModelResult:
             if one.size != places.shape[0] and at_faces:  # a bed at nodes
                 given[key] = _mean_of_corners(one[:, None], corners)[:, 0]
         of_flow_fm = f"{mesh}_flowelem_bl" in variables or f"{mesh}_ucx" in variables
-        notes, keep = [], np.ones(len(places), bool)
+        keep = np.ones(len(places), bool)
+        notes: tuple[ImportNote, ...] = ()
         domain = variables.get(f"{mesh}_flowelem_domain")
         if domain is not None and at_faces:
             numbers = np.ravel(domain.numbers()).astype(np.int64)
@@ -92,7 +93,7 @@ def read_ugrid(path: Path) -> ModelResult:
             own = int(in_name[1]) if in_name else Counter(numbers.tolist()).most_common(1)[0][0]
             keep = numbers == own
             if not keep.all():
-                notes.append(f"{int((~keep).sum())} ghost cells of other partitions left out")
+                notes = (ImportNote(Noted.GHOSTS, int((~keep).sum())),)
         roughness: Array | None = None
         kind: RoughnessKind = "not-stated"
         chezy = variables.get(f"{mesh}_czs")
@@ -101,7 +102,7 @@ def read_ugrid(path: Path) -> ModelResult:
         of_cells = (*places.T, *bed_level_depth(given), given["u"], given["v"])
         return model_result(
             "D-Flow FM" if of_flow_fm else "UGRID", *(one[keep] for one in of_cells), roughness=roughness,
-            roughness_kind=kind, corners=nodes, crs=_system(variables), time=last_time(variables), notes=tuple(notes),
+            roughness_kind=kind, corners=nodes, crs=_system(variables), time=last_time(variables), notes=notes,
         )  # fmt: skip
 
 

@@ -23,12 +23,14 @@ from vegglue.importers.column_names import UNITS, names_without_unit, role_of, w
 from vegglue.importers.column_roles import columns_of_table, taken_as_si
 from vegglue.importers.coordinate_systems import StatedSystem, epsg_number, refuse_other_system, system_of_wkt
 from vegglue.importers.file_options import FileOptions, read_file_options
+from vegglue.importers.import_notes import ImportNote, Noted, PatchesRead, UnitsAssumed
 from vegglue.importers.library_files import importing, read_by_library, readable_text
 from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, read_rows, rows_of_table
 from vegglue.importers.site_file import FileOfSite
 from vegglue.importers.table_parser import WORKBOOKS, is_number, parse_table
 from vegglue.measurements.plausibility import is_mark_anywhere
-from vegglue.wording.numbers import in_digits, listed, so_many
+from vegglue.wording.numbers import in_digits
+from vegglue.wording.sentences import sentence, sentences
 
 MAP_FILES = (".geojson", ".json", ".shp")
 TABLES = (".csv", ".txt", ".tsv", ".dat", *WORKBOOKS)
@@ -106,11 +108,8 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
                 own = dict(feature.get("properties") or {})
                 geometry = feature["geometry"]
                 if geometry is None or geometry["type"] not in ("Polygon", "MultiPolygon"):
-                    got = "one of no place" if geometry is None else f"a {str(geometry['type'])[:40]}"
-                    raise InputError(
-                        f"{shown_path(path)}: expected polygons alone, got {got} as feature {number}; take it out, or "
-                        "save it as the area that it stands for."
-                    )
+                    got = "" if geometry is None else str(geometry["type"])[:40]
+                    raise InputError("no_polygon", file=path, feature=number, got=got)
                 features += [(ring, own) for ring in _outlines(geometry)]
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
@@ -188,25 +187,17 @@ def summary_of_plants(found: Sequence[NamedPolygon]) -> str:
     """`2 patches: stems from Density; not read: d_mm`."""
     known = dict.fromkeys(one.density_from for one in found if one.density_from is not None)
     unread = dict.fromkeys(heading for one in found for heading in one.unread)
-    stems = f"stems from {listed(list(known))}" if known else "no stems, and so equally dense"
-    clauses = [f"{so_many(len(found), 'patch', 'patches')}: {stems}", *note_on_units(found)]
-    clauses += [f"not read: {listed(list(unread))}"] if unread else []
     alike = dict.fromkeys(heading for one in found for heading in one.like_density)
-    if alike and not known:
-        clauses.append(
-            f"{listed(list(alike))} may be their density: where it is, write "
-            f"`patches: {{file: ..., columns: {{stems: {next(iter(alike))}}}}}`"
-        )
-    return "; ".join(clauses)
+    units = units_assumed(found)
+    return sentence(PatchesRead(len(found), tuple(known), units.lengths, units.densities, tuple(unread), tuple(alike)))
 
 
-def note_on_units(found: Sequence[NamedPolygon]) -> list[str]:
-    """`no unit given of x and y, taken as m`, and the same of densities, taken as 1/m2; nothing if all are given."""
+def units_assumed(found: Sequence[NamedPolygon]) -> UnitsAssumed:
+    """Lengths and densities without a unit."""
     lengths = [*dict.fromkeys(axis for one in found for axis in one.unitless)]
     headings = dict.fromkeys(one.density_from for one in found if one.density_from is not None)
     plain = [heading for heading in headings if not _area_named(heading)]
-    taken = [f"{listed(names)}, taken as {unit}" for names, unit in ((lengths, "m"), (plain, "1/m2")) if names]
-    return [f"no unit given of {', and of '.join(taken)}"] if taken else []
+    return UnitsAssumed(tuple(lengths), tuple(plain))
 
 
 def _area_named(heading: str) -> str:
@@ -328,13 +319,13 @@ def shapes_and_records(path: Path, kind: str, frame: Frame | None) -> Iterator[l
     beside = {one.suffix.lower(): one for one in path.parent.glob(f"{glob.escape(path.stem)}.*")}
     if ".prj" in beside:
         refuse_other_system(path, system_of_wkt(readable_text(beside[".prj"])), frame)
-    with importing("pyshp", path, "shapefiles", "field", "save it as GeoJSON"):
+    with importing("pyshp", path, "field", "GeoJSON"):
         import shapefile
     encoding = "utf-8"
     if ".cpg" in beside:
         with suppress(LookupError, ValueError):  # of a name that is no encoding
             encoding = codecs.lookup(readable_text(beside[".cpg"]).strip()).name
-    with read_by_library(path, "a shapefile"):
+    with read_by_library(path, "shapefile"):
         try:
             with shapefile.Reader(str(path), encoding=encoding) as reader:
                 found = list(reader.shapeRecords())
@@ -420,7 +411,7 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
     """
     columns: Tree = {}
     units: Tree = {}
-    how = "as the site file says"
+    how = "site file"
     if isinstance(given, CentrelineShape):
         shape = given
         if frame is not None and shape.points is not None:
@@ -431,9 +422,7 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
     else:
         path = folder / given.file
         if not path.is_file():
-            raise InputError(
-                f"{shown_path(folder)}: `grid.centreline.file` names {given.file}, which is not there; correct it."
-            )
+            raise InputError("not_there", folder=folder, key="grid.centreline.file", name=given.file)
         keys = dict(given.model_extra or {})
         reverse = bool(keys.pop("reverse", False))
         options = read_file_options(keys, f"{shown_path(folder)}: `grid.centreline`")
@@ -459,7 +448,7 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
         shape = CentrelineShape(points=tuple(points[::-1] if reverse else points))
         taken = taken.not_reading(*(taken.columns.keys() - {"x", "y"}))
         columns, units = dict(taken.columns), dict(taken.units)
-        how = f"{taken.summary}{', the last one first' if reverse else ''}"
+        how = ", ".join([taken.summary, *sentences([ImportNote(Noted.LAST_FIRST)] if reverse else [])])
     line = centreline_of(shape)
 
     def as_lists(value: Any) -> Any:

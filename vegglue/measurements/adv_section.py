@@ -238,9 +238,9 @@ def _read_points(observation: Observation) -> pd.DataFrame:
     optional = ("v", "w", "u_se", "u_std", "duration_s")
     rows = read_table(path, ("case", "device"), ("x", "y", upward, "u"), optional, gaps=("v", "w"))
     if "u_se" in rows:
-        refuse_rows(path, rows["u_se"] < 0.0, "expected u_se of at least 0, which is unknown; mend or remove the row")
+        refuse_rows(path, rows["u_se"] < 0.0, "out_of_bounds", rows["u_se"], least=0.0)
     for column in {"u_std", "duration_s"} & set(rows.columns):
-        refuse_rows(path, rows[column] <= 0.0, f"expected {column} above 0; mend or remove the row")
+        refuse_rows(path, rows[column] <= 0.0, "out_of_bounds", rows[column], above=0.0)
     refuse_repeated(path, rows, ("case", "x", "y", upward))
     chosen = rows[rows["case"] == wanted]
     if chosen.empty:
@@ -248,7 +248,8 @@ def _read_points(observation: Observation) -> pd.DataFrame:
             f"{shown_path(path)}: expected rows with case {wanted!r}, got only {', '.join(rows['case'].unique())}; "
             f"correct `case` in the observation."
         )
-    refuse_rows(path, chosen["x"] != chosen["x"].iloc[0], f"expected the same x in all rows of case {wanted!r}")
+    first = chosen["x"].iloc[0]
+    refuse_rows(path, chosen["x"] != first, "other_x", chosen["x"], case=wanted, first=first)
     moved = chosen.assign(x=chosen["x"] + observation.offset.x, y=chosen["y"] + observation.offset.y)
     return moved.drop(columns="case").sort_values(["y", upward]).reset_index(drop=True)
 

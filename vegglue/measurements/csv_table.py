@@ -60,18 +60,14 @@ def read_table(
     found: dict[str, pd.Series] = {}
     for column in (*names, *(name for name in labels if name in raw.columns)):
         text = found[column] = raw[column].str.strip()
-        refuse_rows(path, text == "", f"expected a name in column {column}, got nothing")
-        signs = text.map(unprintable).dropna()
-        if len(signs):
-            sign = f"expected a name in column {column}, got one with the sign {signs.iloc[0]!a}; take it out"
-            raise InputError(f"{shown}, row {signs.index[0]}: {sign}.")
+        refuse_rows(path, text == "", "no_name", text)
+        signs = text.map(unprintable)
+        refuse_rows(path, signs.notna(), "unprintable_name", signs)
     for column in (*numbers, *(name for name in optional if name in raw.columns)):
         text = raw[column].str.strip()
         value = found[column] = pd.to_numeric(text, errors="coerce").astype(float)
         wrong = ~np.isfinite(value) & ~((text == "") & (column in gaps))
-        if wrong.any():
-            got = f"expected a number in column {column}, got {raw[column][wrong.idxmax()]!r}"
-            refuse_rows(path, wrong, f"{got}; mend or remove the row")
+        refuse_rows(path, wrong, "no_number", raw[column], why="correct or remove the row")
     return pd.DataFrame(found)
 
 
@@ -105,10 +101,11 @@ def _raw_table(path: Path) -> pd.DataFrame:
     return pd.DataFrame(fields, columns=heading, dtype=str)
 
 
-def refuse_rows(path: Path, wrong: pd.Series, complaint: str) -> None:
-    """Errors: InputError with the complaint, naming the file and the first row where `wrong` (rows,) is true."""
+def refuse_rows(path: Path, wrong: pd.Series, kind: str, column: pd.Series, **values: object) -> None:
+    """Errors: InputError of that kind with file, row, column and value of the first row that is `wrong` (rows,)."""
     if wrong.any():
-        raise InputError(f"{shown_path(path)}, row {wrong.idxmax()}: {complaint}.")
+        row = wrong.idxmax()
+        raise InputError(kind, file=path, row=row, column=str(column.name), got=column[row], **values)
 
 
 def refuse_repeated(path: Path, table: pd.DataFrame, columns: Sequence[str]) -> None:

@@ -275,17 +275,15 @@ def _read_stations(case: Case, observation: Observation, kind: Kind) -> pd.DataF
                 )
             rows = chosen
     unknown = ~rows["experiment"].isin(list(case.experiments))
-    refuse_rows(path, unknown, f"expected an experiment of the case, one of {', '.join(case.experiments)}")
+    refuse_rows(path, unknown, "unknown_name", rows["experiment"], known=list(case.experiments))
     refuse_repeated(path, rows, ("experiment", "section", *place))
-    error = rows.get(kind.error_column, pd.Series(observation.standard_error or 0.0, index=rows.index))
-    refuse_rows(path, error < 0.0, f"expected {kind.error_column} of at least 0; mend it or leave the column out")
+    unstated = pd.Series(observation.standard_error or 0.0, index=rows.index, name=kind.error_column)
+    error = rows.get(kind.error_column, unstated)
     odd = (error != 0.0) & ~error.between(SMALLEST_STATED_ERROR, LARGEST_READING)
-    refuse_rows(
-        path, odd, f"expected a {kind.error_column} of 0 (unknown), or {SMALLEST_STATED_ERROR:g} to {LARGEST_READING:g}"
-    )
+    refuse_rows(path, odd, "odd_error", error, least=SMALLEST_STATED_ERROR, most=LARGEST_READING)
     for column in (*place, kind.column):
         far = rows[column].abs() > LARGEST_READING
-        refuse_rows(path, far, f"expected {column} up to {LARGEST_READING:g}; mend it or take the row out")
+        refuse_rows(path, far, "out_of_bounds", rows[column], most=LARGEST_READING)
     stations = rows.rename(columns={kind.column: "value"}).assign(
         kind=kind.name,
         x=rows["x"] + observation.offset.x,

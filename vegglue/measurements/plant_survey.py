@@ -86,16 +86,16 @@ def read_survey(path: Path) -> dict[str, SurveyedQuantity]:
         Naming file and row, for what is missing, unknown, repeated, or not positive.
     """
     rows = read_table(path, ("quantity",), ("mean", "standard_deviation", "samples"))
-    known = ", ".join(SURVEYED)
-    refuse_rows(path, ~rows["quantity"].isin(SURVEYED), f"expected one of the quantities {known}")
+    refuse_rows(path, ~rows["quantity"].isin(SURVEYED), "unknown_name", rows["quantity"], known=list(SURVEYED))
     refuse_repeated(path, rows, ("quantity",))
-    refuse_rows(path, rows["mean"] <= 0.0, "expected a mean above 0; mend the row")
-    refuse_rows(path, rows["standard_deviation"] < 0.0, "expected a standard deviation of at least 0; mend the row")
-    refuse_rows(path, rows["samples"] < 1.0, "expected at least 1 sample; mend the row")
+    refuse_rows(path, rows["mean"] <= 0.0, "out_of_bounds", rows["mean"], above=0.0)
+    for name, least in (("standard_deviation", 0.0), ("samples", 1.0)):
+        refuse_rows(path, rows[name] < least, "out_of_bounds", rows[name], least=least)
     missing = [name for name in SURVEYED if name not in set(rows["quantity"])]
     if missing:
         raise InputError(
-            f"{shown_path(path)}: expected a row for each of {known}, got none for {', '.join(missing)}; add it."
+            f"{shown_path(path)}: expected a row for each of {', '.join(SURVEYED)}, got none for {', '.join(missing)}; "
+            "add it."
         )
     columns = (rows["quantity"], rows["mean"], rows["standard_deviation"], rows["samples"])
     return {

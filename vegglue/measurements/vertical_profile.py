@@ -91,9 +91,9 @@ class ProfileFit:
 class CanopyUnknown(Enum):
     """Why verticals inside plants show no canopy height."""
 
-    FEW_POINTS = "too few points in each vertical inside the plants"
-    NO_SHARED_HEIGHT = "no height that all verticals reach above and below"
-    NO_TOP = "no canopy top in the verticals: not or just submerged"
+    FEW_POINTS = "few-points"
+    NO_SHARED_HEIGHT = "no-shared-height"
+    NO_TOP = "no-top"
 
 
 @dataclass(frozen=True)

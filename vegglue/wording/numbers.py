@@ -2,9 +2,11 @@
 
 import html
 import math
+import os
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 # Of a unit of time, from which the next one is used; below two of it, a whole number may be off by more than a quarter.
 LEAST_OF_A_UNIT = 2.0
@@ -51,6 +53,14 @@ def in_short_html(text: str, headings: Sequence[str] = (), rows: Sequence[Sequen
         body = "".join(f"<tr>{row}</tr>" for row in cells[1:])
         parts.append(f"<table><thead><tr>{cells[0]}</tr></thead><tbody>{body}</tbody></table>")
     return f"<div>{''.join(parts)}</div>"
+
+
+def shown_path(path: Path) -> str:
+    """The path as sentences name it: relative to where the user stands; as it is on another drive of Windows."""
+    try:
+        return os.path.relpath(path)
+    except ValueError:
+        return str(path)
 
 
 def so_many(number: int, one: str, many: str = "") -> str:

@@ -1,6 +1,7 @@
 """What a long command does now: the phases of its progress."""
 
 CALIBRATING = "calibrating the model as it is"
+CALIBRATING_WITHOUT_LINE = "calibrating without the level of a surveyed line"
 SEARCHING = "looking for what is missing"
 SEARCHING_WITH = "looking for what is missing with it"
 SEARCHING_SECOND = "looking for what that law changes with"

@@ -9,6 +9,7 @@ SCHEDULER_GONE = f"--cluster: expected the scheduler to stay, got no answer any 
 REMOVE_PART = "remove {} and run the same command again"
 ANOTHER_FILE = "give another file by --to"
 ANOTHER_FOLDER = "give another folder by --to"
+ANOTHER_PLACE = "give another place by --to"
 ANOTHER_NAME = "give another place by --folder"
 ANOTHER_RUNS = "expected a folder that can be made there; give another one by --runs"
 ROOM_FOR_TEMPORARY = "free some room in the folder for temporary files"

@@ -10,7 +10,6 @@ from functools import cache
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
-from vegglue.errors import shown_path
 from vegglue.wording.numbers import (
     MINUS,
     NARROW,
@@ -29,6 +28,7 @@ from vegglue.wording.numbers import (
     range_in_digits,
     section_in_words,
     short,
+    shown_path,
     sized,
     so_many,
     symbol_html,
@@ -229,6 +229,7 @@ def _environment(page: bool, folder: str) -> "Environment":
         "sentence": (lambda value: Written(sentence(value), page_sentence(value))) if page else sentence,
         "phrase": (lambda *given: Written(phrase(*given), page_phrase(*given))) if page else phrase,
         "infinity": math.inf,
+        "so_many": so_many,
         "section_at": section_in_words,
         "tag_of": tag_of,
     }

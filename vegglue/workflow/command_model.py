@@ -113,17 +113,12 @@ def refuse_unlike(case: Case, found: ResultCompared) -> None:
     if found.alike:
         return
     shares = (found.velocity_share, found.level_share, found.area_share)
-    words = ("of the velocity", "of the depth in level", "of the wet area")
     worst = max(range(3), key=lambda one: shares[one] / found.limits[one])
-    hint = "complete bed, roughness and plants, or see `vegglue check`"
-    if found.beyond_mesh > 0.5 * found.limits[2]:
-        hint = f"{100 * found.beyond_mesh:.0f} % of it lies beyond their mesh, so narrow `grid`"
-    elif found.discharge_spread > SPREAD_OF_STEADY:
-        hint = f"its discharge varies by {100 * found.discharge_spread:.0f} % along the channel, so run it to rest"
     raise InputError(
-        f"{shown_path(case.source)}: expected a flow within {100 * found.limits[worst]:.0f} % {words[worst]} of "
-        f"`finished_result`, got {100 * shares[worst]:.0f} %; {hint}."
-    )
+        "unlike_flow", file=case.source, quantity=("velocity", "level", "area")[worst], limit=found.limits[worst],
+        got=shares[worst], beyond=found.beyond_mesh if found.beyond_mesh > 0.5 * found.limits[2] else 0.0,
+        spread=found.discharge_spread if found.discharge_spread > SPREAD_OF_STEADY else 0.0,
+    )  # fmt: skip
 
 
 def unseen_with_command(unseen: Model, model: Model, folder: Path, watch: Watch) -> Model:

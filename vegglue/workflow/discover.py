@@ -18,6 +18,7 @@ from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.wording.numbers import in_short
 from vegglue.wording.remedies import ANOTHER_FILE
+from vegglue.wording.sentences import phrase
 from vegglue.workflow.case_run import CaseRun, case_run, excluded_in
 from vegglue.workflow.command_model import refuse_command
 
@@ -123,6 +124,6 @@ def written(parent: Case, laws: Sequence[LawFound], target: Path, file: Path, fo
     tree = child_tree(parent, target, added)
     tree = {"extends": tree.pop("extends"), "effect_file": file.name, **tree}
     equations = "".join(f"# {one.equation}.\n" for one in laws)
-    head = f"# Made by `vegglue discover`: {parent.name} with {names}.\n{equations}"
-    write_made({file: text, target: head + as_yaml(tree)}, ANOTHER_FILE, force)
+    head = phrase("made_by", "discover", {"parent": parent.name, "names": names})
+    write_made({file: text, target: f"{head}\n{equations}{as_yaml(tree)}"}, ANOTHER_FILE, force)
     return load_case(target, trust=True)  # the file was written here

@@ -38,7 +38,8 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.loop_results import comparison_that_fits, write_model_score
 from vegglue.results.result_files import diagnosis_that_fits
 from vegglue.wording.numbers import in_short
-from vegglue.wording.sentences import sentence, tagged
+from vegglue.wording.phases import CALIBRATING_WITHOUT_LINE
+from vegglue.wording.sentences import phrase, sentence, tagged
 from vegglue.workflow.case_run import CaseRun, best_parameters, calibrated, calibrated_anew, case_run, keep_best_fit
 from vegglue.workflow.compare import Comparison, comparison_of, excluded_rows, keep_comparison, kept_model_score
 from vegglue.workflow.diagnose import diagnose
@@ -185,7 +186,7 @@ def extended(run: CaseRun, found: Diagnosis) -> StepwiseExtension:
     loose = without_levels(run.case, run.site.grid, found)
     if loose is not run.case:  # as an instrument that is off it is excluded, whatever errors that were held out do
         target = run.case.source.with_name(f"{run.case.source.stem}+survey{run.case.source.suffix}")
-        run.watch(Progress("calibrating without the level of a surveyed line"))
+        run.watch(Progress(CALIBRATING_WITHOUT_LINE))
         run = run.of(write_relevelled(run.case, loose, target, run.force))
         parent = calibrated(run, aside)
         several.append(run)
@@ -329,16 +330,16 @@ def write_child(parent: Case, target: Path, added: Sequence[Addition], force: bo
     refuse_parent(target, parent.source)
     tree = child_tree(parent, target, added)
     names = ", ".join(candidate.name for candidate, _ in added)
-    text = f"# Made by `vegglue extend`: {parent.name} with {names}.\n"
-    write_made({target: text + as_yaml(tree)}, "move it away", force)
+    text = phrase("made_by", "extend", {"parent": parent.name, "names": names})
+    write_made({target: f"{text}\n{as_yaml(tree)}"}, "move it away", force)
     return load_case(target, trust=True)  # what it can run, its parent has run
 
 
 def write_relevelled(parent: Case, loose: Case, target: Path, force: bool = False) -> Case:
     """Write the config of the parent without levels of surveyed lines, and read it back, as `write_child`."""
     refuse_parent(target, parent.source)
-    text = f"# Made by `vegglue extend`: {parent.name} without the level of a surveyed line.\n"
-    write_made({target: text + as_yaml(relevelled_tree(parent, loose, target))}, "move it away", force)
+    text = phrase("made_by", "extend", {"parent": parent.name})
+    write_made({target: f"{text}\n{as_yaml(relevelled_tree(parent, loose, target))}"}, "move it away", force)
     return load_case(target, trust=True)
 
 

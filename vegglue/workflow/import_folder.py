@@ -35,7 +35,7 @@ from vegglue.importers.result_site import SiteOfResult, site_of
 from vegglue.importers.site_file import assumptions_of_site, site_file
 from vegglue.measurements.observations import read_observations
 from vegglue.wording.remedies import ANOTHER_FILE, ROOM_FOR_TEMPORARY
-from vegglue.wording.sentences import sentence, sentences
+from vegglue.wording.sentences import phrase, sentence, sentences
 
 
 def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bool = False) -> Case:
@@ -70,10 +70,10 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
         made = case_from_folder(folder, target) if planned is None else case_from_sheet(folder, target, planned)
         tree, texts, flat = made.tree, dict(made.texts), None
     refuse_unreadable_import(tree, texts, target, folder)
-    made_by = f"# Made by `vegglue import` from {folder.name}.\n"
-    configs = [{**texts, target: f"{made_by}{as_yaml(tree)}"}]
+    made_by = phrase("made_by", "import", {"source": folder.name})
+    configs = [{**texts, target: f"{made_by}\n{as_yaml(tree)}"}]
     if flat is not None:
-        configs.append({target.with_stem(f"{target.stem}-flat"): f"{made_by}{as_yaml(flat)}"})
+        configs.append({target.with_stem(f"{target.stem}-flat"): f"{made_by}\n{as_yaml(flat)}"})
     for files in configs:
         refuse_not_made(files, ANOTHER_FILE, force)
     for files in configs:
@@ -89,7 +89,7 @@ def assumptions_of(folder: Path | str) -> list[str]:
     if site_file(folder).is_file() or (folder.is_dir() and any(map(holds_result, folder.iterdir()))):
         found = site_of(folder)
         return list(sentences(assumptions_of_site(folder, found.site if isinstance(found, SiteOfResult) else found)))
-    return list(NOT_STATED) if holds_confluence(folder) or mat_folder(folder) is not None else []
+    return [sentence(NOT_STATED)] if holds_confluence(folder) or mat_folder(folder) is not None else []
 
 
 def without_errors(case: Case) -> list[str]:

@@ -10,6 +10,7 @@ from vegglue.errors import InputError, shown_path
 from vegglue.parallel import at_most, one_thread
 from vegglue.progress import Watch, silent
 from vegglue.results.resume import begun_or_finished
+from vegglue.wording.sentences import phrase
 from vegglue.workflow.case_run import CaseRun, case_run
 from vegglue.workflow.compare import Comparison, comparison_of, draw_ladder_of, keep_comparison, model_score_of
 from vegglue.workflow.diagnose import diagnose
@@ -124,13 +125,13 @@ def make_posterior(run: CaseRun, members: int | None, show: Show) -> bool:
         sized = run.sized(members)
         current = is_up_to_date(sized)
         ensemble = simulate(sized)
-        show(case, f"{run.folder / 'ensemble.h5'} is up to date." if current else ensemble)
+        show(case, phrase("up_to_date", run.folder / "ensemble.h5") if current else ensemble)
     if is_inferred(run.sized(members)):
-        show(case, f"{run.folder / 'posterior.h5'} is up to date.")
+        show(case, phrase("up_to_date", run.folder / "posterior.h5"))
         return True
     try:
         show(case, infer(run, ensemble))
     except InputError as error:
-        show(case, f"{error} There is no report of {case.name} without a posterior.")
+        show(case, phrase("no_report", error, case.name))
         return False
     return True

@@ -25,7 +25,7 @@ from vegglue.parallel import one_thread
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import diagnosis_that_fits
 from vegglue.wording.remedies import ANOTHER_FOLDER
-from vegglue.wording.sentences import sentence
+from vegglue.wording.sentences import phrase, sentence
 from vegglue.workflow.case_run import case_run
 from vegglue.workflow.command_model import refuse_command
 from vegglue.workflow.hidden_effect import BAD_PROBE, Answer, Hidden, measured_twin, true_place, twin_base
@@ -39,7 +39,7 @@ def sealed_answer(answer: Answer) -> str:
 
 def opened_answer(path: Path) -> Answer:
     """The answer in a file. Errors: InputError when there is no seal, or it is broken."""
-    lines = read_text(path, LARGEST_JSON, "`vegglue twin` writes it").splitlines()
+    lines = read_text(path, LARGEST_JSON, "twin").splitlines()
     try:
         # What is packed may claim to be of any size.
         unpacked = zlib.decompressobj().decompress(base64.b64decode("".join(lines[1:])), LARGEST_JSON)
@@ -71,7 +71,7 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
         "observations": [{"kind": kind.name, "file": kind.file, "synthetic": True} for kind in kinds],
         **{key: None for key in ("validation", "reference") if getattr(case, key) is not None},
     }
-    note = f"# Made by `vegglue twin` from {case.name}; the answer is sealed in {SEAL}.\n"
+    note = phrase("made_by", "twin", {"source": case.name, "seal": SEAL}) + "\n"
     texts = {}
     for kind in kinds:
         names = {"value": kind.column, "standard_error": kind.error_column}
@@ -182,7 +182,7 @@ def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False
     diagnosis = diagnosis_that_fits(there / "diagnosis.h5", case_hash(case))
     lines = [sentence(one) for one in compared_with_truth(answer, diagnosis)]
     if diagnosis is None:
-        lines.append(f"No diagnosis of it in {there}: {shown_command('diagnose', config_in(folder))} makes one.")
+        lines.append(phrase("no_diagnosis_of_twin", there, shown_command("diagnose", config_in(folder))))
     return lines
 
 
