@@ -36,9 +36,9 @@ def imported(name: str, folder: Path, larger: float = LARGER) -> Case:
     return load_case(target)
 
 
-def looked_into(name: str, folder: Path) -> Diagnosis:
+def looked_into(name: str, folder: Path, larger: float = LARGER) -> Diagnosis:
     """What is said of an open case; read where it has been said in this folder before."""
-    return diagnose(imported(name, folder), runs=folder / "runs", watch=print)
+    return diagnose(imported(name, folder, larger), runs=folder / "runs", watch=print)
 
 
 def extended(name: str, folder: Path, larger: float = LARGER) -> StepwiseExtension:

@@ -8,5 +8,4 @@ from open_cases import assert_better, extended
 
 @pytest.mark.slow
 def test_two_effects_are_added(campaigns: Path) -> None:
-    """On the cells of an import: a secondary current and a mixing length are hidden."""
     assert_better(extended("open-l", campaigns, larger=1.0), 2)
