@@ -23,27 +23,21 @@ WANTED = 0.010
 EDDIES = {"viscosity", "elder", "smagorinsky", "mixing_length", "coherent_structures", "edge_mixing"}
 
 
-# How many times as long and wide cells are as `import` makes them: the same is found, in less time.
-LARGER = 2.0
-
-
-def imported(name: str, folder: Path, larger: float = LARGER) -> Case:
-    """An open case on larger cells, its config written into the folder."""
+def imported(name: str, folder: Path) -> Case:
+    """An open case, its config written into the folder."""
     target = folder / f"{name}.yaml"
-    tree = case_from_folder(OPEN_CASES / name, target).tree
-    tree["grid"]["cell"] = [larger * size for size in tree["grid"]["cell"]]
-    target.write_text(yaml.safe_dump(tree), encoding="utf-8")
+    target.write_text(yaml.safe_dump(case_from_folder(OPEN_CASES / name, target).tree), encoding="utf-8")
     return load_case(target)
 
 
-def looked_into(name: str, folder: Path, larger: float = LARGER) -> Diagnosis:
+def looked_into(name: str, folder: Path) -> Diagnosis:
     """What is said of an open case; read where it has been said in this folder before."""
-    return diagnose(imported(name, folder, larger), runs=folder / "runs", watch=print)
+    return diagnose(imported(name, folder), runs=folder / "runs", watch=print)
 
 
-def extended(name: str, folder: Path, larger: float = LARGER) -> StepwiseExtension:
+def extended(name: str, folder: Path) -> StepwiseExtension:
     """An open case with what its diagnosis names, which is read where there is one in this folder."""
-    return extend_stepwise(imported(name, folder, larger), runs=folder / "runs", watch=print)
+    return extend_stepwise(imported(name, folder), runs=folder / "runs", watch=print)
 
 
 def assert_found(found: Diagnosis, hidden: str, true: float) -> None:

@@ -8,4 +8,4 @@ from open_cases import assert_better, extended
 
 @pytest.mark.slow
 def test_two_effects_are_added(campaigns: Path) -> None:
-    assert_better(extended("open-l", campaigns, larger=1.0), 2)
+    assert_better(extended("open-l", campaigns), 2)
