@@ -8,14 +8,13 @@ from pathlib import Path
 
 import blind_truth
 import numpy as np
-import pandas as pd
 import pytest
 import yaml
 from blind_truth import perfect_site, true_values
 from result_files import GridFlow, write_hec_ras, write_selafin
 from second_channel import SHORT
 from site_reach import EDDY_VISCOSITY, bed_level, centres, steady_flow
-from test_second_engine import HIDDEN, small_twin
+from test_second_engine import HIDDEN, small_twin, write_with_errors
 
 import vegglue
 from vegglue.case.config import load_case
@@ -59,13 +58,7 @@ def folder_of_user(folder: Path, code: str, hidden: dict[str, dict[str, float]],
     case = load_case(small_twin(folder, "mid" in flows))
     station = read_observations(case).table
     site = perfect_site(case, "twin", STATED, len(station))
-    value = np.asarray(true_values(site, case, "twin", station, hidden))
-    value = value + np.random.default_rng(3).standard_normal(value.size) * station["standard_error"].to_numpy(float)
-    for observation in case.observations:
-        column = "u" if observation.kind == "velocity" else "level"
-        table = pd.read_csv(observation.file)
-        table[column] = value[(station["kind"] == observation.kind).to_numpy()]
-        table.to_csv(observation.file, index=False)
+    write_with_errors(case, station, np.asarray(true_values(site, case, "twin", station, hidden)))
     (folder / "twin.yaml").unlink()
     write, ending, more = WRITERS[code]
     for name, flow in flows.items():

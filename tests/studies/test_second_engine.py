@@ -54,7 +54,11 @@ def small_twin(folder: Path, mid: bool = False) -> Path:
 
 def measured_by_second(case: Case, station: pd.DataFrame, hidden: dict[str, dict[str, float]]) -> None:
     """Replace the measurements of the case by those of the second solver, with errors as they state them."""
-    value = second(case, station, hidden)(TRUE)
+    write_with_errors(case, station, second(case, station, hidden)(TRUE))
+
+
+def write_with_errors(case: Case, station: pd.DataFrame, value: np.ndarray) -> None:
+    """Values of stations and errors as they state them, into the tables of the case."""
     value = value + np.random.default_rng(3).standard_normal(value.size) * station["standard_error"].to_numpy(float)
     for observation in case.observations:
         column = "u" if observation.kind == "velocity" else "level"
