@@ -2,16 +2,15 @@
 
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from coarse_twin import coarse_twin
 from diagnoses import IMPLAUSIBLE, an_anomaly, candidate_laws_of
 from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_of
 
-from vegglue.case.config import load_case
 from vegglue.decision_constants import constants
 from vegglue.diagnosis import candidate_effects
 from vegglue.diagnosis.candidate_effects import candidate_laws, laws_beside
@@ -19,10 +18,8 @@ from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.search_state import PriorWeight, SearchState
 from vegglue.effects.grammar import LAWS
 from vegglue.results.causes import CandidateLaws, Step
-from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import measured_twin, true_place, twin_base
 
-CONFIG = Path(__file__).parents[2] / "configs" / "twin.yaml"
 NAMES = ("law_bank_speed_step", "law_bank_speed_ramp", "law_floor_along_trend")
 
 
@@ -119,8 +116,8 @@ def test_a_place_is_compared_with_laws_by_what_it_explained() -> None:
 
 @pytest.mark.slow
 def test_a_law_that_is_in_no_list_is_not_nothing() -> None:
-    """The example of docs/discover.md. `diagnose` alone once said that nothing was missing."""
-    model = CaseRun(load_case(CONFIG)).model
+    """The example of docs/discover.md, on larger cells. `diagnose` alone once said that nothing was missing."""
+    model, _ = coarse_twin()
     ground = twin_base(model, true_place(len(model.names), 2))
     station, _ = measured_twin(ground, ["law_viscosity_offset_step=-1.12"], 8.0, "white", 2)
     found = diagnose_model(replace(model, station=station))
