@@ -38,9 +38,9 @@ def suspected(
     cosine = np.eye(5)
     cosine[1, 2:] = 0.95  # every law looks like waves
     screening: Any = SimpleNamespace(
-        p=p, of_each=lambda evidence: evidence, kind=SimpleNamespace(log_evidence=np.array([9.0, 7.0, 1.0])), laws=laws,
-        settings=[{"reference": 0.4}] * 2 + [{}], best_column=lambda law: law, gain=lambda law: -0.5, of_listed=2,
-        listed=SimpleNamespace(fingerprints=prints), cosine=cosine,
+        p=p, of_each=lambda evidence: evidence, laws=laws, settings=[{"reference": 0.4}] * 2 + [{}],
+        kind=SimpleNamespace(log_evidence=np.array([9.0, 7.0, 1.0]), gain=np.full(3, -0.5)), of_listed=2,
+        best_column=lambda law: law, listed=SimpleNamespace(fingerprints=prints), cosine=cosine,
     )  # fmt: skip
     slope, values = measured_linearly(("A",), 4, 2)
     base = at_best(CASE_OF_TWINS, stations_of(CASE_OF_TWINS, ("A",), 4), values, slope)

@@ -95,7 +95,6 @@ from vegglue.pages.findings import (
     MassError,
     MembersSolved,
     ReadingsExcludedSince,
-    StationNotUsed,
 )
 from vegglue.pages.headline import WorstZone
 from vegglue.pages.parameters import PosteriorVerdict, ResidualCompared
@@ -310,7 +309,7 @@ FINDINGS = (
     PosteriorVerdict((), (), (), 21, False, 7.0, 2048, ResidualCompared(VELOCITY, 0.02, np.nan, "unknown")),
     *(ResidualCompared(VELOCITY, 0.02, 0.008, one, best=True) for one in ("exceeds", "explained", "far-less")),
     CylinderCompared(PHI, 2.3, 0.4, 2.2, 3.6, None), CanopyHeightRead("D3", "high", 0.8, 0.05, "", (0.75,)),
-    ReadingsExcludedSince(2, "brook.yaml"), StationNotUsed("high", 12.0, 3.5, "a dead probe"),
+    ReadingsExcludedSince(2, "brook.yaml"),
     DischargeMeasured("D3", "high", 2.1, 0.1, 1.7, "", 4.0), DischargeMeasured("D3", "high", 2.1, 0.1, None, "", 0.0),
     MembersSolved(2044, 1, 3, None, (2048, 0)), MassError(2e-6), FlowOfBuiltInEngine(),
 )  # fmt: skip

@@ -284,14 +284,18 @@ class LawScreening:
         columns = self.columns[law]
         return int(columns[np.argmax(self.kind.log_evidence[columns])])
 
-    def settings_of(self, law: int) -> dict[str, float]:
-        """Of that fingerprint."""
-        return self.settings[self.best_column(law)]
-
-    def gain(self, law: int) -> float:
-        """Its strength to first order, not beyond LARGEST_GAIN plausible ones [-]."""
-        column, scale = self.best_column(law), self.laws[law].candidate.amplitude.scale
-        return float(np.clip(self.kind.gain[column], -LARGEST_GAIN * scale, LARGEST_GAIN * scale))
+    def alike(self, column: int, law: Law) -> tuple[str, ...]:
+        """Names of what leaves the same trace as a column of a law, the most alike first: listed effects, and the
+        nearest law of any other quantity.
+        """
+        row, listed = np.abs(self.cosine[self.of_listed + column]), self.listed.fingerprints
+        near = {one.name: float(row[some].max()) for one, some in zip(listed.candidates, listed.columns, strict=True)}
+        for subject, laws in self.subjects.items():
+            if subject != law.subject:
+                cosine = {other: float(row[self.of_listed + self.columns[other]].max()) for other in laws}
+                nearest = max(laws, key=lambda other: cosine[other])
+                near[self.laws[nearest].candidate.name] = cosine[nearest]
+        return most_alike(near)
 
     @property
     def of_listed(self) -> int:
@@ -423,8 +427,19 @@ class ProductScreening:
             for one, some in zip(found.candidates, found.columns, strict=True)
             if some.max(initial=0) < cosine.size
         }
-        least = constants().alike_cosine
-        return tuple(name for name in sorted(near, key=lambda name: -near[name]) if near[name] > least)
+        return most_alike(near)
+
+
+def most_alike(near: Mapping[str, float]) -> tuple[str, ...]:
+    """Names that the data cannot separate from one, the most alike first; near: |cosine| with each [-]."""
+    ranked = sorted(near, key=lambda name: -near[name])
+    return tuple(name for name in ranked if near[name] > constants().alike_cosine)
+
+
+def first_order_gain(kind: HypothesisKind, column: int, law: LawInCase) -> float:
+    """The strength of a law by one of its columns, not beyond LARGEST_GAIN plausible ones [-]."""
+    most = LARGEST_GAIN * law.candidate.amplitude.scale
+    return float(np.clip(kind.gain[column], -most, most))
 
 
 def screen_products(

@@ -19,7 +19,7 @@ from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import log_evidence
 from vegglue.calibration.fit import objective
-from vegglue.calibration.law_screening import LawScreening, law_fingerprints, screen_laws
+from vegglue.calibration.law_screening import LawScreening, first_order_gain, law_fingerprints, screen_laws
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import prior_shrinkage
 from vegglue.decision_constants import constants
@@ -168,7 +168,8 @@ def candidate_laws(
     count = int(np.searchsorted(np.cumsum(chances[order]), LAWS_HELD * chances.sum())) + 1
     laws = []
     for j in map(int, order[:count]):
-        one, reference = screening.laws[j], screening.settings[screening.best_column(j)].get("reference")
+        one, column = screening.laws[j], screening.best_column(j)
+        reference = screening.settings[column].get("reference")
         laws.append(
             CandidateLaw(
                 name=one.law.name,
@@ -178,7 +179,7 @@ def candidate_laws(
                 equation=one.law.equation(reference),
                 reference=reference,
                 scale=one.candidate.amplitude.scale,
-                strength=strengths.get(one.law.name, screening.gain(j)),
+                strength=strengths.get(one.law.name, first_order_gain(screening.kind, column, one)),
                 chance=float(chances[j]),
             )
         )

@@ -249,7 +249,7 @@ class ExperimentUnmeasured:
 
 @dataclass(frozen=True)
 class StationUnused:
-    """A station within the grid that is not used, and why; x, y [m]."""
+    """A station that is not used, and why; x, y [m]."""
 
     experiment: str
     x: float

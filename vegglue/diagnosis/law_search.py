@@ -25,10 +25,10 @@ from vegglue.calibration.baseline import Baseline, SearchModel, baseline
 from vegglue.calibration.candidates import start_with, with_effect
 from vegglue.calibration.fingerprints import Fingerprints
 from vegglue.calibration.law_screening import (
-    LARGEST_GAIN,
     VALUES_SEEN,
     LawInCase,
     LawScreening,
+    first_order_gain,
     law_fingerprints,
     screen_laws,
     screen_products,
@@ -245,10 +245,9 @@ def product_beside(
     columns = sorted(best_columns, key=lambda column: -evidence[column])[:PRODUCTS_REFITTED]
     trials = []
     for column in columns:
-        one, shapes = screening.products[screening.law_of[column]].candidate, screening.settings[column]
-        most = LARGEST_GAIN * one.amplitude.scale
-        gain = float(np.clip(float(screening.kind.gain[column]), -most, most))
-        trials.append(RefitTrial(one, shapes, (start_with(one, full.point.z, gain),)))
+        one = screening.products[screening.law_of[column]]
+        start = start_with(one.candidate, full.point.z, first_order_gain(screening.kind, column, one))
+        trials.append(RefitTrial(one.candidate, screening.settings[column], (start,)))
     refits = refits_of(full, trials, watch)
     ends = [(column, one) for column, one in zip(columns, refits, strict=True) if one is not None]
     if not ends:
@@ -260,19 +259,7 @@ def product_beside(
     if chance < 0.5:
         return None
     one = screening.products[screening.law_of[column]]
-    found = LawFound(
-        law=one.law,
-        same_as="",
-        reference=best.shapes.get("reference"),
-        scale=best.candidate.amplitude.scale,
-        strength=best.amplitude,
-        interval95=best.interval95,
-        chance=chance,
-        log_evidence=total,
-        seen=one.seen,
-        alike=screening.alike(column),
-        first=best.shapes.get("first"),
-    )
+    found = law_found(one, best, chance, total, screening.alike(column))
     theta = theta_at(full.model.case, best.fitted.point.z[:-1])
     return ProductFound(found, best, float(theta[refit.candidate.parameter][0]))
 
@@ -317,10 +304,15 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
     chances = chances_in_set(evidence)
     count = int(np.searchsorted(np.cumsum(chances), HELD)) + 1
     pairs = list(zip(ranked, chances, strict=True))[:count]
+    tried, held = {one.candidate.name: one for one in screening.laws}, []
+    for one, p in pairs:
+        if isinstance(one.what, Refit) and one.kind == "law":
+            law = tried[one.name]
+            held.append(law_found(law, one.what, float(p), one.log_evidence, screening.alike(one.column, law.law)))
     found = Discovery(
         p=screening.p,
         tried=len(screening.laws),
-        laws=tuple(_law_found(screening, one, float(p)) for one, p in pairs if one.kind == "law"),
+        laws=tuple(held),
         others={one.name: float(p) for one, p in pairs if one.kind != "law"},
         compared={one.name: one.log_evidence for one in ranked},
         likeliest=ranked[0].what if isinstance(ranked[0].what, Refit) else None,
@@ -353,9 +345,9 @@ def refitted_laws(screening: LawScreening, known: float, watch: Watch) -> tuple[
         tried += [(subject, law) for law in forms[: FORMS_REFITTED if rank < SEVERAL_FORMS else 1]]
     trials = []
     for _, law in tried:
-        one, shapes = screening.laws[law].candidate, screening.settings_of(law)
-        start = start_with(one, search.point.z, screening.gain(law))
-        trials.append(RefitTrial(one, shapes, (start,)))
+        one, column = screening.laws[law], screening.best_column(law)
+        start = start_with(one.candidate, search.point.z, first_order_gain(screening.kind, column, one))
+        trials.append(RefitTrial(one.candidate, screening.settings[column], (start,)))
     refits = refits_of(search, trials, watch)
     found, of_columns = [], np.full(evidence.size, -np.inf)
     for subject in ranked:
@@ -393,30 +385,18 @@ def laws_beside_accepted(
     return *refitted_laws(screening, known, watch), known
 
 
-def _law_found(screening: LawScreening, one: Hypothesis, chance: float) -> LawFound:
-    """A law with what leaves the same trace, the most alike first: listed effects, and the nearest law of any other
-    quantity.
-    """
-    refit = one.what
-    assert isinstance(refit, Refit)
-    of_law = next(law for law in screening.laws if law.candidate.name == one.name)
-    row, listed = np.abs(screening.cosine[screening.of_listed + one.column]), screening.listed.fingerprints
-    near = {of.name: float(row[some].max()) for of, some in zip(listed.candidates, listed.columns, strict=True)}
-    for subject, laws in screening.subjects.items():
-        if subject != of_law.law.subject:
-            cosine = {law: float(row[screening.of_listed + screening.columns[law]].max()) for law in laws}
-            nearest = max(laws, key=lambda law: cosine[law])
-            near[screening.laws[nearest].candidate.name] = cosine[nearest]
-    ranked = sorted(near, key=lambda name: -near[name])
+def law_found(tried: LawInCase, refit: Refit, chance: float, log_evidence: float, alike: tuple[str, ...]) -> LawFound:
+    """A law or a product as its refit has left it."""
     return LawFound(
-        law=of_law.law,
-        same_as=SAME_AS.get(of_law.law.name, ""),
+        law=tried.law,
+        same_as=SAME_AS.get(tried.law.name, ""),
         reference=refit.shapes.get("reference"),
         scale=refit.candidate.amplitude.scale,
         strength=refit.amplitude,
         interval95=refit.interval95,
         chance=chance,
-        log_evidence=one.log_evidence,
-        seen=of_law.seen,
-        alike=tuple(name for name in ranked if near[name] > constants().alike_cosine),
+        log_evidence=log_evidence,
+        seen=tried.seen,
+        alike=alike,
+        first=refit.shapes.get("first"),
     )

@@ -11,6 +11,7 @@ import pandas as pd
 
 from vegglue.case.channel_geometry import discharges_upstream_of
 from vegglue.case.resolved_config import case_hash
+from vegglue.diagnosis.channel_check import StationUnused
 from vegglue.errors import shell_line
 from vegglue.flow.status import FAILED, RUN_BY_COMMAND, STATUS_WORDS, members_with
 from vegglue.inference.command_ensemble import doubts_of_predictions
@@ -67,14 +68,6 @@ class ReadingsExcludedSince:
 
     readings: int
     config: str
-
-
-@dataclass(frozen=True)
-class StationNotUsed:
-    experiment: str
-    x: float
-    y: float
-    reason: str
 
 
 @dataclass(frozen=True)
@@ -143,7 +136,7 @@ def findings(run: Run) -> list[tuple[object, bool]]:
         compared = residual_compared(posterior, kind, rmse, best=True)
         found.append((compared, compared.compared == "exceeds"))
     for _, row in observations.table[~observations.table["used"]].iterrows():
-        found.append((StationNotUsed(str(row["experiment"]), row["x"], row["y"], str(row["reason"])), False))
+        found.append((StationUnused(str(row["experiment"]), row["x"], row["y"], str(row["reason"])), False))
     if run.excluded_since:
         found.append((ReadingsExcludedSince(run.excluded_since, shell_line([case.source.name])), True))
     for (experiment, section), rules in observations.discharge.items():
