@@ -54,11 +54,9 @@ def _cached(loop: Callable[..., Any], **flags: Any) -> Any:
 def _say_uncached() -> None:
     """Once, and not by each worker."""
     if current_process().name == "MainProcess":
-        print(
-            "No folder for compiled code can be written to, so that every command compiles anew, for a minute or two: "
-            "set NUMBA_CACHE_DIR to one that can.",
-            file=sys.stderr,
-        )
+        from vegglue.wording.sentences import phrase  # whose files are not stamped with those of loops
+
+        print(phrase("compiled_anew"), file=sys.stderr)
 
 
 def is_kept(loop: Any) -> bool:

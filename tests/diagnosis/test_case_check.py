@@ -20,11 +20,11 @@ from vegglue.diagnosis.station_check import PointsOutsideWater, StationsOnLand, 
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements import kinds, plausibility, section_discharge
-from vegglue.measurements.adv_section import ABOVE_SURFACE
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.plausibility import ImplausibleValues, Symptom
 from vegglue.pages.channel import save_channel_figure
 from vegglue.wording.sentences import macros, tag_of
+from vegglue.wording.unused import ABOVE_SURFACE
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.check import critical_warnings
 

@@ -17,8 +17,8 @@ from vegglue.diagnosis.station_check import (
     remarks_on_errors_across_plants,
     remarks_on_unmoved_heights,
 )
-from vegglue.measurements.adv_section import ABOVE_SURFACE, BELOW_BED
 from vegglue.measurements.observations import read_observations
+from vegglue.wording.unused import ABOVE_SURFACE, BELOW_BED
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 VELOCITIES = "{kind: velocity, file: velocities.csv}"

@@ -18,7 +18,8 @@ from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
-from vegglue.measurements.observations import AT_WALL, read_observations
+from vegglue.measurements.observations import read_observations
+from vegglue.wording.unused import AT_WALL
 from vegglue.workflow.import_folder import assumptions_of
 
 FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0)

@@ -11,11 +11,11 @@ from diagnoses import NOTHING, a_diagnosis, an_effect_found
 from report_runs import MEMBERS, a_toy, kict, told_of, written
 
 from vegglue.errors import StorageError
-from vegglue.measurements.observations import EXCLUDED
 from vegglue.pages.findings import run_health
 from vegglue.pages.parameters import parameter_rows
 from vegglue.pages.run import Run, file_name, is_synthetic, station_zones
 from vegglue.pages.sections import section_panels
+from vegglue.wording.unused import EXCLUDED
 
 pytestmark = pytest.mark.slow  # whole pages
 VOID = {"meta", "link", "br", "hr", "img", "input"}

@@ -101,6 +101,7 @@ from vegglue.pages.parameters import PosteriorVerdict, ResidualCompared
 from vegglue.results.causes import CandidateEffect, FaultyInstrument, ModelErrorUsed, Rival
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import FieldsTooLarge
+from vegglue.results.field_exports import QUANTITIES_OF_FLOW
 from vegglue.results.loop_results import HiddenEffect, OneOfRivals, ProposedMeasurement, Question, RivalEffects
 from vegglue.results.plan import (
     Confusion,
@@ -250,7 +251,7 @@ VELOCITY = kind_of("velocity")
 NOTES = (
     EstimateAtBound("n_b", 0.0051, "s m^(-1/3)", 0.005, 0.05, True),
     InflowDevelops("probe_gain[x2.2]", 2.2, 14.9, 76.0), CellsTooCoarse(0.027, 0.015),
-    BeyondHandbook("n_b", 0.062, "s m^(-1/3)", 0.01, 0.06, "Chow (1959) for streams wider than 30 m"),
+    BeyondHandbook("n_b", 0.062, "s m^(-1/3)", 0.01, 0.06, "chow-major"),
     EstimateOffPrior("eddy_viscosity", 0.002, "m2/s", 2.9),
     MisfitTooSmall(61.5, 150), ImplausibleAmplitude("wind", 3.4), EffectsNotExcluded(("wind", "waves"), beside=True),
     A_POOL, replace(A_POOL, x=2.0, change=0.11, interval95=(0.02, 0.2), between=(float("nan"), float("nan"))),
@@ -460,6 +461,11 @@ REFUSED = [
     InputError("unknown_experiment", where="adv.csv, row 3", name="mid", elsewhere=False, option=False, **OF_SITE),
     InputError("unknown_experiment", where="adv.csv, row 3", name="", elsewhere=False, option=False, **OF_SITE),
     InputError("unknown_experiment", where="adv.csv", name="flood", elsewhere=True, option=True, **OF_SITE),
+    InputError("no_column_of_experiments", where="adv.csv:", file="adv.csv", known=("low", "high"), alike=()),
+    InputError(
+        "no_column_of_experiments", where="adv.csv:", file="adv.csv", known=("low", "high"),
+        alike=("Q", ["small", "large"], True),
+    ),
     InputError("no_measurements", where="brook", files=["velocities.csv", "levels.csv"]),
     InputError(
         "no_column_of_measurements", where="brook", tables=[{"name": "adv.csv", "taken": "x from x; 3 rows"}],
@@ -469,6 +475,8 @@ REFUSED = [
     InputError("no_polygon", file=Path("plants.geojson"), feature=2, got=""),
     InputError("no_bed_columns", file=CSV, got=("x", "y", "depth"), deep=True),
     InputError("no_bed_columns", file=CSV, got=("Chainage", "Station", "Elevation"), deep=False),
+    *(InputError("no_effects_in_file", file=Path("own.py"), got=one) for one in (None, "", "Effect", "int")),
+    InputError("no_start", case="brook"),
     InputError("not_computed", file=Path("a.hdf"), areas=True),
     InputError("not_computed", file=Path("a.hdf"), areas=False),
     InputError("not_on_mesh", file=Path("map.nc"), missing=["u", "v"], layers=True),
@@ -478,7 +486,26 @@ REFUSED = [
     InputError("unlike_flow", file=Path("a.yaml"), quantity="area", limit=0.05, got=0.1, beyond=0.08, spread=0.0),
     InputError("unlike_flow", file=Path("a.yaml"), quantity="velocity", limit=0.15, got=0.2, beyond=0.0, spread=0.0),
 ]  # fmt: skip
+# Titles and meanings in configs that are made, and names in exported files.
+MADE = [
+    *(phrase("title_of_case", one, "brook") for one in ("folder", "confluence", "flat", "twin", "relevelled")),
+    *(
+        phrase("meaning_of_parameter", one)
+        for one in (
+            "bed", "walls", "banks", "viscosity", "phi", "canopy_height", "discharge", "side_discharge", "outlet_level"
+        )
+    ),
+    phrase("meaning_of_parameter", "viscosity_within", 2.0), phrase("meaning_of_parameter", "bed_class", "gravel"),
+    phrase("meaning_of_parameter", "bed_of_run", ("HEC-RAS", 0.035)), phrase("sheet_to_fill_in"), phrase("sealed"),
+    *(phrase("quantity_of_flow", one) for one in QUANTITIES_OF_FLOW), phrase("any_time"),
+    *(phrase("coordinates_of", one) for one in ("model", "map")), phrase("flow_of", "posterior", False, True),
+    phrase("flow_of", "prior", True), phrase("comparison_in_short", 2), phrase("no_built_in_flow"),
+    phrase("compiled_anew"), phrase("new_reach", "brook/case.yaml", 40.0),
+    phrase("next_measurements", "`vegglue check`"),
+    phrase("next_commands", ["`vegglue check`", "`vegglue run`"]), phrase("no_room_for", ["RMSE", "chi2"]),
+]  # fmt: skip
 RENDERED: dict[str, Callable[[], str]] = {
+    "made": lambda: "\n".join(MADE),
     "imports": lambda: wrapped(IMPORTED),
     "refusals": lambda: wrapped(map(str, REFUSED)),
     "files": lambda: wrapped((*YAML, *EXTENSIONS, *BUDGET)),

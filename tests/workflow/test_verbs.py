@@ -14,11 +14,12 @@ from systems import NOT_SIMULATED
 import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.inference.statements import ReadingsExcluded, posterior_statements
-from vegglue.measurements.observations import EXCLUDED, read_observations
+from vegglue.measurements.observations import read_observations
 from vegglue.progress import Progress
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.loop_results import comparison_that_fits, questions_that_fit
 from vegglue.results.result_files import stored_hash, write_diagnosis
+from vegglue.wording.unused import EXCLUDED
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.infer import is_inferred
 from vegglue.workflow.report import results_of

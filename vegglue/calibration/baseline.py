@@ -29,6 +29,7 @@ from vegglue.engine.newton import NEWTON, on_half_as_many_cells
 from vegglue.errors import InputError
 from vegglue.parallel import in_threads
 from vegglue.progress import Watch
+from vegglue.wording.phases import AT_PLACE, TOWARDS_PLACE
 
 # Points of the prior that are computed on the coarse grid, and how many of them the fit starts from. Chosen, not
 # measured: more cost runs of the coarse model and guard against a local minimum.
@@ -332,9 +333,9 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
         run = np.unique(np.concatenate([one.run for one in tried]), axis=0)
         return CommandPlace(here, z, settled, places, correction, run, sum(one.failed for one in tried))
 
-    def in_phase(words: str) -> Watch:
+    def in_phase(words: str, place: int) -> Watch:
         """A phase of its own, so that the time that is left is that of its runs."""
-        return lambda now: watch(replace(now, phase=f"{now.phase}, {words}"))
+        return lambda now: watch(replace(now, phase=words.format(now.phase, place)))
 
     def model_at(correction: Correction, phase: Watch = watch) -> Model:
         return replace(model, engine=corrected(correction, runs, phase))
@@ -356,7 +357,7 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
             step = step / 2.0
         return None
 
-    z, correction = _start(model, lambda z, slopes: correction_there(z, in_phase("place 1"), slopes))
+    z, correction = _start(model, lambda z, slopes: correction_there(z, in_phase(AT_PLACE, 1), slopes))
     here = model_at(correction)
     base = baseline(here)
     for places in range(1, MOST_PLACES + 1):
@@ -365,10 +366,10 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
             return found(True)
         if places == MOST_PLACES:
             break
-        lower = lower_place(here, base, z, in_phase(f"on the way to place {places + 1}"))
+        lower = lower_place(here, base, z, in_phase(TOWARDS_PLACE, places + 1))
         if lower is None:
             break
-        z, correction = lower, correction_there(lower, in_phase(f"place {places + 1}"))
+        z, correction = lower, correction_there(lower, in_phase(AT_PLACE, places + 1))
         here = model_at(correction)
         base = baseline(here, z)
     return found(False)
@@ -376,7 +377,7 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
 
 def _start(model: Model, correction_there: Callable[[Array, bool], Correction]) -> tuple[Array, Correction]:
     """The middle of the prior or, if the command fails there, the next of its Sobol' points."""
-    refused = InputError(f"{model.case.name}: the command has no place to start from.")
+    refused = InputError("no_start", case=model.case.name)
     for z in places_of_prior(len(model.names)):
         try:
             correction_there(z, False)  # alone: a command that fails may take its time

@@ -10,6 +10,7 @@ from vegglue.cli.reporting import progress_reporter
 from vegglue.cli.terminal import FLAG, RUNS, Config, Force, Json, Quiet, Runs, Trust, command_line, print_object
 from vegglue.errors import InputError, shown_path
 from vegglue.wording.commands import HELP
+from vegglue.wording.sentences import phrase
 
 if TYPE_CHECKING:
     from vegglue.effects.definition import Effect
@@ -39,9 +40,9 @@ def new_command(
     if as_object:
         print_object({"config": config, "case": case.name, "parameters": list(case.parameters)})
         return
-    print(f"{config}: a reach of {length:g} m with computed measurements beside it; put your own in their place.")
+    print(phrase("new_reach", config, length))
     if not quiet:
-        print(f"Next: {command_line('check', config)}, then {command_line('run', config)}")
+        print(phrase("next_commands", [command_line("check", config), command_line("run", config)]))
 
 
 def export_command(

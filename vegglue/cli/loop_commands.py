@@ -29,6 +29,7 @@ from vegglue.cli.terminal import (
 from vegglue.errors import InputError, shown_path
 from vegglue.wording.commands import HELP
 from vegglue.wording.numbers import so_many
+from vegglue.wording.sentences import phrase
 
 
 def import_command(
@@ -88,12 +89,12 @@ def diagnose_command(
     if quiet or as_object:
         return
     if found.verdict.doubts_the_data:
-        print(f"Next: correct the measurements; see {command_line('check', config)}")
+        print(phrase("next_measurements", command_line("check", config)))
         return
     following = ("extend", config, "--auto") if found.steps or found.places else ("next", config)
     if found.verdict.tells_laws:
         following = ("discover", config)
-    print(f"Next: {command_line(*following, runs=runs, trust=trust)}")
+    print(phrase("next_commands", [command_line(*following, runs=runs, trust=trust)]))
 
 
 def discover_command(

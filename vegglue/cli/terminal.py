@@ -16,6 +16,7 @@ import vegglue
 from vegglue.errors import InputError, shell_line
 from vegglue.plain_json import plain
 from vegglue.wording.commands import HELP
+from vegglue.wording.sentences import phrase
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -139,7 +140,7 @@ def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], kept: Se
         table.add_row(*(row[place] for place in shown))
     screen.print(table)
     if left_out:
-        screen.print(f"No room in this window for: {', '.join(left_out)}.")
+        screen.print(phrase("no_room_for", left_out))
 
 
 def left_out_of(headings: Sequence[str], rows: Sequence[Sequence[str]], kept: Sequence[str], width: int) -> list[str]:

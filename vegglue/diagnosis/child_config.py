@@ -29,6 +29,7 @@ from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.errors import InputError, path_from
 from vegglue.results.causes import LocalAnomaly
+from vegglue.wording.sentences import phrase
 
 
 def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
@@ -141,7 +142,7 @@ def relevelled_tree(parent: Case, relevelled: Case, target: Path) -> Tree:
                 part[key] = path_from(here, path)
         layers.append(tree)
     name = case_name(f"{parent.name}-survey")
-    title = f"{parent.title or parent.name}, without the level of a surveyed line"
+    title = phrase("title_of_case", "relevelled", parent.title or parent.name)
     return {"extends": path_from(here, parent.source), "name": name, "title": title, "bed": layers}
 
 

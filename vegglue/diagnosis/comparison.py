@@ -33,11 +33,12 @@ from vegglue.engine.model import coarser
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import KINDS, leading_velocities
-from vegglue.measurements.observations import EXCLUDED, section_places, station_table
+from vegglue.measurements.observations import section_places, station_table
 from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.loop_results import HeldOut, InSample, ModelScore, PredictiveScores
 from vegglue.wording.sentences import phrase
+from vegglue.wording.unused import EXCLUDED
 
 # How often errors alone exceed the reported bound; 5 % is usual.
 BY_CHANCE = 0.05

@@ -66,6 +66,7 @@ from vegglue.flow.local_changes import Term
 from vegglue.normal_range import NORMAL95
 from vegglue.progress import Progress, Watch
 from vegglue.results.causes import PatchOutline
+from vegglue.wording.phases import COMPARING_LINE
 
 # Odds beyond e^this are reported as this: larger numbers mean no more.
 LARGEST_LOG_ODDS = 100.0
@@ -377,7 +378,7 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
         line = of_kind.what.line if isinstance(of_kind.what, Instrument) else None
         if line is None or not _within_reach(of_kind.log_evidence, best):
             continue
-        watch(Progress(f"comparing the surveyed line at x = {line.x:g} m"))
+        watch(Progress(COMPARING_LINE.format(line.x)))
         if (without := relevelled(screening.base, line)) is not None:
             lines = kind_named(screening.kinds, of_kind.kind)
             by_score = float(lines.log_evidence[of_kind.column] - lines.log_prior[of_kind.column])

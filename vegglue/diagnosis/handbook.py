@@ -23,7 +23,7 @@ MINOR_STREAM = 30.0
 
 @dataclass(frozen=True)
 class HandbookRange:
-    """What a handbook gives for a quantity, low to high [its unit]."""
+    """What a handbook gives for a quantity, low to high [its unit]; source: its key in the template of the remark."""
 
     low: float
     high: float
@@ -32,10 +32,10 @@ class HandbookRange:
 
 # Manning's n [s m^(-1/3)], Chow (1959), table 5-6: glass 0.009 to cobbles and plastic grass in a flume; minor streams
 # up to sluggish weedy reaches; major streams.
-OF_FLUME = HandbookRange(0.008, 0.035, "Chow (1959) for linings, from glass to stones")
-OF_MINOR_STREAM = HandbookRange(0.01, 0.15, "Chow (1959) for minor streams, from concrete to weedy pools")
-OF_MAJOR_STREAM = HandbookRange(0.01, 0.06, "Chow (1959) for streams wider than 30 m of regular section")
-OF_WALLS = HandbookRange(0.008, 0.018, "Chow (1959) for glass to rough timber and mortar")
+OF_FLUME = HandbookRange(0.008, 0.035, "chow-flume")
+OF_MINOR_STREAM = HandbookRange(0.01, 0.15, "chow-minor")
+OF_MAJOR_STREAM = HandbookRange(0.01, 0.06, "chow-major")
+OF_WALLS = HandbookRange(0.008, 0.018, "chow-walls")
 
 
 def parameter_doubts(base: Baseline) -> Iterator[EstimateAtBound | BeyondHandbook | EstimateOffPrior]:
@@ -68,7 +68,7 @@ def _handbook(case: Case, scales: SiteScales, name: str) -> HandbookRange | None
     if case.eddy_viscosity == name:
         # Not checked against it: 0.15 to 0.3 of straight channels to 1 to 3 of sharp bends, here with wider ends.
         eddy = scales.of("eddy")
-        return HandbookRange(0.05 * eddy, 3.5 * eddy, "0.05 to 3.5 h u*, Rutherford (1994) for flumes to sharp bends")
+        return HandbookRange(0.05 * eddy, 3.5 * eddy, "rutherford")
     of_classes = [one for one in case.friction.classes.values() if one.coefficient == name]
     if any(one.law == "manning" for one in of_classes):
         width = scales.discharge / (scales.speed * scales.mean_depth)
@@ -76,5 +76,5 @@ def _handbook(case: Case, scales: SiteScales, name: str) -> HandbookRange | None
         return OF_FLUME if walls is not None else of_stream
     if any(one.law == "keulegan" for one in of_classes):
         high = scales.mean_depth
-        return HandbookRange(0.0, high, "Keulegan (1938), whose roughness is no higher than the water is deep")
+        return HandbookRange(0.0, high, "keulegan")
     return None

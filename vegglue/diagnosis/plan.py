@@ -55,6 +55,7 @@ from vegglue.results.plan import (
     TwoEffects,
     hours_of,
 )
+from vegglue.wording.phases import COMPUTING_FINGERPRINTS, WEIGHING_ADDED, WEIGHING_PLANNED
 
 # |cosine| from which another effect is listed as similar [-]: half of the squares of a trace are then the same.
 SIMILAR_FROM = 0.7
@@ -103,7 +104,7 @@ def plan_measurements(
         noise_of(at_hand)  # raises InputError if a station states no error
     base = planned_pieces(model, planned)
     possible = possible_pieces(model, planned, at_hand, base)
-    watch(Progress("computing flows and fingerprints"))
+    watch(Progress(COMPUTING_FINGERPRINTS))
     wide = plan_model(model, planned, at_hand, base, possible)
     question = _question(wide.candidates, about, size, between)
     proposed = not len(at_hand) and not base
@@ -118,13 +119,13 @@ def plan_measurements(
         base = [wide.pieces[j] for j in chosen]
         wide = with_chosen(wide, chosen)
         question = _question(wide.candidates, about, size, between)
-    watch(Progress("weighing what they show"))
+    watch(Progress(WEIGHING_PLANNED))
     shown = shown_by(wide)
     places, chances_of_places = _places(model.case, shown)
     flows = frozenset(at_hand["experiment"])
     present = flows | {one.experiment for one in base if one.experiment}
     hours = hours_of(base, planned.costs.discharge, flows)
-    watch(Progress("weighing what could be added"))
+    watch(Progress(WEIGHING_ADDED))
     search = plan_search(wide, question, planned, shown.level, present, shown.beyond)
     left = planned.hours - hours
     return FieldPlan(

@@ -40,6 +40,7 @@ from vegglue.normal_range import NORMAL95
 from vegglue.parallel import parallel_map
 from vegglue.progress import Progress, Watch, counted, silent
 from vegglue.results.causes import CandidateEffect
+from vegglue.wording.phases import NO_LONGER_NEEDED
 
 # Steps that a refit may take, and how many more for each shape that is fitted, too. Chosen, not measured: most need
 # four; an outline needs up to twenty, and stops far from the best with ten.
@@ -194,7 +195,7 @@ def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, 
         interval = interval95(base.model, base.fitted, one.parameter)
         if one.has_further_amplitudes or not is_near_off(interval, one.effect.amplitude.off):
             continue
-        watch(Progress(f"{name} is no longer needed"))
+        watch(Progress(NO_LONGER_NEEDED.format(name)))
         fewer = without_effect(base, one)
         if fewer is not None:
             base, unneeded = fewer, [*unneeded, name]

@@ -24,6 +24,7 @@ from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValu
 from vegglue.normal_range import NORMAL95
 from vegglue.progress import Progress, Watch
 from vegglue.results.causes import CandidateEffect, FaultyInstrument, LocalAnomaly, Rival, Step
+from vegglue.wording.phases import COMPARING_AGAIN
 
 
 @dataclass(frozen=True)
@@ -323,7 +324,7 @@ def with_rivals_again(
     kept, known = list[Step](), dict(effects)
     for step in steps:
         kept.append(step)
-        watch(Progress(f"comparing {step.accepted} again with all else"))
+        watch(Progress(COMPARING_AGAIN.format(step.accepted)))
         less = without_effect(base, candidate_in_case(base.model.case, step.accepted))
         if less is None:
             continue

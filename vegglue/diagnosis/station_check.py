@@ -19,11 +19,12 @@ from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of, distance_to_outline
 from vegglue.diagnosis.flow_check import dry_outlets, exchanged_components
-from vegglue.measurements.adv_section import ABOVE_SURFACE, BELOW_BED, average_of, upward_column
+from vegglue.measurements.adv_section import average_of, upward_column
 from vegglue.measurements.kinds import kind_of, velocity_rows
-from vegglue.measurements.observations import OUTSIDE, Observations
+from vegglue.measurements.observations import Observations
 from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues, implausible_values
 from vegglue.measurements.section_discharge import neighbour_error
+from vegglue.wording.unused import ABOVE_SURFACE, BELOW_BED, OUTSIDE
 
 # Nearer to a patch edge than this share of a cell [-], a station is on it.
 ON_THE_EDGE = 0.02

@@ -73,16 +73,10 @@ def effects_of(path: Path) -> tuple[Effect, ...]:
         raise InputError(f"{shown}: cannot be run: {type(error).__name__}: {error}; mend it.") from None
     found = getattr(module, "EFFECTS", None)
     found = tuple(found) if isinstance(found, list) else found
-    expected = f"{shown}: expected EFFECTS = (Effect(...), ...), got"
-    if found is None:
-        raise InputError(f"{expected} none; add it.")
-    if isinstance(found, Effect):
-        raise InputError(f"{expected} one Effect; put it in brackets with a comma, (Effect(...),).")
     other = next((one for one in found if not isinstance(one, Effect)), None) if isinstance(found, tuple) else found
-    if other is not None:
-        raise InputError(f"{expected} {type(other).__name__}; correct it.")
-    if not found:
-        raise InputError(f"{expected} none in it; add one.")
+    if other is not None or not found:
+        got = None if found is None else "" if other is None else type(other).__name__
+        raise InputError("no_effects_in_file", file=path, got=got)
     for effect in found:
         _refuse_unusable(effect, shown)
     return tuple(replace(effect, from_file=True) for effect in found)

@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from vegglue.case.resolved_config import Tree
+from vegglue.wording.sentences import phrase
 
 # One bed of Manning's law, whose coefficient is the parameter n_b.
 MANNING_BED = {"law": "manning", "n": "n_b"}
@@ -47,18 +48,18 @@ def lognormal_prior(median: float, log_sd: float, unit: str, symbol: str, meanin
 
 def bed_prior(low: float, high: float) -> Tree:
     """The prior of n_b of MANNING_BED [s m^(-1/3)]."""
-    return loguniform_prior(low, high, "s m^(-1/3)", "n_b", "Manning coefficient of the bed")
+    return loguniform_prior(low, high, "s m^(-1/3)", "n_b", phrase("meaning_of_parameter", "bed"))
 
 
 def viscosity_prior(stated: float, factor: float) -> Tree:
     """The prior of an eddy viscosity [m2/s] that is known to within a factor."""
-    log_sd = round(math.log(factor), 4)
-    return lognormal_prior(stated, log_sd, "m2/s", "ν", f"eddy viscosity, known to within a factor of {factor:g}")
+    meaning = phrase("meaning_of_parameter", "viscosity_within", factor)
+    return lognormal_prior(stated, round(math.log(factor), 4), "m2/s", "ν", meaning)
 
 
 def wall_prior(median: float) -> Tree:
     """The prior of n_w, Manning's n of side walls about as known [s m^(-1/3)]."""
-    return lognormal_prior(median, WALL_LOG_SD, "s m^(-1/3)", "n_w", "Manning coefficient of the side walls")
+    return lognormal_prior(median, WALL_LOG_SD, "s m^(-1/3)", "n_w", phrase("meaning_of_parameter", "walls"))
 
 
 def observed(kind: str, file: str, experiment: str | None = None) -> Tree:

@@ -34,6 +34,7 @@ from vegglue.importers.import_notes import ConfluenceAssumptions
 from vegglue.importers.library_files import load_matlab
 from vegglue.measurements.csv_table import read_table
 from vegglue.wording.remedies import ANOTHER_PLACE
+from vegglue.wording.sentences import phrase
 
 EXPERIMENT = "measured"
 # Length of a cell, and about its width [m].
@@ -118,7 +119,7 @@ def case_from_confluence(folder: Path, target: Path) -> Tree:
     levels = observed("level", f"{into.name}/levels.csv", EXPERIMENT)
     return {
         "name": case_name(target.stem),
-        "title": "Open-channel confluence, measured by others",
+        "title": phrase("title_of_case", "confluence"),
         "grid": grid,
         "bed": [{"points": f"{into.name}/bed.csv"}],
         "friction": {"classes": {"bed": MANNING_BED}, "default": "bed", "walls": {"law": "manning", "n": "n_w"}},
@@ -149,7 +150,7 @@ def flat_bed(folder: Path, parent: Path) -> Tree:
     return {
         "extends": parent.name,
         "name": f"{case_name(parent.stem)}-flat",
-        "title": "Open-channel confluence, its bed taken as a plane",
+        "title": phrase("title_of_case", "flat"),
         "bed": [{"trapezoid": plane}],
     }
 
@@ -173,16 +174,18 @@ def _priors(vertical: Array, blocks: Array, width: float) -> Tree:
     level = float(blocks[blocks[:, 0] > blocks[:, 0].max() - 0.5 * width, 2].mean())
     return {
         "discharge": normal_prior(
-            round(before, 5), round(UPSTREAM * before, 5), "m3/s", "Q", "discharge from upstream"
+            round(before, 5), round(UPSTREAM * before, 5), "m3/s", "Q", phrase("meaning_of_parameter", "discharge")
         ),
         "side_discharge": normal_prior(
-            round(side, 5), round(SIDE * side, 5), "m3/s", "Q_s", "discharge from the side, which is not stated",
+            round(side, 5), round(SIDE * side, 5), "m3/s", "Q_s", phrase("meaning_of_parameter", "side_discharge"),
             low=round(0.02 * side, 5), high=round(3.0 * side, 5),
         ),
-        "outlet_level": normal_prior(round(level, 5), OUTLET, "m", "z_out", "water level at the outlet"),
+        "outlet_level": normal_prior(
+            round(level, 5), OUTLET, "m", "z_out", phrase("meaning_of_parameter", "outlet_level")
+        ),
         "n_b": bed_prior(0.005, 0.05),
         "n_w": wall_prior(WALL),
-        "eddy_viscosity": loguniform_prior(3e-5, 1e-2, "m2/s", "ν", "eddy viscosity"),
+        "eddy_viscosity": loguniform_prior(3e-5, 1e-2, "m2/s", "ν", phrase("meaning_of_parameter", "viscosity")),
     }  # fmt: skip
 
 

@@ -66,6 +66,7 @@ from vegglue.importers.vector_files import (
     summary_of_plants,
 )
 from vegglue.measurements.plausibility import DEEPEST_CHANNEL, STANDING_WATER
+from vegglue.wording.sentences import phrase
 
 # Cells across the floor, and how much longer than wide a cell is: patches of some metres with 16 cells across are as
 # well resolved as by cells of half that length (open-a and open-e change by less than 0.3 mm/s).
@@ -83,10 +84,8 @@ BY_EYE = 0.12
 # Transverse mixing over h u* [-] (Fischer et al. 1979, chapter 5): of straight flumes and of streams. Points each
 # way at which the bed is sampled for it.
 MIXING_OF_FLUME, MIXING_OF_STREAM, SAMPLED = 0.15, 0.6, 48
-PARAMETERS: Tree = {"n_b": bed_prior(0.01, 0.2)}
-# Of plaster and glass up to cobbles.
-BED_OF_FLUME = bed_prior(0.005, 0.05)
-PHI = loguniform_prior(0.02, 100.0, "-", "φ", "drag of the densest patches")
+# Manning's n of the bed [s m^(-1/3)]: of streams, and of flumes from plaster and glass up to cobbles.
+BED_OF_STREAM, BED_OF_FLUME = (0.01, 0.2), (0.005, 0.05)
 
 
 @dataclass(frozen=True)
@@ -144,24 +143,24 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         stated = usual_viscosity(site, ground)
     unknown = {VISCOSITY: viscosity_prior(stated, factor)} if factor > 1 else {}
     classes = ground.tree["friction"]["classes"]
-    of_bed = BED_OF_FLUME if site.walls is not None else PARAMETERS["n_b"]
+    of_bed = bed_prior(*(BED_OF_STREAM if site.walls is None else BED_OF_FLUME))
     rough = {
-        one["n"]: of_bed | {"symbol": one["n"], "meaning": f"Manning coefficient of {name}"}
+        one["n"]: of_bed | {"symbol": one["n"], "meaning": phrase("meaning_of_parameter", "bed_class", name)}
         for name, one in classes.items()
         if one.get("n", "n_b") != "n_b"
     }
-    banks = {"k_s": loguniform_prior(0.01, 5.0, "m", "k_s", "Nikuradse roughness height of the banks")}
-    has_banks = BANK_CLASS in classes.values()
+    if BANK_CLASS in classes.values():
+        rough["k_s"] = loguniform_prior(0.01, 5.0, "m", "k_s", phrase("meaning_of_parameter", "banks"))
     measured.imported.extend([*ground.imported, *drawn_patches])
     tree: Tree = {
         "name": case_name(folder.resolve().name),
-        "title": f"Measurements of {folder.resolve().name}",
+        "title": phrase("title_of_case", "folder", folder.resolve().name),
         **ground.tree,
         "inflows": {"upstream": {"side": "west", "spread": "conveyance"}},
         "outlet": {},
         "eddy_viscosity": VISCOSITY if unknown else stated,
         "experiments": {name: _experiment(flow) for name, flow in site.experiments.items()},
-        "parameters": PARAMETERS | rough | (banks if has_banks else {}) | unknown,
+        "parameters": {"n_b": of_bed} | rough | unknown,
         "observations": measured.observations,
         **FIRST_LOOK,
     }
@@ -170,8 +169,7 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         tree["finished_result"] = of_result.key
     if site.walls is not None:  # a smoother bed than a stream's, and one that is known better
         tree["friction"] = tree["friction"] | {"walls": {"law": "manning", "n": "n_w"}}
-        of_floor = {"n_b": BED_OF_FLUME} if of_result is None else {}
-        tree["parameters"] = tree["parameters"] | of_floor | {"n_w": wall_prior(site.walls.n)}
+        tree["parameters"] = tree["parameters"] | {"n_w": wall_prior(site.walls.n)}
         tree |= MODEL_ERROR_OF_FLUME
     elif site.bed is not None:  # of a natural reach, surveyed outdoors
         walked = any(patch.polygon is not None for patch in patches)
@@ -191,7 +189,7 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     if patches:
         guess = site.canopy_height_guess_m
         canopy = normal_prior(
-            guess, round(BY_EYE * guess, 4), "m", "h_d", "height of the canopy, estimated by eye",
+            guess, round(BY_EYE * guess, 4), "m", "h_d", phrase("meaning_of_parameter", "canopy_height"),
             low=round(0.4 * guess, 4), high=round(1.8 * guess, 4),
         )  # fmt: skip
         numbered = {f"p{number}": patch for number, patch in enumerate(patches, 1)}
@@ -205,7 +203,8 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         densest = max(patch.stems_per_m2 for patch in patches)
         stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
         tree["plants"] = {"stands": {"plants": stand}, "patches": rows}
-        tree["parameters"] |= {"phi": PHI, "canopy_height": canopy}
+        phi = loguniform_prior(0.02, 100.0, "-", "φ", phrase("meaning_of_parameter", "phi"))
+        tree["parameters"] |= {"phi": phi, "canopy_height": canopy}
     texts = {**ground.texts, **texts_of_tables(target, [*measured.tables, *held_out.tables])}
     kept = {"frame": frame.model_dump(exclude_none=True) | {"origin": list(frame.origin)}} if frame is not None else {}
     return FolderCase(tree | kept | ({"imported": measured.imported} if measured.imported else {}), texts)

@@ -31,7 +31,7 @@ from vegglue.importers.terrain import Ground, Terrain, ascii_grid, grid_of_keys,
 from vegglue.importers.vector_files import drawn_centreline
 from vegglue.measurements.their_flow import TheirFlow, text_of_flow
 from vegglue.wording.numbers import in_digits, so_many
-from vegglue.wording.sentences import sentences
+from vegglue.wording.sentences import phrase, sentences
 
 # Name of the experiment of a result if the site file names none.
 ONLY_EXPERIMENT = "run"
@@ -327,7 +327,7 @@ def _friction(
             LOG_SD_OF_CLASS,
             "s m^(-1/3)",
             parameter[value],
-            f"Manning coefficient, {value:g} in {placed.result.code}",
+            phrase("meaning_of_parameter", "bed_of_run", (placed.result.code, value)),
         )
         for value in groups
     }

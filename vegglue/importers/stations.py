@@ -194,18 +194,13 @@ def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str]
         raise written_long
     else:
         file = where.removesuffix(":").rpartition("/")[2]
-        alike = ""  # an unread column of repeated words may hold the experiments by other names
+        alike = ()  # an unread column of repeated words may hold the experiments by other names
         for heading, texts in taken.others.items():
             known = list(dict.fromkeys(text for text in texts if text))
             if 1 < len(known) < len(texts) and numbers_of(texts) is None:
-                more = ["..."] if len(known) > OTHER_NAMES_SHOWN else []
-                shown = ", ".join([*known[:OTHER_NAMES_SHOWN], *more])
-                alike = f", but {heading!r} with {shown} (write the names of the site file there)"
+                alike = heading, known[:OTHER_NAMES_SHOWN], len(known) > OTHER_NAMES_SHOWN
                 break
-        raise InputError(
-            f"{where} expected a column with the experiment of each row ({', '.join(experiments)}), got none{alike}; "
-            f"add one, or `{file}: {{experiment: {experiments[0]}}}` under `files`."
-        )
+        raise InputError("no_column_of_experiments", where=where, file=file, known=experiments, alike=alike)
     sections = [options.section] * taken.size if options.section is not None else taken.texts.get("section")
     if sections is None or "" in sections:
         x, y = taken.numbers["x"], taken.numbers.get("y", np.zeros(taken.size))

@@ -32,7 +32,7 @@ from vegglue.progress import Progress, Watch
 from vegglue.results.ensemble import Ensemble
 from vegglue.results.resume import ensemble_writer
 from vegglue.wording.phases import RUNNING_COMMAND
-from vegglue.wording.sentences import sentence
+from vegglue.wording.sentences import phrase, sentence
 
 # Share of a prediction [-] below which two are the same: what a sum in another order changes.
 SAME = 1e-12
@@ -213,7 +213,7 @@ def run_ensemble(
             for solved, (position, end) in enumerate(ends, resumed + 1):
                 index, reason = todo[position], end.reason
                 if end.prediction is not None and np.isnan(added[index]).any():
-                    reason = "the built-in solver found no flow with or without the effects of the case"
+                    reason = phrase("no_built_in_flow")
                 found = np.full(stations, np.nan) if end.prediction is None or reason else end.prediction + added[index]
                 # What a command does not give is NaN.
                 rows = {

@@ -12,9 +12,9 @@ from vegglue.inference.homogeneity import DIFFERS_BELOW, differing
 from vegglue.inference.refine import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT, root_mean_square
 from vegglue.measurements.kinds import Kind, kind_of
-from vegglue.measurements.observations import EXCLUDED
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Posterior, Transfer
 from vegglue.results.verdict import MisfitTooSmall, is_too_small
+from vegglue.wording.unused import EXCLUDED
 
 # |r| [-] above which a pair is named: the other parameter then explains half the variance of each (r² = 0.49).
 STRONG_CORRELATION = 0.7

@@ -36,6 +36,7 @@ from vegglue.measurements.vertical_profile import (
 )
 from vegglue.wording.numbers import in_digits, range_in_digits, so_many
 from vegglue.wording.sentences import sentence
+from vegglue.wording.unused import ABOVE_SURFACE, BELOW_BED
 
 EDGE = 0.05  # m, a vertical closer to the edge of a patch stands beside the plants as much as in them
 SMALLEST_ERROR = 0.001  # m/s, resolution of an ADV; keeps one calm point from outweighing all others
@@ -43,8 +44,6 @@ SLOWEST = 0.05  # m/s, below which the mean velocity of a vertical does not give
 # Stand-ins for what a file leaves out, chosen so that errors come out too large rather than too small.
 TURBULENCE = 0.15  # u_std over the mean velocity of the vertical
 DURATION = 60.0  # s
-# Why a point is not used.
-BELOW_BED, ABOVE_SURFACE = "below the bed", "above the water surface"
 SECTIONS_OF_FLOOR = 50  # chosen, not measured: some in every pool and on every riffle of a reach
 # A probe is dead when all four hold. Chosen wide apart from what slow water shows, which still fluctuates.
 LARGEST_DEAD_SPEED = 0.05  # m/s, no point of a dead probe is above this

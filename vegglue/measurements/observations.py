@@ -16,6 +16,7 @@ from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_r
 from vegglue.measurements.kinds import KINDS, STREAMWISE, TRANSVERSE, WATER_LEVEL, Kind, kind_of
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
+from vegglue.wording.unused import AT_WALL, OUTSIDE
 
 # Columns of every table of stations, of ADV points and of verticals, with their types; points may have more, as in
 # their file (v, u_se, ...).
@@ -33,9 +34,6 @@ PROFILE_TYPES: dict[str, type] = {
     "device": str, "points": int, "used": bool, "reason": str, "law": str, "linear": float, "linear_error": float,
     "fitted": float, "fitted_error": float, "within": float, "slope": float, "top": float, "scatter": float,
 }  # fmt: skip
-OUTSIDE = "it is outside the grid"
-AT_WALL = "it is nearer to a side wall than the middle of its cell, where the model has no flow"
-EXCLUDED = "the diagnosis excludes it"
 # Readings and their errors, in the SI unit of whatever kind: beyond them lies nothing that is measured in a stream, and
 # the squares of such numbers leave no digits of the others.
 SMALLEST_STATED_ERROR, LARGEST_READING = 1e-9, 1e9

@@ -22,6 +22,7 @@ from vegglue.results.calibration_files import csv_text
 from vegglue.results.labelled_arrays import ENGINE, extra_library
 from vegglue.whole_files import failed_writes_told, write_file
 from vegglue.wording.remedies import MAKE_ROOM
+from vegglue.wording.sentences import phrase
 
 # Tags of GeoTIFF 1.1 (OGC 19-008): the affine way from pixels to the map, and the coordinate system; and that of GDAL
 # for what marks no data.
@@ -72,16 +73,10 @@ def epsg_code(frame: Frame | None) -> int | None:
     return int(found[1]) if found else None
 
 
-# Quantities of a flow at cell centres: what they are called in words, and their unit.
-QUANTITIES_OF_FLOW = {
-    "bed": ("level of the bed", "m"),
-    "level": ("level of the water", "m"),
-    "depth": ("depth of the water", "m"),
-    "u": ("velocity along the channel", "m/s"),
-    "v": ("velocity across the channel", "m/s"),
-    "east_velocity": ("velocity to the east of the map", "m/s"),
-    "north_velocity": ("velocity to the north of the map", "m/s"),
-}
+# Quantities of a flow at cell centres, and their unit.
+QUANTITIES_OF_FLOW = dict.fromkeys(("bed", "level", "depth"), "m") | dict.fromkeys(
+    ("u", "v", "east_velocity", "north_velocity"), "m/s"
+)
 
 
 def quantities(flow: FlowFields, grid: Grid, frame: Frame | None) -> dict[str, Array]:
@@ -119,12 +114,11 @@ def write_mesh(
     on_map = ("u", "v") if frame is None and grid.centreline is None else ("east_velocity", "north_velocity")
     for experiment, flow in flows.items():
         for name, values in quantities(flow, grid, frame).items():
-            words, unit = QUANTITIES_OF_FLOW[name]
-            long_name = f"{words}, {experiment}"
+            long_name = f"{phrase('quantity_of_flow', name)}, {experiment}"
             if name in on_map:
                 long_name = f"velocity, {experiment}, {'xy'[on_map.index(name)]}-component"
             at_faces = {"mesh": "mesh", "location": "face", "coordinates": "face_x face_y", **_mapped(frame)}
-            told = {"long_name": long_name, "units": unit, **at_faces}
+            told = {"long_name": long_name, "units": QUANTITIES_OF_FLOW[name], **at_faces}
             # QGIS's reader takes the x-component for both if a vector has no time (lutraconsulting/MDAL issue 521).
             vector = name in on_map
             dims, data = (("time", "face"), values.reshape(1, -1)) if vector else (("face",), values.ravel())
@@ -165,7 +159,7 @@ def _mesh(grid: Grid, frame: Frame | None) -> dict[str, Any]:
             {
                 "standard_name": "time",
                 "units": "hours since 2000-01-01 00:00:00",
-                "long_name": "any time, as the flow is steady",
+                "long_name": phrase("any_time"),
             },
         ),
         "mesh": ((), np.int32(0), topology),
@@ -194,7 +188,7 @@ def _mapped(frame: Frame | None) -> dict[str, str]:
 def _system(frame: Frame | None) -> dict[str, Any]:
     """The coordinate system by its code and, with pyproj, as CF has it (grid_mapping_name, crs_wkt); and the frame."""
     if frame is None:
-        return {"long_name": "coordinates of the model"}
+        return {"long_name": phrase("coordinates_of", "model")}
     code = epsg_code(frame)
     of_code: dict[str, Any] = {"epsg": np.int32(code), "epsg_code": f"EPSG:{code}"} if code else {}
     with suppress(ImportError):
@@ -205,14 +199,19 @@ def _system(frame: Frame | None) -> dict[str, Any]:
             warnings.simplefilter("ignore")  # of what CF has no word for; crs_wkt has it
             of_code = (CRS.from_epsg(code).to_cf() if code else {}) | of_code
     origin = np.array(frame.origin)
-    return {"long_name": frame.crs or "coordinates of the map", **of_code, "origin": origin, "angle": frame.angle}
+    return {
+        "long_name": frame.crs or phrase("coordinates_of", "map"),
+        **of_code,
+        "origin": origin,
+        "angle": frame.angle,
+    }
 
 
 def write_field_table(path: Path, flow: FlowFields, grid: Grid, frame: Frame | None) -> None:
     """One row a cell: x, y, east, north of its centre [m], then the quantities with their units; nothing where dry."""
     x, y = (part.ravel() for part in np.meshgrid(flow.x, flow.y, indexing="ij"))
     found = quantities(flow, grid, frame)
-    heading = [f"{name} [{QUANTITIES_OF_FLOW[name][1]}]" for name in found]
+    heading = [f"{name} [{QUANTITIES_OF_FLOW[name]}]" for name in found]
     columns = [*_places(x, y, grid, frame), *(values.ravel() for values in found.values())]
     _write(path, [*_place_headings(grid, frame), *heading], columns)
 

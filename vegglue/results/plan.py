@@ -22,7 +22,7 @@ from vegglue.errors import InputError, path_from
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL
 from vegglue.results.calibration_files import csv_text
 from vegglue.wording.remedies import MAKE_ROOM
-from vegglue.wording.sentences import lines_of, tagged
+from vegglue.wording.sentences import lines_of, phrase, tagged
 
 
 class Work(Enum):
@@ -448,7 +448,7 @@ def sheets(folder: Path, case: Case, plan: FieldPlan) -> dict[str, str]:
             files[of.file] = {"coordinates": "channel"}
     named = path_from(folder.resolve(), case.source)
     text = yaml_of({OF_CASE: named, "files": files})
-    return {**found, "site.yaml": f"# Fill in the tables beside this file; empty rows are ignored.\n{text}"}
+    return {**found, "site.yaml": f"{phrase('sheet_to_fill_in')}\n{text}"}
 
 
 def _digits(value: float, places: int) -> str:

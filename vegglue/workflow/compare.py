@@ -27,7 +27,8 @@ from vegglue.results.loop_results import (
     write_comparison,
     write_model_score,
 )
-from vegglue.wording.numbers import in_short, in_short_html, so_many
+from vegglue.wording.numbers import in_short, in_short_html
+from vegglue.wording.sentences import phrase
 from vegglue.workflow.case_run import CaseRun, calibrated, case_run, excluded_in
 
 # What the name of a case with a finished result ends with when the built-in engine predicts.
@@ -46,7 +47,7 @@ class Comparison:
     left_out: pd.DataFrame
 
     def __repr__(self) -> str:
-        heading = f"Comparison of {so_many(len(self.model_scores), 'model')}, root mean square errors of velocity [m/s]"
+        heading = phrase("comparison_in_short", len(self.model_scores))
         return in_short(heading, [*map(model_score_in_short, self.model_scores), exclusion_in_words(self.left_out)])
 
     def _repr_html_(self) -> str:

@@ -116,7 +116,6 @@ def export(
         extra_library(library, "field", "vegglue export", "choose --only csv")
     run.watch(Progress(with_compilation(SOLVING_FLOW.format(case.name))))
     flows, predicted, words = flow_to_export(run)
-    words += "" if case.engine is None else ", by the built-in engine"
     if not flows:
         raise InputError(f"{shown_path(case.source)}: no experiment finds a steady flow at {words}; check the case.")
     into, grid, files = folder_within(run.folder, "export"), build_grid(case), list[Path]()
@@ -209,10 +208,12 @@ def flow_to_export(run: CaseRun) -> tuple[dict[str, FlowFields], Array | None, s
     if stored_hash(folder / "posterior.h5") == wanted:
         posterior = read_posterior(folder / "posterior.h5", wanted)
         predicted = posterior.station["value"].to_numpy(float) - posterior.fit.residual
-        return median_flow(sized, posterior), predicted, phrase("flow_of", "posterior", False)
+        return median_flow(sized, posterior), predicted, phrase("flow_of", "posterior", False, case.engine is not None)
     best = kept_best_fit(case, folder)
     z = np.zeros(len(case.parameters)) if best is None else best
     theta = {name: float(value[0]) for name, value in theta_at(case, z[None]).items()}
-    words = phrase("flow_of", "prior" if best is None else "best-fit", (folder / "posterior.h5").exists())
+    words = phrase(
+        "flow_of", "prior" if best is None else "best-fit", (folder / "posterior.h5").exists(), case.engine is not None
+    )
     point = linearise(run.model, z)
     return solve_flow(case, theta), None if point is None else point.prediction, words

@@ -34,7 +34,7 @@ from vegglue.workflow.hidden_effect import BAD_PROBE, Answer, Hidden, measured_t
 def sealed_answer(answer: Answer) -> str:
     """The answer as text that is not read at a glance."""
     packed = base64.b64encode(zlib.compress(json.dumps(asdict(answer)).encode())).decode()
-    return "\n".join(["# Sealed by `vegglue twin`; `vegglue reveal` opens it.", *re.findall(r".{1,76}", packed), ""])
+    return "\n".join([phrase("sealed"), *re.findall(r".{1,76}", packed), ""])
 
 
 def opened_answer(path: Path) -> Answer:
@@ -67,7 +67,7 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
     tree = {
         "extends": path_from(folder.resolve(), case.source),
         "name": name,
-        "title": f"Twin of {case.name}, something may be hidden (synthetic)",
+        "title": phrase("title_of_case", "twin", case.name),
         "observations": [{"kind": kind.name, "file": kind.file, "synthetic": True} for kind in kinds],
         **{key: None for key in ("validation", "reference") if getattr(case, key) is not None},
     }
