@@ -461,10 +461,10 @@ REFUSED = [
     InputError("unknown_experiment", where="adv.csv, row 3", name="mid", elsewhere=False, option=False, **OF_SITE),
     InputError("unknown_experiment", where="adv.csv, row 3", name="", elsewhere=False, option=False, **OF_SITE),
     InputError("unknown_experiment", where="adv.csv", name="flood", elsewhere=True, option=True, **OF_SITE),
-    InputError("no_column_of_experiments", where="adv.csv:", file="adv.csv", known=("low", "high"), alike=()),
+    InputError("no_column_of_experiments", where="adv.csv:", file="adv.csv", known=("low", "high"), alike=[]),
     InputError(
         "no_column_of_experiments", where="adv.csv:", file="adv.csv", known=("low", "high"),
-        alike=("Q", ["small", "large"], True),
+        alike=[("Q", ["small", "large"], True)],
     ),
     InputError("no_measurements", where="brook", files=["velocities.csv", "levels.csv"]),
     InputError(

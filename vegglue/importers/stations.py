@@ -194,13 +194,14 @@ def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str]
         raise written_long
     else:
         file = where.removesuffix(":").rpartition("/")[2]
-        alike = ()  # an unread column of repeated words may hold the experiments by other names
-        for heading, texts in taken.others.items():
-            known = list(dict.fromkeys(text for text in texts if text))
-            if 1 < len(known) < len(texts) and numbers_of(texts) is None:
-                alike = heading, known[:OTHER_NAMES_SHOWN], len(known) > OTHER_NAMES_SHOWN
-                break
-        raise InputError("no_column_of_experiments", where=where, file=file, known=experiments, alike=alike)
+        # An unread column of repeated words may hold the experiments by other names.
+        distinct = {heading: list(dict.fromkeys(filter(None, texts))) for heading, texts in taken.others.items()}
+        alike = [
+            (heading, words[:OTHER_NAMES_SHOWN], len(words) > OTHER_NAMES_SHOWN)
+            for heading, words in distinct.items()
+            if 1 < len(words) < taken.size and numbers_of(taken.others[heading]) is None
+        ]
+        raise InputError("no_column_of_experiments", where=where, file=file, known=experiments, alike=alike[:1])
     sections = [options.section] * taken.size if options.section is not None else taken.texts.get("section")
     if sections is None or "" in sections:
         x, y = taken.numbers["x"], taken.numbers.get("y", np.zeros(taken.size))
