@@ -166,10 +166,10 @@ def results_of_tasks(client: "Client", work: TaskWork, tasks: Iterable[tuple[Any
     Raises what a task raises, and InputError if workers died of it, or the scheduler is gone.
     """
     from distributed import CancelledError, KilledWorker, as_completed
-    from distributed.protocol.pickle import dumps
+    from distributed.protocol.pickle import dumps, loads
 
     # A task that any worker can repeat, and no value that is lost with its holder.
-    shared = client.submit(_unpacked, dumps(work), key=f"shared-{uuid4().hex}")
+    shared = client.submit(loads, dumps(work), key=f"shared-{uuid4().hex}")
     looked, had_workers = monotonic(), False
     waiting, under_way, ends = enumerate(tasks), dict[Any, int](), as_completed(loop=client.loop)
     try:
@@ -220,13 +220,6 @@ def results_of_tasks(client: "Client", work: TaskWork, tasks: Iterable[tuple[Any
             yield under_way.pop(future), result
     finally:
         client.cancel([*under_way, shared])
-
-
-def _unpacked(packed: bytes) -> TaskWork:
-    from distributed.protocol.pickle import loads
-
-    work: TaskWork = loads(packed)
-    return work
 
 
 def _at_work(wanted: Mapping[str, str], work: TaskWork, packed: bytes) -> Any:

@@ -27,7 +27,7 @@ from vegglue.importers.file_options import FileOptions
 from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.library_files import read_by_library, readable_text, reading_structures, refuse_larger
 from vegglue.importers.measured_rows import MeasuredRows, on_the_tape, rows_of_table
-from vegglue.importers.table_parser import Line, ParsedTable, is_number
+from vegglue.importers.table_parser import ParsedTable, is_number
 from vegglue.measurements.plausibility import is_mark_anywhere
 
 ZIP_BEGINS = b"PK\x03\x04"
@@ -157,11 +157,7 @@ def read_gauging(path: Path, options: FileOptions) -> MeasuredRows:
     InputError
         If there is no such table, or `line` is not given.
     """
-    text = readable_text(path)
-    if AQUACALC.search(text):
-        table = _aquacalc_table(path, text)
-    else:
-        table = _flowtracker_table(path, text) if FLOWTRACKER.search(text) else _riversurveyor_table(path, text)
+    table = _table_of_gauging(path, readable_text(path))
     columns = {role: name for role, names in COLUMNS_OF_GAUGINGS.items() for name in names if name in table.headings}
     taken = rows_of_table(path, table, replace(options, columns=columns))
     if not {"tape", "depth", "u"} <= taken.numbers.keys() or not taken.size:
@@ -177,63 +173,53 @@ def read_gauging(path: Path, options: FileOptions) -> MeasuredRows:
     return on_the_tape(path, _wet_verticals(replace(taken, others={}), measured), options)
 
 
-def _flowtracker_table(path: Path, text: str) -> ParsedTable:
-    """The table that begins with `St  Clock`; the line below holds its units."""
-    lines = text.splitlines()
-    head = next((i for i, line in enumerate(lines) if re.match(r"\s*St\s+Clock", line)), len(lines))
-    if head + 1 >= len(lines):
-        raise InputError(
-            f"{shown_path(path)}: expected the table of stations of a FlowTracker, got none; export it anew."
-        )
-    headings = tuple(lines[head].split())
-    units = tuple("" if one in ("()", "(*D)") else one for one in lines[head + 1].split())
-    units = (units + ("",) * len(headings))[: len(headings)]
-    rows = [(number, line.split()) for number, line in enumerate(lines[head + 2 :], head + 3)]
-    return _table(headings, units, rows, "FlowTracker")
+def _table_of_gauging(path: Path, text: str) -> ParsedTable:
+    """The table of verticals, whose units a FlowTracker states below its headings, a RiverSurveyor in the part `Units`,
+    and an AquaCalc by its standard. Its rows begin with a number, or hold half as many as the heading has fields.
+    """
+    unit_of: dict[str, str] = {}
+    if AQUACALC.search(text):
+        program, mark, below = "AquaCalc", re.compile(r'\s*"?VERT"?\s*(,|$)'), 0
+        metric = re.search(r"^\s*Meas\w* standard:\s*,\s*(metric|SI)\b", text, re.MULTILINE | re.IGNORECASE)
+        length, velocity = ("m", "m/s") if metric else ("ft", "ft/s")
+        unit_of = {"DIST": length, "TDPTH": length, "VVEL": velocity}
+    elif FLOWTRACKER.search(text):
+        program, mark, below = "FlowTracker", re.compile(r"\s*St\s+Clock"), 0
+    else:
+        program, mark, below = "RiverSurveyor Stationary", re.compile("Measurement Results"), 1
+        part = re.search(r"^Units\s*$(.*?)^\s*$", text, re.MULTILINE | re.DOTALL)
+        stated = dict(re.findall(r"^(Distance|Velocity);\s*(\S+)", part[1] if part else "", re.MULTILINE))
+        length, velocity = stated.get("Distance", "m"), stated.get("Velocity", "m/s")
+        unit_of = {"Location": length, "Depth": length, "Mean Velocity": velocity}
 
+    def cut(line: str) -> list[str]:
+        if program == "FlowTracker":
+            return line.split()
+        by_commas = program == "AquaCalc"
+        fields = next(csv.reader([line], skipinitialspace=True), []) if by_commas else line.split("\t")
+        return [field.strip() for field in fields]
 
-def _riversurveyor_table(path: Path, text: str) -> ParsedTable:
-    """The table below `Measurement Results`, by tabs; its units stand in the part `Units`."""
     lines = text.splitlines()
-    head = next((i + 1 for i, line in enumerate(lines) if line.startswith("Measurement Results")), len(lines))
+    head = below + next((i for i, line in enumerate(lines) if mark.match(line)), len(lines))
     if head >= len(lines):
         raise InputError(
-            f"{shown_path(path)}: expected `Measurement Results` of a RiverSurveyor, got none; export it anew."
+            f"{shown_path(path)}: expected the table of verticals of a {program}, got none; export it anew."
         )
-    part = re.search(r"^Units\s*$(.*?)^\s*$", text, re.MULTILINE | re.DOTALL)
-    stated = dict(re.findall(r"^(Distance|Velocity);\s*(\S+)", part[1] if part else "", re.MULTILINE))
-    length, velocity = stated.get("Distance", "m"), stated.get("Velocity", "m/s")
-    headings = tuple(field.strip() for field in lines[head].rstrip("\t ").split("\t"))
-    units = tuple({"Location": length, "Depth": length, "Mean Velocity": velocity}.get(one, "") for one in headings)
-    cut = [[field.strip() for field in line.split("\t")][: len(headings)] for line in lines[head + 1 :]]
-    return _table(headings, units, list(enumerate(cut, head + 2)), "RiverSurveyor Stationary")
-
-
-def _aquacalc_table(path: Path, text: str) -> ParsedTable:
-    """The table that begins with VERT; its units are those of the standard, SAE in feet or metric."""
-    lines = list(csv.reader(text.splitlines(), skipinitialspace=True))
-    head = next((i for i, fields in enumerate(lines) if fields and fields[0].strip() == "VERT"), len(lines))
-    if head >= len(lines):
-        raise InputError(f"{shown_path(path)}: expected the table VERT of an AquaCalc, got none; export it anew.")
-    metric = re.search(r"^\s*Meas\w* standard:\s*,\s*(metric|SI)\b", text, re.MULTILINE | re.IGNORECASE)
-    length, velocity = ("m", "m/s") if metric else ("ft", "ft/s")
-    headings = tuple(field.strip() for field in lines[head])
-    units = tuple({"DIST": length, "TDPTH": length, "VVEL": velocity}.get(one, "") for one in headings)
-    rows = [(number, [field.strip() for field in fields]) for number, fields in enumerate(lines[head + 1 :], head + 2)]
-    return _table(headings, units, rows, "AquaCalc")
-
-
-def _table(headings: tuple[str, ...], units: tuple[str, ...], rows: list[Line], form: str) -> ParsedTable:
-    """The rows that begin with a number, or hold half as many as the heading has fields; others end the table."""
+    headings, rest = tuple(cut(lines[head].rstrip("\t "))), [cut(line) for line in lines[head + 1 :]]
+    if program == "FlowTracker" and rest:
+        unit_of = {name: unit for name, unit in zip(headings, rest[0], strict=False) if unit not in ("()", "(*D)")}
+    if program == "RiverSurveyor Stationary":  # its rows end in tabs
+        rest = [fields[: len(headings)] for fields in rest]
     there = [
         (number, fields)
-        for number, fields in rows
+        for number, fields in enumerate(rest, head + 2)
         if fields and (is_number(fields[0]) or 2 * sum(map(is_number, fields)) >= len(headings))
     ]
     kept = [(number, fields) for number, fields in there if len(fields) == len(headings)]
     other = [ImportNote(Noted.OTHER_WIDTH, len(there) - len(kept))] if len(there) > len(kept) else []
     texts, numbers = tuple(fields for _, fields in kept), tuple(number for number, _ in kept)
-    return ParsedTable(headings, units, texts, numbers, decimal_comma=False, form=(form, *other))
+    units = tuple(unit_of.get(name, "") for name in headings)
+    return ParsedTable(headings, units, texts, numbers, decimal_comma=False, form=(program, *other))
 
 
 def _wet_verticals(taken: MeasuredRows, measured: Mask) -> MeasuredRows:

@@ -108,16 +108,12 @@ def _area(geometry: Any, results: Any, vertical: float, horizontal: float) -> di
 
 
 def _last_of(dataset: Any, default: float) -> Array:
-    """The last state of a series [m or m/s], NaN where there is no value; default: see `_unit`."""
-    return without_marks(np.asarray(dataset[-1], dtype=np.float64)) * _unit(dataset, default)
-
-
-def _unit(dataset: Any, default: float) -> float:
-    """The unit [m or m/s] that an attribute of a dataset states: `Units` of 6.x, the quantity's own name in 5.0."""
-    for value in dataset.attrs.values():
-        if isinstance(value, bytes | np.bytes_) and text_of(value).lower() in LENGTHS:
-            return LENGTHS[text_of(value).lower()]
-    return default
+    """The last state of a series [m or m/s], NaN where there is no value, by the unit that an attribute states: `Units`
+    of 6.x, the quantity's own name in 5.0; else by the default.
+    """
+    stated = [text_of(one).lower() for one in dataset.attrs.values() if isinstance(one, bytes | np.bytes_)]
+    unit = next((LENGTHS[one] for one in stated if one in LENGTHS), default)
+    return without_marks(np.asarray(dataset[-1], dtype=np.float64)) * unit
 
 
 def _of_faces(geometry: Any, level: Array, vertical: float, length: Array) -> tuple[Array, Array]:

@@ -158,12 +158,18 @@ def ground_of_result(target: Path, found: SiteOfResult) -> GroundOfResult:
     files: dict[str, str] = {}
     for experiment, one in found.placed.items():
         file = f"flow-{case_name(experiment)}.csv"
-        texts[data_folder(target) / file] = text_of_flow(_near(one.flow, found.grid))
+        flow, (west, east), (south, north) = one.flow, found.grid["x"], found.grid["y"]
+        beside = 2.0 * flow.spacing  # of the flow beyond the grid two spacings are kept
+        near = (
+            (flow.x > west - beside) & (flow.x < east + beside) & (flow.y > south - beside) & (flow.y < north + beside)
+        )
+        kept = TheirFlow(*(part[near] for part in (flow.x, flow.y, flow.bed, flow.depth, flow.u, flow.v)))
+        texts[data_folder(target) / file] = text_of_flow(kept)
         files[experiment] = f"{data_folder(target).name}/{file}"
         taken = f"flow of {one.result.code}" + (f" at {one.result.time}" if one.result.time else "")
-        taken += f": {so_many(len(one.flow.x), 'place')}, {int((one.flow.depth > 0).sum())} wet"
-        flow = {**found.site.experiments, **found.site.holdout}[experiment]
-        taken += f", {in_digits(flow.discharge_m3_s)} m3/s, outlet level {in_digits(flow.downstream_level_m, 4)} m"
+        taken += f": {so_many(len(flow.x), 'place')}, {int((flow.depth > 0).sum())} wet"
+        stated = {**found.site.experiments, **found.site.holdout}[experiment]
+        taken += f", {in_digits(stated.discharge_m3_s)} m3/s, outlet level {in_digits(stated.downstream_level_m, 4)} m"
         notes = [taken, *one.result.notes] + ([words] if experiment == name else [])
         imported.append(record(found.paths[experiment], None, "; ".join(sentences(notes))))
     ground = ground_on_grid(target, found.terrain, found.grid, friction, found.place)
@@ -336,10 +342,3 @@ def _friction(
         words += f", of {len(distinct)} values"
     of_run = {parameter[value]: value for value in groups}
     return friction, priors, of_run, {data_folder(target) / "classes.asc": text}, words
-
-
-def _near(flow: TheirFlow, grid: Tree) -> TheirFlow:
-    """The part of a flow on the grid and two spacings beside it."""
-    (west, east), (south, north), beside = grid["x"], grid["y"], 2.0 * flow.spacing
-    near = (flow.x > west - beside) & (flow.x < east + beside) & (flow.y > south - beside) & (flow.y < north + beside)
-    return TheirFlow(*(one[near] for one in (flow.x, flow.y, flow.bed, flow.depth, flow.u, flow.v)))

@@ -3,11 +3,12 @@
 import difflib
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import InitErrorDetails
 
 from vegglue.case.config import read_tree
 from vegglue.case.messages import dotted, expected_in_words
@@ -48,23 +49,32 @@ def _with_unit(quantity: str) -> Callable[[Any], Any]:
     return converted
 
 
-def _measured(value: float) -> float:
-    if is_mark_anywhere(value):
-        raise ValueError("a measured value, not a mark for none")
-    return value
+def _only(wanted: str, is_right: Callable[[Any], bool]) -> AfterValidator:
+    """The check of a value that is right or not: what is wanted stands in the refusal."""
 
+    def checked(value: Any) -> Any:
+        if not is_right(value):
+            raise ValueError(wanted)
+        return value
 
-def _one_or_more(experiments: dict[str, Any]) -> dict[str, Any]:
-    if not experiments:
-        raise ValueError("one or more, those that were measured")
-    return experiments
+    return AfterValidator(checked)
 
 
 # Bounds far beyond any stream; what lies outside is a slip of the pen or of the unit.
 PrintableName = Annotated[str, AfterValidator(_printable)]
 Length = Annotated[Number, Field(gt=0, le=1e6)]
-Level = Annotated[Number, Field(ge=-1e4, le=1e4), AfterValidator(_measured)]
-MeasuredDischarge = Annotated[Number, Field(gt=0, le=1e6), AfterValidator(_measured)]
+MEASURED = _only("a measured value, not a mark for none", lambda value: not is_mark_anywhere(value))
+Level = Annotated[Number, Field(ge=-1e4, le=1e4), MEASURED]
+MeasuredDischarge = Annotated[Number, Field(gt=0, le=1e6), MEASURED]
+
+
+def _refuse_lacking(given: Mapping[str, Any], *keys: str, part: str = "") -> None:
+    """ValidationError for the first of the keys that is not given, in that part of the site."""
+    for key in keys:
+        if given.get(key) is None:
+            place = (part, key) if part else (key,)
+            problem = InitErrorDetails(type="missing", loc=place, input=given)
+            raise ValidationError.from_exception_data("site", [problem])
 
 
 class _SitePart(BaseModel):
@@ -98,12 +108,6 @@ def _walled(given: Any) -> Any:
     return {"n": given} if isinstance(given, int | float) else given
 
 
-def _of_polygons(columns: dict[str, str]) -> dict[str, str]:
-    if not columns.keys() <= {"stems", "name"}:
-        raise ValueError("the headings of `stems` and `name`, such as `{stems: HEADING}`")
-    return columns
-
-
 class PlantedPatch(_SitePart):
     """A rectangle of plants, or a polygon, in the channel; or a file of polygons."""
 
@@ -112,7 +116,13 @@ class PlantedPatch(_SitePart):
     polygon: Polygon | None = None
     file: PrintableName | None = None
     name: PrintableName | None = None
-    columns: Annotated[dict[str, str], AfterValidator(_of_polygons)] = {}
+    columns: Annotated[
+        dict[str, str],
+        _only(
+            "the headings of `stems` and `name`, such as `{stems: HEADING}`",
+            lambda columns: columns.keys() <= {"stems", "name"},
+        ),
+    ] = {}
     stems_per_m2: Annotated[Number, Field(gt=0, le=1e7)] = 1.0
 
     @model_validator(mode="before")
@@ -120,15 +130,10 @@ class PlantedPatch(_SitePart):
     def _one_shape(cls, given: Any) -> Any:
         """Errors: ValidationError of a rectangle that lacks a side, unless it is another shape."""
         if isinstance(given, dict) and not given.keys() & {"polygon", "file"}:
-            _Rectangle.model_validate(given)
+            _refuse_lacking(given, "x", "y")
         if isinstance(given, dict) and "columns" in given and "file" not in given:
             raise ValueError("a `file` beside `columns`")
         return given
-
-
-class _Rectangle(_SitePart):
-    x: Interval
-    y: Interval
 
 
 class MeasuredFlow(_SitePart):
@@ -229,7 +234,7 @@ class FieldSite(_SitePart):
     result: ResultEntry | None = None
     walls: Annotated[FlumeWalls | None, BeforeValidator(_walled)] = None
     files: dict[PrintableName, dict[str, Any] | None] = {}
-    experiments: Annotated[dict[PrintableName, MeasuredFlow], AfterValidator(_one_or_more)]
+    experiments: Annotated[dict[PrintableName, MeasuredFlow], _only("one or more, those that were measured", bool)]
     holdout: dict[PrintableName, MeasuredFlow] = {}
     patches: Annotated[
         tuple[PlantedPatch, ...], BeforeValidator(lambda given: [given] if isinstance(given, dict) else given)
@@ -252,51 +257,20 @@ class FieldSite(_SitePart):
         """ValidationError for a channel or a frame that lacks what its site needs."""
         if not isinstance(given, dict):
             return given
+        channel, frame, grid = (given.get(key) for key in ("channel", "frame", "grid"))
+        straight = not (isinstance(grid, dict) and grid.get("centreline"))
         if "bed" not in given:
-            _Ground.model_validate(given)
-        straight = not (isinstance(given.get("grid"), dict) and given["grid"].get("centreline"))
-        needed: list[tuple[str, type[BaseModel]]] = [("channel", _Straight), ("frame", _StraightlyPlaced)]
-        needed = (needed if straight else []) + ([] if given.get("walls") else [("channel", _Banked)])
-        for key, model in needed:
-            if isinstance(given.get(key), dict):
-                model.model_validate(given)
+            _refuse_lacking(given, "channel")
+        if isinstance(channel, dict):
+            banked = not given.get("walls")
+            _refuse_lacking(channel, *["length_m"] * straight, *["bank_slope_v_per_h"] * banked, part="channel")
+        if straight and isinstance(frame, dict):
+            _refuse_lacking(frame, "origin", part="frame")
+            if (frame.get("angle") is None) == (frame.get("towards") is None):
+                both = {"error": ValueError(ONE_DIRECTION)}
+                problem = InitErrorDetails(type="value_error", loc=("frame",), input=frame, ctx=both)
+                raise ValidationError.from_exception_data("site", [problem])
         return given
-
-
-class _Ground(_SitePart):
-    channel: Channel
-
-
-class _StraightChannel(_SitePart):
-    length_m: Length
-
-
-class _Straight(_SitePart):
-    channel: _StraightChannel
-
-
-class _ChannelWithBanks(_SitePart):
-    bank_slope_v_per_h: Annotated[Number, Field(ge=0.001, le=100)]
-
-
-class _Banked(_SitePart):
-    channel: _ChannelWithBanks
-
-
-class _WholeFrame(_SitePart):
-    origin: tuple[Number, Number]
-    angle: Any = None
-    towards: Any = None
-
-    @model_validator(mode="after")
-    def _one_direction(self) -> Self:
-        if (self.angle is None) == (self.towards is None):
-            raise ValueError(ONE_DIRECTION)
-        return self
-
-
-class _StraightlyPlaced(_SitePart):
-    frame: _WholeFrame
 
 
 SITE_PARTS: dict[str, type[BaseModel]] = {

@@ -346,7 +346,11 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         parts = _cross_sections(path, points, names)
         line = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
         survey = BedSurvey(np.concatenate(parts), line)
-        return _between_points(_of_sections(parts, taken), survey, lambda left: _of_sections(_without(parts, left), ""))
+
+        def without(left: NDArray[np.int64]) -> Terrain:
+            return _of_sections([part for number, part in enumerate(parts) if number != line[left[0]]], "")
+
+        return _between_points(_of_sections(parts, taken), survey, without)
 
     def triangulated(points: Array) -> Terrain:
         surface = LinearNDInterpolator(points[:, :2], points[:, 2])
@@ -361,12 +365,6 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
     named = np.unique(names, return_inverse=True)[1] if names and all(names) else np.full(len(points), -1)
     survey = BedSurvey(points, named.astype(np.int64))
     return _between_points(terrain, survey, lambda left: triangulated(np.delete(points, left, axis=0)))
-
-
-def _without(parts: list[Array], left: NDArray[np.int64]) -> list[Array]:
-    """Cross-sections without the one whose points stand in these rows of all."""
-    ends = np.cumsum([len(part) for part in parts])
-    return [part for part, end in zip(parts, ends, strict=True) if end <= left[0] or end - len(part) > left[0]]
 
 
 def _between_points(terrain: Terrain, survey: BedSurvey, without: Callable[[NDArray[np.int64]], Terrain]) -> Terrain:
