@@ -46,8 +46,10 @@ from vegglue.effects.library import SHIPPED
 from vegglue.errors import InputError
 from vegglue.importers.import_notes import (
     BanksOfBed,
+    CentrelineTaken,
     ConfluenceAssumptions,
     CountedStems,
+    FlowTaken,
     ImportNote,
     Noted,
     PatchesRead,
@@ -424,6 +426,8 @@ IMPORTED = [
     RepeatsAveraged(12, together=2.2, apart=4.1, worst=(2.0, 0.5)),
     BanksOfBed(0.25, 3.1, 3.0), BanksOfBed(0.25, None, 3.0),
     PatchesRead(2, ("Density",), (), (), ("d_mm",), ()), PatchesRead(1, (), ("x", "y"), (), ("stems",), ("stems",)),
+    CentrelineTaken(52.4, 31.0, 18.2), CentrelineTaken(40.0, 0.0, None),
+    FlowTaken("HEC-RAS", "20JUN2026 12:00:00", 1400, 1210, 4.2, 12.345), FlowTaken("TELEMAC", "", 1, 1, 0.05, 0.2),
     UnitsAssumed(("x", "y"), ("stems",)), ConfluenceAssumptions(0.02, 0.01, 0.001, 0.011, 0.15),
 ]  # fmt: skip
 CSV = Path("adv.csv")

@@ -46,7 +46,14 @@ class Noted(StrEnum):
     COPIES = auto()  # how many rows
     ONE_SHEET = auto()  # that sheet, and the others
     HIDDEN = auto()  # how many rows; the first of them
+    # Of places and directions.
+    FACTOR = auto()  # of velocities [-]
+    REVERSED = auto()  # the axis
+    ZERO_AT = auto()  # x and y [m]
     # Of an instrument.
+    SAMPLES = auto()  # how many; the instrument, and their rate [Hz]
+    SAMPLES_LOST = auto()  # how many
+    CELLS_SOUND = auto()  # how many; of how many
     ADCP_AT = auto()  # its draft [m]; its model
     DECLINATION = auto()  # [degrees]
     DAMAGED = auto()  # how many ensembles
@@ -131,6 +138,27 @@ class UnitsAssumed:
 
     lengths: tuple[str, ...]
     densities: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CentrelineTaken:
+    """A centreline: its length [m], its turn to the left [degrees], and its least radius [m], None if straight."""
+
+    length: float
+    turn: float
+    radius: float | None
+
+
+@dataclass(frozen=True)
+class FlowTaken:
+    """The flow of a finished run: how many places, how many wet, its discharge [m3/s] and outlet level [m]."""
+
+    code: str
+    time: str
+    places: int
+    wet: int
+    discharge: float
+    level: float
 
 
 @dataclass(frozen=True)

@@ -292,7 +292,7 @@ def in_the_channel(taken: MeasuredRows, place: Placement, options: FileOptions) 
     if options.factor is not None:
         roles = [role for role in taken.numbers if ROLES[role].quantity == "velocity"]
         scaled = {role: options.factor * taken.numbers[role] for role in roles}
-        taken = taken.having(scaled, f"velocities times {options.factor:g}")
+        taken = taken.having(scaled, ImportNote(Noted.FACTOR, options.factor))
     numbers = taken.numbers
     known = [roles for roles in (("east_velocity", "north_velocity"), ("u",)) if set(roles) <= numbers.keys()]
     if {"speed", "direction"} <= numbers.keys() and "u" not in numbers and "east_velocity" not in numbers:
@@ -313,12 +313,12 @@ def in_the_channel(taken: MeasuredRows, place: Placement, options: FileOptions) 
     taken = _along_and_across(taken, place, options)
     turned = {"x": ("x", "u"), "y": ("y", "v")}
     flipped = {name: -taken.numbers[name] for axis in options.flip for name in turned[axis] if name in taken.numbers}
-    taken = taken.having(flipped, *(f"{axis} reversed" for axis in options.flip))
+    taken = taken.having(flipped, *(ImportNote(Noted.REVERSED, names=(axis,)) for axis in options.flip))
     if options.zero is None:
         return taken
     x0, y0 = options.zero
     moved = {axis: taken.numbers[axis] + at for axis, at in (("x", x0), ("y", y0)) if axis in taken.numbers}
-    return taken.having(moved, f"zero at x = {x0:g}, y = {y0:g} m")
+    return taken.having(moved, ImportNote(Noted.ZERO_AT, names=(f"{x0:g}", f"{y0:g}")))
 
 
 def _along_and_across(taken: MeasuredRows, place: Placement, options: FileOptions) -> MeasuredRows:

@@ -19,6 +19,7 @@ import numpy as np
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.library_files import numbers_of_variable, open_raw, readable_text, reading_structures
 from vegglue.importers.measured_rows import MeasuredRows
 
@@ -167,10 +168,13 @@ def _record_mean(
     numbers |= {axis: part[trusted].mean(keepdims=True) for axis, part in zip("uvw", velocity.T, strict=True)}
     numbers["u_std"] = velocity[trusted, 0].std(ddof=1, keepdims=True)
     numbers["duration_s"] = np.array([trusted.sum() / rate])
-    note = f"{name}, {len(velocity):,} samples at {rate:g} Hz, {len(velocity) - int(trusted.sum()):,} left out"
+    notes = (
+        ImportNote(Noted.SAMPLES, len(velocity), (name, f"{rate:g}")),
+        ImportNote(Noted.SAMPLES_LOST, len(velocity) - int(trusted.sum())),
+    )
     texts = {"device": [name.partition(",")[0]]}
     columns = {axis: f"velocity {place}" for axis, place in zip("uvw", "xyz", strict=True)}
-    return MeasuredRows(numbers, texts, columns, dict.fromkeys("uvw", "m/s"), (note,), of_probe=True)
+    return MeasuredRows(numbers, texts, columns, dict.fromkeys("uvw", "m/s"), notes, of_probe=True)
 
 
 def _trusted_samples(velocity: Array, correlation: Array) -> Mask:
@@ -225,7 +229,10 @@ def rows_of_profiler(path: Path, parts: dict[str, Any], options: FileOptions) ->
             f"{shown_path(path)}: no cell has a correlation of {LEAST_CORRELATION:g} % in half of its samples; leave "
             "it out."
         )
-    note = f"Vectrino Profiler, {len(velocity):,} samples at {rate:g} Hz, {kept.size} of {away.size} cells"
+    notes = (
+        ImportNote(Noted.SAMPLES, len(velocity), ("Vectrino Profiler", f"{rate:g}")),
+        ImportNote(Noted.CELLS_SOUND, kept.size, (str(away.size),)),
+    )
     away, trusted = away[kept], trusted[:, kept]
     good = np.where(trusted[..., None], velocity[:, kept], np.nan)
     mean = np.nanmean(good, axis=0)
@@ -235,4 +242,4 @@ def rows_of_profiler(path: Path, parts: dict[str, Any], options: FileOptions) ->
     numbers |= {"u_std": np.nanstd(good[..., 0], axis=0, ddof=1), "duration_s": trusted.sum(axis=0) / rate}
     columns = {axis: f"Profiles_Vel{name}" for axis, name in zip("uvw", ("X", "Y", "Z1"), strict=True)}
     device = {"device": ["Vectrino Profiler"] * away.size}
-    return MeasuredRows(numbers, device, columns, dict.fromkeys("uvw", "m/s"), (note,), of_probe=True)
+    return MeasuredRows(numbers, device, columns, dict.fromkeys("uvw", "m/s"), notes, of_probe=True)

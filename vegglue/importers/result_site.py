@@ -23,6 +23,7 @@ from vegglue.case.text_files import case_name
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import MANNING_BED, bed_prior, lognormal_prior
 from vegglue.importers.finished_results import holds_result, read_result
+from vegglue.importers.import_notes import FlowTaken
 from vegglue.importers.measured_files import data_folder, record
 from vegglue.importers.measured_rows import Placement
 from vegglue.importers.model_result import ModelResult
@@ -30,7 +31,7 @@ from vegglue.importers.site_file import FieldSite, ResultEntry, read_keys, read_
 from vegglue.importers.terrain import Ground, Terrain, ascii_grid, grid_of_keys, grid_of_terrain, ground_on_grid
 from vegglue.importers.vector_files import drawn_centreline
 from vegglue.measurements.their_flow import TheirFlow, text_of_flow
-from vegglue.wording.numbers import in_digits, so_many
+from vegglue.wording.numbers import in_digits
 from vegglue.wording.sentences import phrase, sentences
 
 # Name of the experiment of a result if the site file names none.
@@ -166,11 +167,11 @@ def ground_of_result(target: Path, found: SiteOfResult) -> GroundOfResult:
         kept = TheirFlow(*(part[near] for part in (flow.x, flow.y, flow.bed, flow.depth, flow.u, flow.v)))
         texts[data_folder(target) / file] = text_of_flow(kept)
         files[experiment] = f"{data_folder(target).name}/{file}"
-        taken = f"flow of {one.result.code}" + (f" at {one.result.time}" if one.result.time else "")
-        taken += f": {so_many(len(flow.x), 'place')}, {int((flow.depth > 0).sum())} wet"
         stated = {**found.site.experiments, **found.site.holdout}[experiment]
-        taken += f", {in_digits(stated.discharge_m3_s)} m3/s, outlet level {in_digits(stated.downstream_level_m, 4)} m"
-        notes = [taken, *one.result.notes] + ([words] if experiment == name else [])
+        places, wet = len(flow.x), int((flow.depth > 0).sum())
+        boundary = stated.discharge_m3_s, stated.downstream_level_m
+        taken = FlowTaken(one.result.code, one.result.time, places, wet, *boundary)
+        notes = [taken, *one.result.notes, *([words] if experiment == name else [])]
         imported.append(record(found.paths[experiment], None, "; ".join(sentences(notes))))
     ground = ground_on_grid(target, found.terrain, found.grid, friction, found.place)
     ground = Ground(ground.tree, imported, {**ground.texts, **texts}, ground.level)

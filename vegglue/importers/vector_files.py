@@ -23,13 +23,12 @@ from vegglue.importers.column_names import UNITS, names_without_unit, role_of, w
 from vegglue.importers.column_roles import columns_of_table, taken_as_si
 from vegglue.importers.coordinate_systems import StatedSystem, epsg_number, refuse_other_system, system_of_wkt
 from vegglue.importers.file_options import FileOptions, read_file_options
-from vegglue.importers.import_notes import ImportNote, Noted, PatchesRead, UnitsAssumed
+from vegglue.importers.import_notes import CentrelineTaken, ImportNote, Noted, PatchesRead, UnitsAssumed
 from vegglue.importers.library_files import importing, read_by_library, readable_text
 from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, read_rows, rows_of_table
 from vegglue.importers.site_file import FileOfSite
 from vegglue.importers.table_parser import WORKBOOKS, is_number, parse_table
 from vegglue.measurements.plausibility import is_mark_anywhere
-from vegglue.wording.numbers import in_digits
 from vegglue.wording.sentences import sentence, sentences
 
 MAP_FILES = (".geojson", ".json", ".shp")
@@ -458,12 +457,10 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
         return {key: as_lists(one) for key, one in value.items() if one is not None} if is_tree else value
 
     kept = {key: as_lists(value) for key, value in shape.model_dump(exclude_defaults=True, exclude_none=True).items()}
-    turn = np.degrees(line.heading[-1] - line.heading[0])
-    side = "left" if turn > 0.0 else "right"
+    turn = float(np.degrees(line.heading[-1] - line.heading[0]))
     sharpest = float(np.abs(np.gradient(line.heading, line.s)).max())
-    radius = f", radius {in_digits(1.0 / sharpest)} m at least" if sharpest > 0.0 else ""
-    summary = f"centreline of {in_digits(line.s[-1], 4)} m, {abs(turn):.0f} degrees to the {side}{radius}: {how}"
-    return DrawnCentreline(kept, line, columns, units, summary)
+    shown = CentrelineTaken(float(line.s[-1]), turn, 1.0 / sharpest if sharpest > 0.0 else None)
+    return DrawnCentreline(kept, line, columns, units, f"{sentence(shown)}: {how}")
 
 
 def read_line(path: Path, frame: Frame | None = None) -> MeasuredRows:

@@ -6,6 +6,7 @@ Both are an extra. Files are read whole and closed, so that a command may write 
 import re
 from collections.abc import Mapping
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -71,15 +72,8 @@ def as_tree(parts: "Mapping[str, xarray.Dataset]") -> "xarray.DataTree":
     Each variable has a `long_name`, `units` that UDUNITS reads, and a `standard_name` if CF has one. A unit that CF
     does not know, or that differs between stations, stands in its `comment`.
     """
-    groups = {name: _with_cf_names(part) for name, part in parts.items()}
-    tree = extra_library("xarray").DataTree.from_dict(groups)
-    tree.attrs["Conventions"] = CF_CONVENTIONS
-    return tree
-
-
-def _with_cf_names(part: "xarray.Dataset") -> "xarray.Dataset":
-    named = part.copy()
-    for name, variable in named.variables.items():
+    groups = {name: part.copy() for name, part in parts.items()}
+    for name, variable in chain.from_iterable(part.variables.items() for part in groups.values()):
         attributes = dict(variable.attrs)
         unit = str(attributes.pop("units", ""))
         if " for " in unit or unit.startswith("that of") or "^(" in unit:
@@ -96,7 +90,9 @@ def _with_cf_names(part: "xarray.Dataset") -> "xarray.Dataset":
                 "flag_meanings": " ".join(re.sub(r"\W+", "_", words) for words in STATUS_WORDS.values()),
             }
         variable.attrs = attributes
-    return named
+    tree = extra_library("xarray").DataTree.from_dict(groups)
+    tree.attrs["Conventions"] = CF_CONVENTIONS
+    return tree
 
 
 def extra_library(name: str, extra: str = "arviz", asking: str = "vegglue.load", instead: str = "") -> Any:
