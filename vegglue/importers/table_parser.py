@@ -71,19 +71,19 @@ def is_number(text: str) -> bool:
 
 
 def number_in(text: str, decimal_comma: bool) -> float | None:
-    """A field as a number; None for a mark of no value. Errors: ValueError, with what to do."""
+    """A field as a number; None for a mark of no value. Errors: ValueError, `comma` or `point` if that is wanted."""
     plain = text.strip().translate(DASHES)
     if plain.lower() in MISSING_WORDS or OF_FORMULA.fullmatch(plain):
         return None
     sign = "," if decimal_comma else "."
     if (written := _decimal_sign(plain)) and written != sign:
-        raise ValueError(f"write it with a decimal {'comma' if decimal_comma else 'point'}, as most numbers here")
+        raise ValueError("comma" if decimal_comma else "point")
     if GROUPED.fullmatch(plain):
         plain = re.sub(rf"[^-+\d{sign}]", "", plain)
     try:
         return float(re.sub("[dD]", "e", plain.replace(",", ".")))
     except ValueError:
-        raise ValueError("mend or remove the row") from None
+        raise ValueError("no number") from None
 
 
 def has_decimal_comma(fields: Iterable[str]) -> bool:
@@ -131,14 +131,8 @@ class ParsedTable:
             try:
                 number = number_in(text, self.decimal_comma)
             except ValueError as error:
-                raise InputError(
-                    "no_number",
-                    file=path,
-                    row=self.row_numbers[i],
-                    column=self.headings[column],
-                    got=text,
-                    why=str(error),
-                ) from None
+                row, heading = self.row_numbers[i], self.headings[column]
+                raise InputError("no_number", file=path, row=row, column=heading, got=text, why=str(error)) from None
             values[i] = np.nan if number is None else number
         return values
 
@@ -263,15 +257,8 @@ def _table(
     for number, fields in rows if named else lines[begin:]:
         # A comma may be that of a number, wherever it stands; elsewhere words behind the last column are a remark.
         if len(fields) > room and (separator == "," or any(map(is_number, fields[room:]))):
-            raise InputError(
-                "other_width",
-                file=path,
-                row=number,
-                fields=room,
-                got=len(fields),
-                headed=named,
-                commas=separator == ",",
-            )
+            form_of_row = {"fields": room, "got": len(fields), "headed": named, "commas": separator == ","}
+            raise InputError("other_width", file=path, row=number, **form_of_row)
     width = max(width, min(room, max(len(fields) for _, fields in rows)))
 
     def padded(fields: list[str]) -> list[str]:

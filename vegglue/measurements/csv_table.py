@@ -67,7 +67,7 @@ def read_table(
         text = raw[column].str.strip()
         value = found[column] = pd.to_numeric(text, errors="coerce").astype(float)
         wrong = ~np.isfinite(value) & ~((text == "") & (column in gaps))
-        refuse_rows(path, wrong, "no_number", raw[column])
+        refuse_rows(path, wrong, "no_number", raw[column], why="no number")
     return pd.DataFrame(found)
 
 
