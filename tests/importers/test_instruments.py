@@ -195,7 +195,7 @@ def test_a_binary_record_of_a_vector_is_its_mean_without_spikes(tmp_path: Path) 
         ("duration_s", 940 / 32, 0.3),
     ):
         assert taken.numbers[role][0] == pytest.approx(value, abs=off), role
-    assert "20 left out" in taken.notes[0]
+    assert taken.notes[1] == ImportNote(Noted.SAMPLES_LOST, 20)
     assert taken.texts["device"] == ["Vector"]
     refused(path, FileOptions())
 
@@ -329,7 +329,7 @@ def test_a_profile_is_the_mean_of_each_cell_that_is_strong(tmp_path: Path, beams
     profiler_mat(path, MEANS, beams)
     taken = read_matlab(path, FileOptions(position=(2.0, 0.3, 0.15)))
     assert taken.size == 30
-    assert "30 of 31 cells" in taken.notes[0]
+    assert taken.notes[1] == ImportNote(Noted.CELLS_SOUND, 30, ("31",))
     assert taken.numbers["z"] == pytest.approx(0.15 - 0.04 - 0.001 * np.arange(30))
     assert taken.numbers["u"] == pytest.approx(MEANS[:30], abs=0.005)
     assert taken.numbers["v"] == pytest.approx(0.0, abs=0.005)
