@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
-from pydantic_core import InitErrorDetails
 
 from vegglue.case.config import read_tree
 from vegglue.case.messages import dotted, expected_in_words
@@ -63,9 +62,9 @@ def _only(wanted: str, is_right: Callable[[Any], bool]) -> AfterValidator:
 # Bounds far beyond any stream; what lies outside is a slip of the pen or of the unit.
 PrintableName = Annotated[str, AfterValidator(_printable)]
 Length = Annotated[Number, Field(gt=0, le=1e6)]
-MEASURED = _only("a measured value, not a mark for none", lambda value: not is_mark_anywhere(value))
-Level = Annotated[Number, Field(ge=-1e4, le=1e4), MEASURED]
-MeasuredDischarge = Annotated[Number, Field(gt=0, le=1e6), MEASURED]
+UNMARKED = _only("a measured value, not a mark for none", lambda value: not is_mark_anywhere(value))
+Level = Annotated[Number, Field(ge=-1e4, le=1e4), UNMARKED]
+MeasuredDischarge = Annotated[Number, Field(gt=0, le=1e6), UNMARKED]
 
 
 def _refuse_lacking(given: Mapping[str, Any], *keys: str, part: str = "") -> None:
@@ -73,8 +72,7 @@ def _refuse_lacking(given: Mapping[str, Any], *keys: str, part: str = "") -> Non
     for key in keys:
         if given.get(key) is None:
             place = (part, key) if part else (key,)
-            problem = InitErrorDetails(type="missing", loc=place, input=given)
-            raise ValidationError.from_exception_data("site", [problem])
+            raise ValidationError.from_exception_data("site", [{"type": "missing", "loc": place, "input": given}])
 
 
 class _SitePart(BaseModel):
@@ -263,13 +261,15 @@ class FieldSite(_SitePart):
             _refuse_lacking(given, "channel")
         if isinstance(channel, dict):
             banked = not given.get("walls")
-            _refuse_lacking(channel, *["length_m"] * straight, *["bank_slope_v_per_h"] * banked, part="channel")
+            needed = ["bottom_width_m", *["length_m"] * straight, *["bank_slope_v_per_h"] * banked]
+            _refuse_lacking(channel, *needed, part="channel")
         if straight and isinstance(frame, dict):
             _refuse_lacking(frame, "origin", part="frame")
             if (frame.get("angle") is None) == (frame.get("towards") is None):
                 both = {"error": ValueError(ONE_DIRECTION)}
-                problem = InitErrorDetails(type="value_error", loc=("frame",), input=frame, ctx=both)
-                raise ValidationError.from_exception_data("site", [problem])
+                raise ValidationError.from_exception_data(
+                    "site", [{"type": "value_error", "loc": ("frame",), "input": frame, "ctx": both}]
+                )
         return given
 
 
