@@ -11,6 +11,7 @@ appended to data/plan/SITE-SOLVER.jsonl, and a set that is there is not made aga
 """
 
 import argparse
+import itertools
 import json
 import time
 from collections.abc import Callable, Mapping
@@ -35,17 +36,15 @@ from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import hypotheses_of
 from vegglue.diagnosis.diagnose import _best_branch, _with_alarm
-from vegglue.diagnosis.plan import plan_measurements
-from vegglue.diagnosis.plan_model import planned_pieces
+from vegglue.diagnosis.plan import _effects, needed_evidence, plan_measurements, shown_by
+from vegglue.diagnosis.plan_model import place_along, plan_model, planned_pieces, possible_pieces, with_chosen
+from vegglue.diagnosis.plan_search import plan_search
 from vegglue.diagnosis.search_state import SearchState, Undecided
-from vegglue.effects.definition import Effect
-from vegglue.effects.identity import EffectIdentity
-from vegglue.effects.library import library
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.plain_json import plain
 from vegglue.progress import silent
-from vegglue.results.plan import FieldPlan, PlannedEffect, hours_of
+from vegglue.results.plan import EffectsInGeneral, FieldPlan, PlannedEffect, PlannedPiece, Work, hours_of
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.hidden_effect import candidate_of, measured_twin, true_place, twin_base
 
@@ -163,11 +162,6 @@ def first_step(model: Model) -> SearchState:
     return replace(found, undecided=branch) if isinstance(branch, Undecided) else branch.found
 
 
-def listed(case: Case, name: str) -> Effect:
-    """The effect of the library that acts under a name."""
-    return library(case.effect_file)[EffectIdentity.parse(name).name]
-
-
 def share(found: list[bool]) -> str:
     """A share with its 95 % interval (Clopper and Pearson)."""
     count, number = sum(found), len(found)
@@ -190,60 +184,71 @@ def figures(records: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def counted(case: Case, plan: FieldPlan) -> tuple[int, int]:
-    """Effects of the case, of experiments and of patches that are testable, and all; those of sections are left out,
-    as each section brings its own.
-    """
-    kept = [one for one in plan.effects if listed(case, one.name).each not in ("section", "device")]
-    return sum(one.testable for one in kept), len(kept)
+Place = tuple[Work, str, float, tuple[float, ...]]
 
 
-def made_by_hand(case: Case, hours: float, beside_plants: bool) -> list[Planned]:
-    """Transects equally spaced along the reach, or all beside the plants, with a gauge at each, in one flow and more:
-    as many as fit the hours.
+def place_of(piece: PlannedPiece) -> Place:
+    return piece.work, piece.experiment, piece.x, piece.y
+
+
+def made_by_hand(case: Case, model: Model, spacing: float, hours: float) -> dict[str, list[PlannedPiece]]:
+    """Transects equally spaced along the reach, or in the middle of the patches, with a gauge at each, in the highest
+    flow, the two highest and so on: all that fit the hours.
     """
-    site = CaseRun(case).model
     low, high = case.grid.x
     ends = [corners_of(case, patch)[:, 0] for patch in case.plants.patches]
     middles = [0.5 * (one.min() + one.max()) for one in ends]
-    found, names = [], list(case.experiments)
-    for flows in range(1, len(names) + 1):
-        best = None
-        for count in range(1, 30):
-            if beside_plants and count > len(middles):
-                break
-            x = np.round(middles[:count] if beside_plants else np.linspace(low, high, count + 2)[1:-1], 1)
-            transects = tuple(
-                PlannedTransect(x=float(one), spacing=0.5, experiments=tuple(names[-flows:])) for one in x
-            )
-            gauges = tuple(PlannedGauge(x=float(one), experiments=tuple(names[-flows:])) for one in x)
-            planned = Planned(hours=hours, transects=transects, gauges=gauges)
-            pieces = planned_pieces(site, planned)
-            if hours_of(pieces, planned.costs.discharge) > hours:
-                break
-            best = planned
-        if best is not None:
-            found.append(best)
+    found, names = {}, list(case.experiments)
+    for flows, count in itertools.product(range(1, len(names) + 1), range(1, 30)):
+        for beside in (False, True)[: 1 + (count <= len(middles))]:
+            where = middles[:count] if beside else np.linspace(low, high, count + 2)[1:-1]
+            x, experiments = [place_along(case, float(one)) for one in where], tuple(names[-flows:])
+            transects = tuple(PlannedTransect(x=one, spacing=spacing, experiments=experiments) for one in x)
+            gauges = tuple(PlannedGauge(x=one, experiments=experiments) for one in x)
+            pieces = planned_pieces(model, Planned(transects=transects, gauges=gauges))
+            if hours_of(pieces, Planned().costs.discharge) <= hours:
+                name = f"{'at patches' if beside else 'equally spaced'}, {count} transects in {flows} flows"
+                found[name] = pieces
     return found
 
 
 def compare(config: Path, hours: float) -> None:
-    """Print a plan proposed for some hours against plans made by hand, in one flow and in more."""
-    case = vegglue.load_case(config).model_copy(update={"observations": (), "planned": Planned(hours=hours)})
-    began = time.process_time()
-    plan = plan_measurements(CaseRun(case).model)
-    seconds = time.process_time() - began
-    print(f"proposed: {counted(case, plan)} testable in {plan.hours:.1f} h ({seconds:.1f} s of CPU)", flush=True)
-    for beside in (False, True):
-        shown = []
-        for planned in made_by_hand(case, hours, beside):
-            with_plan = case.model_copy(update={"planned": planned})
-            plan = plan_measurements(CaseRun(with_plan).model)
-            flows = len({one.experiment for one in plan.pieces})
-            shown.append(
-                f"{counted(case, plan)} with {len(planned.transects)} transects in {flows} flows, {plan.hours:.1f} h"
-            )
-        print(f"{'beside the plants' if beside else 'equally spaced'}: {'; '.join(shown)}", flush=True)
+    """Print plans made by hand that fit some hours, with as dense verticals as the proposed ones, and what is proposed
+    for the hours of the best of them and for 0.7 of these: testable effects, without those of sections and devices.
+    """
+    planned = Planned(hours=hours)
+    case = vegglue.load_case(config).model_copy(update={"observations": (), "planned": planned})
+    model = CaseRun(case).model
+    at_hand = model.station.iloc[:0]
+    possible = possible_pieces(model, planned, at_hand, [])
+    across = max((one.y for one in possible if one.work is Work.TRANSECT), key=len)
+    by_hand = made_by_hand(case, model, float(np.diff(across).min()), hours)
+    there = {place_of(one) for one in possible}
+    further = {place_of(one): replace(one, new=True) for pieces in by_hand.values() for one in pieces}
+    # As of a flow that cannot be ordered: the search does not take them.
+    others = [one for place, one in further.items() if place not in there]
+    wide = plan_model(model, planned, at_hand, [], [*possible, *others])
+    index = {place_of(one): j for j, one in enumerate(wide.pieces)}
+    general = [one.name for one in wide.candidates if not (one.sections or one.devices)]
+
+    def counted(chosen: list[int]) -> tuple[int, float]:
+        chosen_ones = with_chosen(wide, chosen)
+        effects = [one for one in _effects(chosen_ones, shown_by(chosen_ones)) if one.name in general]
+        return sum(one.testable for one in effects), hours_of([wide.pieces[j] for j in chosen], planned.costs.discharge)
+
+    best = (0, 0.0)
+    for name, pieces in by_hand.items():
+        found = counted([index[place_of(one)] for one in pieces])
+        best = max(best, found, key=lambda one: (one[0], -one[1]))
+        print(f"{name}: {found[0]} of {len(general)} testable in {found[1]:.1f} h", flush=True)
+    search = plan_search(wide, EffectsInGeneral(len(general)), planned, needed_evidence(), frozenset(),
+                         np.zeros(len(wide.candidates)))  # fmt: skip
+    for budget in (best[1], 0.7 * best[1]):
+        began = time.process_time()
+        chosen = search.best_set(budget)
+        seconds = time.process_time() - began
+        number, spent = counted(chosen)
+        print(f"proposed: {number} testable in {spent:.1f} h ({seconds:.1f} s of CPU for the search)", flush=True)
 
 
 def main() -> None:
@@ -256,7 +261,9 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=ROOT / "data/plan")
     parser.add_argument("--runs", type=Path, default=ROOT / "runs/plan")
     parser.add_argument("--figures", action="store_true")
-    parser.add_argument("--compare", type=float, help="hours: compare a proposed plan with plans made by hand instead")
+    parser.add_argument(
+        "--compare", type=float, help="hours: compare a config's proposed plans with plans made by hand instead"
+    )
     given = parser.parse_args()
     began = time.monotonic()
     if given.compare is not None:
