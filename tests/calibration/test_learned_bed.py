@@ -10,7 +10,7 @@ from surveyed_twin import OF_BED, surveyed_twin
 
 from vegglue.calibration.baseline import Baseline, baseline, model_that_errs, with_error_there
 from vegglue.calibration.fit import at_point
-from vegglue.calibration.learned_bed import bed_of_spots, learned_bed
+from vegglue.calibration.learned_bed import LearnedBed, bed_of_spots, learned_bed
 from vegglue.calibration.model_error import cell_responses, model_error_columns
 from vegglue.calibration.noise import noise_of, with_model_error
 from vegglue.case.bed import read_bed_survey, read_raster
@@ -112,6 +112,22 @@ def test_a_spot_is_off_by_the_mean_over_it_with_its_error_and_evidence(surveyed:
     assert there.log_factor[0] == pytest.approx(0.5 * ratio**2 - np.log(there.before[0] / there.error[0]))
     assert there.log_factor[0] > elsewhere.log_factor[0]
     assert there.mean[0] < 0.0
+
+
+def test_spots_some_at_a_time_are_those_of_all_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    grid, random = coarse_twin()[0].site.grid, np.random.default_rng(5)
+    learned = LearnedBed(
+        grid,
+        correction=random.standard_normal((grid.x.size, grid.y.size)),
+        columns=random.standard_normal((grid.x.size * grid.y.size, 7)),
+        before=random.standard_normal((grid.x.size * grid.y.size, 7)),
+    )
+    x, y = random.uniform(grid.x[0], grid.x[-1], 23), random.uniform(grid.y[0], grid.y[-1], 23)
+    whole = bed_of_spots(learned, x, y, 3.0 + 0.0 * x, 1.0 + 0.0 * y)
+    monkeypatch.setattr("vegglue.calibration.learned_bed.MOST_WEIGHTS", 4 * grid.x.size * grid.y.size)
+    parts = bed_of_spots(learned, x, y, 3.0 + 0.0 * x, 1.0 + 0.0 * y)
+    for name in ("mean", "error", "before", "columns"):
+        assert getattr(parts, name) == pytest.approx(getattr(whole, name), rel=1e-10, abs=1e-12)
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.12])

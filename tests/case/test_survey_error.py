@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vegglue.arrays import Array
+from vegglue.case import survey_error
 from vegglue.case.bed import read_bed_survey
 from vegglue.case.site_schema import CovarianceOfBed
 from vegglue.case.survey_error import (
@@ -98,6 +99,26 @@ def test_several_covariances_average_and_hold_how_far_their_means_lie_apart() ->
     # Other levels that are taken for the bed are wrong by their distance from the mean, too.
     used = conditional(survey, BOTH, MIDDLE, mean + 0.05)
     assert (used.columns**2).sum() == pytest.approx(variance.sum() + 0.05**2 * len(MIDDLE), rel=0.02)
+
+
+def test_of_many_places_every_nth_decides_on_the_columns_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The whole covariance, but for LEFT_OUT, with columns chosen among a quarter of the places, in parts."""
+    survey, _ = drawn(12.0, SMOOTH, seed=3)
+    places = np.array([[x, y] for x in np.arange(24.0, 36.0, 0.5) for y in np.arange(-5.0, 5.1, 0.25)])
+    used = mean_level(survey, BOTH, places) + 0.02 * np.sin(places[:, 0])
+    monkeypatch.setattr(survey_error, "LEFT_OUT", 1e-7)
+    dense = conditional(survey, BOTH, places, used)
+    monkeypatch.setattr(survey_error, "LEFT_OUT", 0.01)
+    monkeypatch.setattr(survey_error, "PLACES_FOLLOWED", len(places) // 4)
+    monkeypatch.setattr(survey_error, "PLACES_AT_A_TIME", 100)
+    found = conditional(survey, BOTH, places, used)
+    assert found.mean == pytest.approx(dense.mean, abs=1e-12)
+    whole = dense.columns @ dense.columns.T
+    left = whole - found.columns @ found.columns.T
+    assert found.columns.shape[1] < 0.5 * dense.columns.shape[1]
+    assert 0.0 <= np.trace(left) <= 0.02 * np.trace(whole)
+    assert np.linalg.eigvalsh(left).min() >= -1e-5 * np.trace(whole)
+    assert np.abs(left).max() < 0.1 * np.diag(whole).max()
 
 
 @pytest.mark.parametrize("one", [SMOOTH, ROUGH])

@@ -29,6 +29,8 @@ from vegglue.decision_constants import constants
 
 # Below it a standard error counts as this [m]: far less than any bed is known to.
 LEAST_KNOWN = 1e-9
+# Spots times cells whose weights are computed at a time.
+MOST_WEIGHTS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -73,9 +75,12 @@ def bed_of_spots(learned: LearnedBed, x: Array, y: Array, length: Array, width: 
         np.exp(-(((cells[None] - middles[:, None]) / radius[:, None]) ** 2))
         for cells, middles, radius in ((grid.x, x, length), (grid.y, y, width))
     )
-    weight = (along[:, :, None] * across[:, None, :]).reshape(x.size, -1)
-    weight /= weight.sum(axis=1, keepdims=True)
-    mean, columns, before = (weight @ part for part in (learned.correction.ravel(), learned.columns, learned.before))
+    mean, columns, before = np.empty(x.size), *np.empty((2, x.size, learned.columns.shape[1]))
+    for some in np.array_split(np.arange(x.size), x.size * learned.correction.size // MOST_WEIGHTS + 1):
+        weight = (along[some, :, None] * across[some, None, :]).reshape(some.size, -1)
+        weight /= weight.sum(axis=1, keepdims=True)
+        mean[some] = weight @ learned.correction.ravel()
+        columns[some], before[some] = weight @ learned.columns, weight @ learned.before
     error = np.hypot(np.linalg.norm(columns, axis=1), constants().fingerprint_error * mean)
     return BedOfSpots(mean, error, np.linalg.norm(before, axis=1), columns)
 
@@ -98,7 +103,7 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
     amounts = white.T @ residual
     seen = project(slope, residual, where.point.z, white).fingerprints  # seen' seen = F' (C + J J')^-1 F
     values, vectors = np.linalg.eigh(np.eye(columns.shape[1]) - seen.T @ seen)
-    left = columns @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    left = columns @ (vectors * np.sqrt(np.maximum(values, 0.0))).astype(columns.dtype)
     return LearnedBed(grid, (columns @ amounts).reshape(grid.x.size, grid.y.size), left, columns)
 
 

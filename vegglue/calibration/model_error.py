@@ -213,7 +213,7 @@ def survey_error_columns(model: Model, cells: CellResponses) -> Array:
     for name, rows in [("", np.concatenate([*shared, np.zeros(0, int)])), *with_own.items()]:
         error = bed_error_columns(case, grid, name)
         found = np.zeros((len(model.station), error.shape[1]))
-        found[rows] = cells.of["bed"][rows].reshape(len(rows), -1) @ error.astype(cells.of["bed"].dtype)
+        found[rows] = cells.of["bed"][rows].reshape(len(rows), -1) @ error.astype(cells.of["bed"].dtype, copy=False)
         parts.append(found)
     return np.hstack(parts)
 

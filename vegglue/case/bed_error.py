@@ -53,7 +53,7 @@ class SurveyedLayer:
 
     def in_cells(self, values: Array) -> Array:
         """Values of the cells that have its levels (cells, k) among all (nx ny, k), zero in others."""
-        found = np.zeros((self.level.size, values.shape[1]))
+        found = np.zeros((self.level.size, values.shape[1]), values.dtype)
         found[self.there] = values
         return found
 
@@ -68,7 +68,8 @@ def bed_error_columns(case: Case, grid: Grid, experiment: str = "") -> Array:
         return one.in_cells(conditional(one.read, one.covariances, places, used).columns)
 
     layers = [one for one in _surveyed_layers(case, grid, experiment) if one.there.any()]
-    return np.hstack([np.zeros((grid.x.size * grid.y.size, 0)), *(_once(of_layer, one, grid) for one in layers)])
+    found = [_once(of_layer, one, grid) for one in layers]
+    return found[0] if len(found) == 1 else np.hstack([np.zeros((grid.x.size * grid.y.size, 0)), *found])
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,8 @@ LEFT_OUT, MOST_OF_SQUARE_ROOT = 0.01, 400
 PLACES_AT_ONCE = 16
 # Places whose correlations and mean are computed at a time.
 PLACES_AT_A_TIME = 5000
+# Places among which those of the square root are chosen: chosen. Cells of a wide grid lie closer than a bed varies.
+PLACES_FOLLOWED = 15_000
 
 
 @dataclass(frozen=True)
@@ -313,56 +315,88 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
+@dataclass(frozen=True)
+class _Seen:
+    """What a survey says at places (m, 2) [m]: the mean (m,) [m], by how much the mean of each covariance is off it,
+    weighed, and whitened covariances with its points and with its mean section, for each covariance.
+    """
+
+    places: Array
+    mean: Array
+    apart: Array
+    parts: list[tuple[Array, Array]]
+
+    def some(self, of: NDArray[np.int64]) -> "_Seen":
+        parts = [(near[:, of], of_mean[:, of]) for near, of_mean in self.parts]
+        return _Seen(self.places[of], self.mean[of], self.apart[:, of], parts)
+
+
 def conditional(
     survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array, used: Array | None = None
 ) -> Conditional:
     """The bed at places (m, 2) [m], given a survey. used: levels (m,) [m] that are taken for the bed instead of the
-    mean; then B B' holds their distance from it, too.
+    mean; then B B' holds their distance from it, too. Of more than PLACES_FOLLOWED places every n-th decides how many
+    columns B has: LEFT_OUT is then the share at these.
     """
-    points, basis, there, z = survey.points, survey.basis(survey.points), survey.basis(places), survey.points[:, 2]
-    means, parts = [], []
+    points, basis, z = survey.points, survey.basis(survey.points), survey.points[:, 2]
+    chance, of_survey = np.array([one.chance for one in covariances]), []
     for one in covariances:
         lower = cholesky(_of_readings(survey, one), lower=True)
-        near = solve_triangular(lower, one.sd**2 * _between(points, places, one), lower=True)
         white = solve_triangular(lower, np.column_stack([basis, z]), lower=True)
         shape = cholesky(white[:, :-1].T @ white[:, :-1], lower=True)
-        beta = cho_solve((shape, True), white[:, :-1].T @ white[:, -1])
-        of_mean = solve_triangular(shape, there.T - white[:, :-1].T @ near, lower=True)
-        means.append(there @ beta + near.T @ (white[:, -1] - white[:, :-1] @ beta))
-        parts.append((near, of_mean))
-    chance = np.array([one.chance for one in covariances])
-    mean = chance @ np.array(means)
-    apart = np.sqrt(chance)[:, None] * (np.array(means) - mean)
-    if used is not None:
-        apart, mean = np.vstack([apart, used - mean]), used
-    variance = (apart**2).sum(axis=0)
-    for one, (near, of_mean) in zip(covariances, parts, strict=True):
-        variance += one.chance * (one.sd**2 - (near**2).sum(axis=0) + (of_mean**2).sum(axis=0))
+        of_survey.append((one, lower, white, shape, cho_solve((shape, True), white[:, :-1].T @ white[:, -1])))
 
-    def covariance(of: NDArray[np.int64]) -> Array:
-        """Of all places with some, (m, count) [m2]."""
-        found = apart.T @ apart[:, of]
-        for one, (near, of_mean) in zip(covariances, parts, strict=True):
-            kernel = one.sd**2 * _between(places, places[of], one)
-            found += one.chance * (kernel - near.T @ near[:, of] + of_mean.T @ of_mean[:, of])
+    def seen(some: NDArray[np.int64]) -> _Seen:
+        there, means, parts = survey.basis(places[some]), [], []
+        for one, lower, white, shape, beta in of_survey:
+            near = solve_triangular(lower, one.sd**2 * _between(points, places[some], one), lower=True)
+            of_mean = solve_triangular(shape, there.T - white[:, :-1].T @ near, lower=True)
+            means.append(there @ beta + near.T @ (white[:, -1] - white[:, :-1] @ beta))
+            parts.append((near, of_mean))
+        mean = chance @ np.array(means)
+        apart = np.sqrt(chance)[:, None] * (np.array(means) - mean)
+        if used is not None:
+            apart, mean = np.vstack([apart, used[some] - mean]), used[some]
+        return _Seen(places[some], mean, apart, parts)
+
+    def covariance(of: _Seen, others: _Seen) -> Array:
+        """(m, count) [m2]."""
+        found = of.apart.T @ others.apart
+        for one, (near, of_mean), (its_near, its_mean) in zip(covariances, of.parts, others.parts, strict=True):
+            kernel = one.sd**2 * _between(of.places, others.places, one)
+            found += one.chance * (kernel - near.T @ its_near + of_mean.T @ its_mean)
         return np.asarray(found)
 
     # Cholesky's square root B by the largest variance left, of several places apart at once: their columns are one
     # product of matrices, which takes a tenth of the time of one by one.
+    followed = np.arange(0, len(places), max(-(-len(places) // PLACES_FOLLOWED), 1))
+    at_followed = seen(followed)
+    left = (at_followed.apart**2).sum(axis=0)
+    for one, (near, of_mean) in zip(covariances, at_followed.parts, strict=True):
+        left += one.chance * (one.sd**2 - (near**2).sum(axis=0) + (of_mean**2).sum(axis=0))
     nearest = 0.5 * min(one.along for one in covariances), 0.5 * min(one.across for one in covariances)
-    left, columns = np.maximum(variance, 0.0), np.zeros((min(MOST_OF_SQUARE_ROOT, len(places)), len(places)))
-    enough, rank = LEFT_OUT * left.sum(), 0
-    while rank < len(columns) and left.sum() > enough:
-        open_, of = left.copy(), list[int]()
+    left, columns = np.maximum(left, 0.0), np.zeros((min(MOST_OF_SQUARE_ROOT, followed.size), followed.size))
+    enough, chosen = LEFT_OUT * left.sum(), list[int]()
+    while len(chosen) < len(columns) and left.sum() > enough:
+        open_, of, rank = left.copy(), list[int](), len(chosen)
         while len(of) < min(PLACES_AT_ONCE, len(columns) - rank) and open_.max() > 0.5 * left.max():
             of.append(int(open_.argmax()))
-            open_[(np.abs(places[:, :2] - places[of[-1], :2]) < nearest).all(axis=1)] = 0.0
-        rest = covariance(np.array(of)) - columns[:rank].T @ columns[:rank, of]
+            open_[(np.abs(at_followed.places[:, :2] - at_followed.places[of[-1], :2]) < nearest).all(axis=1)] = 0.0
+        rest = covariance(at_followed, at_followed.some(np.array(of))) - columns[:rank].T @ columns[:rank, of]
         lower = cholesky(rest[of], lower=True)
         columns[rank : rank + len(of)] = solve_triangular(lower, rest.T, lower=True)
         left = np.maximum(left - (columns[rank : rank + len(of)] ** 2).sum(axis=0), 0.0)
-        rank += len(of)
-    return Conditional(mean, columns[:rank].T)
+        chosen += of
+    if followed.size == len(places):
+        return Conditional(at_followed.mean, columns[: len(chosen)].T)
+    # The rows of B at the chosen places are Cholesky's L of their covariance: at all places B = C L^-T.
+    at_chosen, lower = at_followed.some(np.array(chosen, dtype=np.int64)), columns[: len(chosen), chosen].T
+    del at_followed, columns
+    mean, root = np.empty(len(places)), np.empty((len(places), len(chosen)), "float32")  # 1 % is left out
+    for part in np.array_split(np.arange(len(places)), len(places) // PLACES_AT_A_TIME + 1):
+        here = seen(part)
+        mean[part], root[part] = here.mean, solve_triangular(lower, covariance(at_chosen, here), lower=True).T
+    return Conditional(mean, root)
 
 
 def _between(places: Array, others: Array, one: CovarianceOfBed) -> Array:

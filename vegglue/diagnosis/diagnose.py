@@ -69,9 +69,6 @@ BASE = 0.4e9
 SEARCHED, OWN = 12.0, 4.0
 # A flow without its factors on a wide grid, and what each core works with [bytes a cell].
 FLOW, AT_WORK = 1000.0, 5000.0
-# Factors of so many flows on the case's own cells are kept if there is room [-]: those of two experiments, of a point
-# and of the one it started from, and two to spare.
-SETS = 6.0
 # Share of the machine's memory that may be used unless a command says otherwise [-].
 MEMORY_SHARE = 0.9
 GIGABYTE = 1e9
@@ -90,7 +87,7 @@ def jobs_in_memory(model: Model, jobs: int, allowed: float) -> int:
     experiments, cells = len(model.case.experiments), model.site.bed.size
     held = BASE + experiments * (SEARCHED * _flow_bytes(searched) + OWN * _flow_bytes(model.site))
     nx, ny = model.site.bed.shape
-    in_use = factor_bytes(nx, ny) if ny >= WIDE_FROM else 0.0  # the least of factors that are kept
+    in_use = factor_bytes(nx, ny) if ny >= WIDE_FROM else 0.0  # factors of one flow
     each = AT_WORK * cells + 2.0 * in_use
     fit = min(int((allowed - held) / each), jobs)
     if fit < 1:
@@ -98,7 +95,7 @@ def jobs_in_memory(model: Model, jobs: int, allowed: float) -> int:
             f"{model.case.name}: a diagnosis on {nx} x {ny} cells needs about {(held + each) / GIGABYTE:.1f} GB, "
             f"{allowed / GIGABYTE:.1f} GB are allowed: take larger cells, or raise --memory."
         )
-    room, enough = allowed - held - AT_WORK * cells * fit, max(MOST_BYTES, SETS * in_use)
+    room, enough = allowed - held - AT_WORK * cells * fit, max(MOST_BYTES, max(2, experiments) * in_use)
     keep_factors_within(min(max(room, 2.0 * in_use), enough))
     return fit
 

@@ -350,8 +350,8 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
         together = int(np.clip(STATIONS_AND_CELLS / cells, 8, STATIONS_TOGETHER))
     for first in range(0, len(station), together):
         some = slice(first, first + together)
-        weights = reading_weights(problem, state, grid, station.iloc[some])
-        sensitivity = adjoints(part, flow.state, flow.factors, weights[:, :, rows]).astype(np.float32)
+        weights = reading_weights(problem, state, grid, station.iloc[some])[:, :, rows].astype(np.float32)
+        sensitivity = adjoints(part, flow.state, flow.factors, weights)
         of_discharges = [np.einsum("ikjn,ikj->n", sensitivity, discharge) for discharge in discharges]
         nx, _, ny, n = sensitivity.shape
         for term, (local, of_wholes) in changes.items():

@@ -219,7 +219,7 @@ class Factors:
 
     def solve(self, right: Array) -> Array:
         """J^-1 right, (nx, 3, ny, m)."""
-        return solved(self.inverse, right)
+        return solved(self.inverse, right).astype(np.float64)
 
     def step(self, rates: Array) -> Single:
         """-J^-1 R in the unknowns of chord steps (nx, 3, ny, m): levels, velocities times rho where water is thin."""
@@ -239,13 +239,13 @@ def eliminate(columns: Single, far: Single) -> None:
         columns.fill(np.nan)
 
 
-def solved(inverse: BlockFactors | SharedFactors, right: Array, transposed: bool = False) -> Array:
+def solved(inverse: BlockFactors | SharedFactors, right: Array | Single, transposed: bool = False) -> Single:
     """J^-1 right, or J'^-1 right, (nx, 3, ny, m)."""
     nx, _, ny, m = right.shape
     with np.errstate(over="ignore"):  # of a member that runs away, known by its correction
         work = right.astype(np.float32).reshape(nx, 3 * ny, m)
     inverse.solve(work, transposed)
-    return work.reshape(right.shape).astype(np.float64)
+    return work.reshape(right.shape)
 
 
 def jacobian(problem: Problem, state: Array) -> BlockJacobian | SparseJacobian:

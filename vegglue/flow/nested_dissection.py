@@ -43,7 +43,7 @@ ADJOINT_TOLERANCE, MOST_ADJOINT_ROUNDS = 1e-4, 12
 LARGEST_BLOCKS = 1_000_000_000
 # Factors of all flows [bytes] unless a command allows more or less: a diagnosis holds up to a hundred flows, of which
 # it works on few at once. To make the factors of one again takes as long as some ten solutions with them.
-MOST_BYTES = 5e8
+MOST_BYTES = 3e8
 _LOCK, _USED = Lock(), dict[int, "ref[SparseFactors]"]()
 _most_bytes = MOST_BYTES
 

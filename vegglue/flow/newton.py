@@ -84,7 +84,7 @@ def newton(problem: Problem, start: Array, tolerance: float, how: Beginning = FR
         stored = np.ones((nx, 3, ny), np.float32)  # D: dh/dz_s of each level, 1 for velocities
         stored[:, LEVEL] = storage(problem, state[:, LEVEL])[..., 0]
         for _ in range(MOST_CUTS):
-            step = -solved(system.inverse(stored / np.float32(time_step)), rates)
+            step = -solved(system.inverse(stored / np.float32(time_step)), rates).astype(np.float64)
             size = float(np.abs(step).max())
             if size < LONGEST_CORRECTION:
                 break

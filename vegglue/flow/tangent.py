@@ -10,7 +10,7 @@ conjugate residuals: if a cell is about to fall dry they can be so far off that 
 
 import numpy as np
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Single
 from vegglue.flow.equations import residual
 from vegglue.flow.jacobian import Factors, SharedFactors, column_held, shared_inflows, sharing_at, solved
 from vegglue.flow.problem import LEVEL, Problem, take
@@ -86,7 +86,7 @@ def jacobian_times(problem: Problem, state: Array, direction: Array) -> Array:
     return (both[..., :count] - both[..., count:]) * (scale / (2.0 * DIRECTION_STEP))
 
 
-def adjoints(problem: Problem, state: Array, shared: Factors, weights: Array) -> Array:
+def adjoints(problem: Problem, state: Array, shared: Factors, weights: Array | Single) -> Single:
     """J' l = g: the force on each unknown that would move predictions, in single precision.
 
     Where inflows through a side share by depth, the factors are those of an A near J, and l is corrected REPEATS times
@@ -107,8 +107,11 @@ def adjoints(problem: Problem, state: Array, shared: Factors, weights: Array) ->
     sides = [inflow for inflow in shared_inflows(problem) if inflow.side != "west"]
     exact = isinstance(shared.inverse, SharedFactors)
     sharings = [] if exact else [sharing_at(problem, state, inflow) for inflow in sides]
-    answer = correction = solved(shared.inverse, weights, transposed=True)
-    for _ in range(REPEATS if sharings else 0):
+    first = solved(shared.inverse, weights, transposed=True)
+    if not sharings:
+        return first
+    answer = correction = first.astype(np.float64)
+    for _ in range(REPEATS):
         left = np.zeros_like(correction)  # (A - J)' l: what A puts down to columns that its blocks hold
         levels = left[:, LEVEL]
         for one in sharings:
@@ -118,9 +121,9 @@ def adjoints(problem: Problem, state: Array, shared: Factors, weights: Array) ->
                 change = one.slope[:, None] * weight
                 np.add.at(levels, (one.column, one.row), change)
                 np.add.at(levels, (column_held(one.column, int(block)), one.row), -change)
-        correction = solved(shared.inverse, left, transposed=True)
+        correction = solved(shared.inverse, left, transposed=True).astype(np.float64)
         answer = answer + correction
-    return answer
+    return answer.astype(np.float32)
 
 
 def _product(one: Array, other: Array) -> Array:
