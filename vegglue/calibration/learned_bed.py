@@ -80,6 +80,7 @@ def bed_of_spots(learned: LearnedBed, x: Array, y: Array, length: Array, width: 
         weight = (along[some, :, None] * across[some, None, :]).reshape(some.size, -1)
         weight /= weight.sum(axis=1, keepdims=True)
         mean[some] = weight @ learned.correction.ravel()
+        weight = weight.astype(learned.columns.dtype, copy=False)
         columns[some], before[some] = weight @ learned.columns, weight @ learned.before
     error = np.hypot(np.linalg.norm(columns, axis=1), constants().fingerprint_error * mean)
     return BedOfSpots(mean, error, np.linalg.norm(before, axis=1), columns)
