@@ -7,13 +7,14 @@
 # Matters:    a flood map or a depth at gauges taken from a TELEMAC result in QGIS, geopandas or fiona is that of the start
 #             of the run, the initial condition, in each frame.
 # Documented: otherwise. The page of the driver says that the elapsed seconds are added to the date of the header.
-# Versions:   pyogrio 0.13.0 (with GDAL 3.12.4), xarray-selafin 0.2.5, python-serafin 0.2.2, geopandas 1.2.0, numpy 2.3.1.
+# Versions:   pyogrio 0.13.0 (with GDAL 3.12.4), xarray-selafin 0.2.5, python-serafin 0.2.2, xarray 2026.9.0,
+#             geopandas 1.2.0, numpy 2.3.1.
 set -eu
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "${PYTHON:-python3}" -m venv "$work/venv"
 "$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check \
-    pyogrio==0.13.0 xarray-selafin==0.2.5 python-serafin==0.2.2 geopandas==1.2.0 numpy==2.3.1
+    pyogrio==0.13.0 xarray-selafin==0.2.5 python-serafin==0.2.2 xarray==2026.9.0 geopandas==1.2.0 numpy==2.3.1
 cd "$work"
 timeout 100 "$work/venv/bin/python" -W ignore - <<'PYTHON'
 from importlib.metadata import version
