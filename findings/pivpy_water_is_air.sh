@@ -8,13 +8,13 @@
 # Matters:    dissipation and energy behind plants in a flume: a mixing length or a balance of turbulent kinetic energy
 #             compared with a model is off by these factors, and no unit or message shows it.
 # Documented: the default stands in the signature, without a fluid; the docstring of kinetic_energy has no formula.
-# Versions:   pivpy 0.4.0, xarray 2026.9.0, numpy 2.3.1.
+# Versions:   pivpy 0.4.0, xarray 2026.9.0, numpy 2.3.1, scipy 1.16.0, matplotlib 3.10.3.
 set -eu
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "${PYTHON:-python3}" -m venv "$work/venv"
 "$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check \
-    pivpy==0.4.0 xarray==2026.9.0 numpy==2.3.1
+    pivpy==0.4.0 xarray==2026.9.0 numpy==2.3.1 scipy==1.16.0 matplotlib==3.10.3
 cd "$work"
 timeout 200 "$work/venv/bin/python" -W ignore - <<'PYTHON'
 from importlib.metadata import version

@@ -152,8 +152,8 @@ class DecisionConstants:
     )  # fmt: skip
     absurd_errors: float = _constant(
         4.0, "-", CHOSEN, "errors over stated ones, with all that was found, above which no name is believed; after A1 "
-        "(2.3, named rightly) and F (6.0, wrongly) of docs/measured.md; what was named on 347 open and drawn sites has "
-        "at most 1.7",
+        "(2.3, named rightly) and F (6.0, wrongly) of docs/measured.md; in 347 runs of open, drawn and measured sites "
+        "what is named beside these two has at most 1.7",
     )  # fmt: skip
     far_off_prior: float = _constant(
         4.0, "standard deviations", CHOSEN, "distance from its prior beyond which a parameter replaces a cause, and "
