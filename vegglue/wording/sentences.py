@@ -220,7 +220,7 @@ def _environment(page: bool, folder: str) -> "Environment":
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("vegglue", f"wording/{folder}"), undefined=StrictUndefined, trim_blocks=True,
+        loader=PackageLoader("vegglue.wording", folder), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, autoescape=page,
     )  # fmt: skip
     environment.filters |= WRITTEN_BY
