@@ -104,6 +104,7 @@ def test_an_effect_of_ones_own_works_in_every_command(tmp_path, monkeypatch, cap
     [
         ("EFFECTS = 1", "expected EFFECTS = (Effect(...), ...), got int; correct it"),
         ("EFFECTS = (max,)", "got builtin_function_or_method; correct it"),
+        ("EFFECTS = (None,)", "got NoneType; correct it"),
         ("effects = ()", "got none; add it"),
         ("1 / 0", "cannot be run: ZeroDivisionError"),
         (OWN.replace('name="slow_stones"', 'name="wind"'), "exists already"),

@@ -73,9 +73,9 @@ def effects_of(path: Path) -> tuple[Effect, ...]:
         raise InputError(f"{shown}: cannot be run: {type(error).__name__}: {error}; mend it.") from None
     found = getattr(module, "EFFECTS", None)
     found = tuple(found) if isinstance(found, list) else found
-    other = next((one for one in found if not isinstance(one, Effect)), None) if isinstance(found, tuple) else found
-    if other is not None or not found:
-        got = None if found is None else "" if other is None else type(other).__name__
+    others = [one for one in found if not isinstance(one, Effect)] if isinstance(found, tuple) else [found]
+    if others or not found:
+        got = None if found is None else type(others[0]).__name__ if others else ""
         raise InputError("no_effects_in_file", file=path, got=got)
     for effect in found:
         _refuse_unusable(effect, shown)
