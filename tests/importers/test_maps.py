@@ -451,6 +451,21 @@ def test_what_is_no_area_is_refused_among_polygons(tmp_path: Path, other: dict[s
     assert (refused.value.kind, refused.value.values["feature"]) == ("no_polygon", 2)
 
 
+def test_a_polygon_of_two_corners_is_refused(tmp_path: Path) -> None:
+    path = geojson(tmp_path, ({}, polygon(*PATCH)), ({}, polygon((16.0, 0.0), (20.0, 0.0))))
+    with pytest.raises(InputError) as refused:
+        planted_polygons(path, None)
+    assert (refused.value.kind, refused.value.values["polygon"], refused.value.values["got"]) == ("few_corners", 2, 2)
+
+
+def test_a_raster_without_levels_is_refused(tmp_path: Path) -> None:
+    head = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 2\nnodata_value -1\n"
+    (tmp_path / "bed.asc").write_text(head + 6 * "-1 ", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_terrain(tmp_path / "bed.asc", Placement(), FileOptions(), False)
+    assert refused.value.kind == "no_levels"
+
+
 @pytest.mark.parametrize(
     ("crs", "corner", "refused"),
     [

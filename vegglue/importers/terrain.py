@@ -327,6 +327,8 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         raster, filled_up = _without_fill(raster)
         reader = RegularGridInterpolator((raster.x, raster.y), raster.values, bounds_error=False, fill_value=np.nan)
         known = np.argwhere(~np.isnan(raster.values))
+        if not len(known):
+            raise InputError("no_levels", file=path)
         shown = known if place.line is None else known[:: max(len(known) // MOST_FOR_EXTENT, 1)]
         along, across = place.to_channel(raster.x[shown[:, 0]], raster.y[shown[:, 1]])
         return Terrain(
@@ -611,4 +613,4 @@ def _of_sections(sections: Sequence[Array], taken: str) -> Terrain:
         return np.where((share >= 0.0) & (share <= 1.0), found, np.nan)
 
     extent = (float(along.min()), float(along.max()), float(ends[:, 0].min()), float(ends[:, 1].max()))
-    return Terrain(level, extent, f"{taken}, in {len(sections)} cross-sections")
+    return Terrain(level, extent, f"{taken}, in {so_many(len(sections), 'cross-section')}")

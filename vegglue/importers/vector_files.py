@@ -120,6 +120,8 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
                 f"{shown_path(path)}: expected corners with places in polygon {number}, got one at {lost[0]:g}, "
                 f"{lost[1]:g}, which marks no value; mend or remove it."
             )
+        if len(ring) < FEWEST_CORNERS:
+            raise InputError("few_corners", file=path, polygon=number, got=len(ring))
         refuse_crossing(f"{shown_path(path)}: polygon {number}", ring)
     named = _columns_named(
         path, columns, list(dict.fromkeys(str(key) for _, properties in features for key in properties))
