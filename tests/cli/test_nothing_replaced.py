@@ -72,6 +72,7 @@ def test_a_second_import_keeps_edits(tmp_path: Path, say: Say) -> None:
     refused(say("import", "my-site"), "my-site.yaml", "edited since")
     assert "My measurements" in config.read_text("utf-8")
     assert say("import", "my-site", "--force") == (0, "")
+    refused(say("import", "my-site", "--to", ".", "--force"), "file", "--to")
 
 
 def test_a_second_import_keeps_edited_tables(tmp_path: Path, say: Say) -> None:

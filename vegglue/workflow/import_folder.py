@@ -63,6 +63,7 @@ def import_folder(folder: Path | str, to: Path | str | None = None, *, force: bo
     folder = Path(folder)
     name = f"{folder.resolve().name}.yaml"
     target = Path(to) if to is not None else Path("configs") / name if Path("configs").is_dir() else Path(name)
+    refuse_not_made({target: ""}, ANOTHER_FILE, force=True)  # a folder, before anything is read into it
     if holds_confluence(folder) or mat_folder(folder) is not None:
         tree, texts, flat = confluence_case(folder, target)
     else:
