@@ -46,10 +46,12 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
         elif re.fullmatch(r"[-+\d.eE]+", got):
             advice = "quoted"
     if kind == "string_pattern_mismatch":  # of the name of a case, which is that of a folder
-        return CaseError(place, f"expected {_meaning(place)[2:-1]} alone, got {_shown(got)}; write {case_name(got)}")
+        return CaseError(
+            place, f"expected {_meaning(place)[2:-1]} alone, got {shown_value(got)}; write {case_name(got)}"
+        )
     if kind == "string_type":
         expected, advice = "a text", "unquoted" if isinstance(got, int | float) else ""
-    return CaseError(place, phrase("unexpected_value", _meaning(place), expected, _shown(got), advice))
+    return CaseError(place, phrase("unexpected_value", _meaning(place), expected, shown_value(got), advice))
 
 
 def expected_in_words(problem: Mapping[str, Any]) -> str:
@@ -58,6 +60,10 @@ def expected_in_words(problem: Mapping[str, Any]) -> str:
         return phrase("expected_pair")
     if problem["type"] == "tuple_type":
         return phrase("expected_list")
+    if problem["type"] == "too_short":
+        return phrase("expected_at_least", problem["ctx"]["min_length"])
+    if problem["type"] == "too_long":
+        return phrase("expected_at_most", problem["ctx"]["max_length"])
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     return re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
 
@@ -99,8 +105,13 @@ def dotted(place: KeyPath) -> str:
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place).lstrip(".")
 
 
-def _shown(got: Any) -> str:
-    text = ", ".join(f"{key}: {value}" for key, value in got.items()) if isinstance(got, dict) else repr(got)
+def shown_value(got: Any) -> str:
+    """A value of a config or site file as it may be written there."""
+    as_yaml = {None: "null", True: "true", False: "false"}
+    if isinstance(got, dict):
+        text = ", ".join(f"{key}: {value}" for key, value in got.items())
+    else:
+        text = as_yaml[got] if got is None or isinstance(got, bool) else repr(got)
     return textwrap.shorten(text or "nothing", 120, placeholder=" ...")
 
 

@@ -17,7 +17,7 @@ from scipy.interpolate import LinearNDInterpolator
 
 from vegglue.arrays import Array
 from vegglue.case.grid import Grid, centres
-from vegglue.case.messages import dotted, expected_in_words
+from vegglue.case.messages import dotted, expected_in_words, shown_value
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name
 from vegglue.errors import InputError, shown_path
@@ -109,7 +109,8 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
         problem = error.errors()[0]
         key = dotted(("result", *problem["loc"]))
         raise InputError(
-            f"{shown_path(path)}: `{key}` expected {expected_in_words(problem)}, got {problem['input']!r}; correct it."
+            f"{shown_path(path)}: `{key}` expected {expected_in_words(problem)}, got {shown_value(problem['input'])}; "
+            "correct it."
         ) from None
     if not (paths := _result_files(folder, given, stated)):
         return read_site(path)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from vegglue.case.config import read_tree
-from vegglue.case.messages import dotted, expected_in_words
+from vegglue.case.messages import dotted, expected_in_words, shown_value
 from vegglue.case.site_schema import CentrelineShape, Frame, Interval, Number, Polygon, Positive, in_metres
 from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text, unprintable
@@ -331,7 +331,7 @@ def read_site(path: Path, completed: Any = None) -> FieldSite:
             raise InputError(f"{shown_path(path)}: `{before}{dot}{short}` is missing; add it.") from None
         expected = expected_in_words(problem)
         expected = expected.replace("valid number", "number").replace("valid string", "text in quotes")
-        got = repr(problem["input"])[:80]
+        got = shown_value(problem["input"])
         raise InputError(f"{shown_path(path)}: `{place}` expected {expected}, got {got}; correct it.") from None
     counted = ["stems_per_m2" in one.model_fields_set for one in site.patches if one.file is None]
     if any(counted) and not all(counted):  # the others would seem all but bare
