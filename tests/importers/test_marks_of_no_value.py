@@ -47,7 +47,7 @@ def imported(tmp_path: Path, site: str = CHANNEL + JUNE, **files: str) -> tuple[
 # code 2, and nothing written.
 OF_OTHERS: dict[str, tuple[dict[str, tuple[int, float]], tuple[float, float]] | None] = {
     "classes_bed": ({"velocity": (2, 0.25)}, (-0.010, 0.0)), "classes_only": ({"velocity": (2, 0.25)}, (-0.010, 0.0)),
-    "dem_pit": ({"velocity": (20, 0.40)}, (-0.040, 1.43)), "dem_scale": ({"velocity": (20, 0.40)}, (-0.040, 1.43)),
+    "dem_pit": ({"velocity": (20, 0.40)}, (-0.040, 1.453)), "dem_scale": ({"velocity": (20, 0.40)}, (-0.040, 1.453)),
     "depths": ({"velocity": (2, 0.25), "level": (3, 0.095)}, (-0.010, 0.0)),
     "flag": ({"velocity": (14, 0.3957)}, (-0.04, 1.453)), "hidden": ({"velocity": (14, 0.3957)}, (-0.04, 1.453)),
     "meanrow2": ({"velocity": (8, 0.4321), "velocity_across": (8, 0.0)}, (-0.04, 1.453)),
