@@ -121,11 +121,8 @@ def wall_rates(problem: Problem, depth: Array) -> tuple[tuple[int, Array], ...]:
     wet = {0: walls.south[:, None] * depth[:, 0]}
     last = depth.shape[1] - 1
     wet[last] = wet.get(last, 0.0) + walls.north[:, None] * depth[:, last]
-    for low in np.unique(np.nonzero(walls.steps)[1]) if walls.steps.size else ():
-        length, rise = walls.steps[:, low, None], np.maximum(np.abs(depth[:, low] - depth[:, low + 1]), 0.0)
-        for row, of_row in ((low, np.maximum(length, 0.0)), (low + 1, np.maximum(-length, 0.0))):
-            if of_row.any():
-                wet[row] = wet.get(row, 0.0) + of_row * rise
+    for row, above, length in walls.faces:
+        wet[row] = wet.get(row, 0.0) + length * np.maximum(depth[:, row] - depth[:, above], 0.0)
     found = []
     for row, height in wet.items():
         beside = depth[:, row]

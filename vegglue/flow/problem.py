@@ -75,6 +75,16 @@ class SideWalls:
     rate: Array
     steps: Array = field(default_factory=lambda: EMPTY)
 
+    @cached_property
+    def faces(self) -> tuple[tuple[int, int, Array], ...]:
+        """Of each row beside steps: its number, that of the row above them, and the length of the wall (nx, 1) [-]."""
+        found = []
+        for south in range(self.steps.shape[1] if self.steps.size else 0):
+            length = self.steps[:, south, None]
+            sides = ((south, south + 1, np.maximum(length, 0.0)), (south + 1, south, np.maximum(-length, 0.0)))
+            found += [side for side in sides if side[2].any()]
+        return tuple(found)
+
 
 SMOOTH_WALLS = SideWalls(np.zeros(0), np.zeros(0), np.zeros(0))
 
