@@ -90,6 +90,7 @@ def test_whatever_stands_of_a_bend_is_read_or_refused(tmp_path: Path, place: tup
         ("[1, 2", "JSON"),
         ("[]", "`site.json` expected"),
         ("9" * 5000, "JSON"),
+        ('{"channel": {"bed_slope": 0.001, "bed_slope": 0.01}}', "`bed_slope` stands twice"),
         (json.dumps(put(SITE, ("channel", "bed_slope"), 3)), "`channel.bed_slope`"),
         (
             json.dumps(put(SITE, ("patches", 0, "x"), [4, 2])),

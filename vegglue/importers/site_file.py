@@ -379,8 +379,15 @@ def read_keys(path: Path) -> Any:
     if path.suffix == ".yaml":
         return read_tree(path)
     text = read_text(path, LARGEST_CONFIG, "site")
+
+    def each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        for number, (key, _) in enumerate(pairs):
+            if key in dict(pairs[:number]):  # json keeps the last one and says nothing
+                raise ValueError(f"the key `{key}` stands twice")
+        return dict(pairs)
+
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=each_once)
     except RecursionError:
         raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
     except ValueError as error:
