@@ -146,8 +146,8 @@ def test_the_bed_and_the_patches_follow_the_line(tmp_path: Path, flow: pd.DataFr
     assert len(planted)
     assert grid.x[planted[:, 0]].min() == pytest.approx(18.0, abs=0.6)
     assert grid.x[planted[:, 0]].max() == pytest.approx(22.0, abs=0.6)
-    # Sides drawn straight on the map are chords of 4 m, which stand 0.1 m off the arc of a bend of this radius.
-    assert 0.0 < grid.y[planted[:, 1]].min() < grid.y[planted[:, 1]].max() < 1.5 + 0.15
+    # A side drawn straight on the map from (18, 1.5) to (22, 1.5) is a chord, 0.139 m off the arc in its middle.
+    assert 0.0 < grid.y[planted[:, 1]].min() < grid.y[planted[:, 1]].max() < 1.5 + 0.139
 
 
 def test_cross_sections_of_a_bend_are_carried_on_along_it(tmp_path: Path) -> None:
