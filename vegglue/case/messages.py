@@ -1,6 +1,7 @@
 """Why the schema refuses a file, as one sentence: where, what was expected, what came, what to do."""
 
 import difflib
+import json
 import re
 import textwrap
 from collections.abc import Iterable, Mapping
@@ -107,11 +108,10 @@ def dotted(place: KeyPath) -> str:
 
 def shown_value(got: Any) -> str:
     """A value of a config or site file as it may be written there."""
-    as_yaml = {None: "null", True: "true", False: "false"}
     if isinstance(got, dict):
         text = ", ".join(f"{key}: {value}" for key, value in got.items())
     else:
-        text = as_yaml[got] if got is None or isinstance(got, bool) else repr(got)
+        text = json.dumps(got) if got is None or isinstance(got, bool) else repr(got)
     return textwrap.shorten(text or "nothing", 120, placeholder=" ...")
 
 
