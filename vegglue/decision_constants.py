@@ -91,7 +91,8 @@ class DecisionConstants:
     # Odds and chances.
     missing_odds: float = _constant(
         5.0, "-", CHOSEN, "odds by which all hypotheses together have to lead nothing; after open-o (7.0), and natural "
-        "reaches of seeds 301 to 348 with nothing hidden, four of whose seven false names had 1.6 to 4.5",
+        "reaches of seeds 301 to 348 with nothing hidden, four of whose seven false names had 1.6 to 4.5 (on 32 cells "
+        "across, with bars too high near both ends)",
     )  # fmt: skip
     known_first_odds: float = _constant(
         5.0, "-", CHOSEN, "odds by which places have to lead what is known; after open-n (4.7) and eight objects of "
