@@ -239,13 +239,11 @@ def paint_zones(axes: Axes, zones: pd.DataFrame) -> None:
     for each, miss, row in zip(size, mean, zones.itertuples(), strict=True):
         across, down = columns.index(row.zone), rows.index((row.experiment, row.section))
         face = COLOUR["measured"] if miss > 0 else "none"
-        axes.scatter(
-            across - 0.34, down, 110 * each / largest, marker="s", facecolor=face, edgecolor=COLOUR["measured"]
-        )
-        weight = "bold" if each > BOLD_MISFIT else "normal"
-        axes.text(across + 0.06, down, fixed(float(each), 1), ha="right", va="center", fontsize=8, fontweight=weight)
-        text = ("+" if miss > 0 else "") + fixed(float(miss), 1)
-        axes.text(across + 0.42, down, text, ha="right", va="center", fontsize=7, color=COLOUR["muted"])
+        axes.scatter(across - 0.4, down, 110 * each / largest, marker="s", facecolor=face, edgecolor=COLOUR["measured"])
+        weight, text = "bold" if each > BOLD_MISFIT else "normal", fixed(float(each), int(each < 10.0))
+        axes.text(across + 0.01, down, text, ha="right", va="center", fontsize=8, fontweight=weight)
+        text = ("+" if miss > 0 else "") + fixed(float(miss), int(abs(miss) < 10.0))
+        axes.text(across + 0.46, down, text, ha="right", va="center", fontsize=7, color=COLOUR["muted"])
     for down in range(1, len(rows)):
         if rows[down][0] != rows[down - 1][0]:
             axes.axhline(down - 0.5, color=COLOUR["rule"], linewidth=0.8)
