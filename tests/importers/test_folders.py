@@ -40,7 +40,7 @@ def survey_on_the_map() -> str:
 
 def test_the_page_has_every_option_of_a_file() -> None:
     page = (Path(__file__).parents[2] / "docs" / "own_files.md").read_text(encoding="utf-8")
-    table = page.partition("## What an entry of `files` may say")[2].partition("\n## ")[0]
+    table = page.partition("## Options of a file")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| (`[^|]*) \|", table, re.MULTILINE)
     assert {key for row in rows for key in re.findall(r"`([a-z_]+)", row)} == set(FileOptions.__dataclass_fields__)
 
