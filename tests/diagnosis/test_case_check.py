@@ -20,11 +20,11 @@ from vegglue.diagnosis.station_check import PointsOutsideWater, StationsOnLand, 
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements import kinds, plausibility, section_discharge
+from vegglue.measurements.kinds import Unused
 from vegglue.measurements.observations import read_observations
 from vegglue.measurements.plausibility import ImplausibleValues, Symptom
 from vegglue.pages.channel import save_channel_figure
 from vegglue.wording.sentences import macros, tag_of
-from vegglue.wording.unused import ABOVE_SURFACE
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.check import critical_warnings
 
@@ -134,7 +134,7 @@ def test_a_wrong_gauge_is_one_remark_and_one_on_the_points_that_it_loses(tmp_pat
     else:
         found = found_in([first], LevelsRiseDownstream, experiments=("low", "high"), first=20.0, last=38.0)
         assert found[0].rises == pytest.approx((0.4, 0.4))
-    assert found_in([second], PointsOutsideWater, reason=ABOVE_SURFACE, levels_doubted=True)
+    assert found_in([second], PointsOutsideWater, reason=Unused.ABOVE_SURFACE, levels_doubted=True)
     assert (second.sections, second.experiments) == (("s20", "s26"), ("low", "high"))
 
 

@@ -17,8 +17,8 @@ from vegglue.diagnosis.station_check import (
     remarks_on_errors_across_plants,
     remarks_on_unmoved_heights,
 )
+from vegglue.measurements.kinds import Unused
 from vegglue.measurements.observations import read_observations
-from vegglue.wording.unused import ABOVE_SURFACE, BELOW_BED
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 VELOCITIES = "{kind: velocity, file: velocities.csv}"
@@ -51,7 +51,7 @@ def test_heights_and_velocities_that_are_exchanged(tmp_path, exchanged):
     assert found == ([HeightsExchanged(file, "z", 4, 4, (30.0, -1.0))] if exchanged else [])
 
 
-@pytest.mark.parametrize(("height", "reason"), [(-0.1, BELOW_BED), (8.0, ABOVE_SURFACE), (None, "")])
+@pytest.mark.parametrize(("height", "reason"), [(-0.1, Unused.BELOW_BED), (8.0, Unused.ABOVE_SURFACE), (None, "")])
 def test_points_outside_the_water_are_a_remark(tmp_path, height, reason):
     """One height with a wrong sign was dropped from its vertical, and nothing was odd."""
     heights = (0.2, 0.4, 0.6, *([height] if reason else []))

@@ -18,8 +18,8 @@ from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
+from vegglue.measurements.kinds import Unused
 from vegglue.measurements.observations import read_observations
-from vegglue.wording.unused import AT_WALL
 from vegglue.workflow.import_folder import assumptions_of
 
 FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0)
@@ -225,7 +225,7 @@ def test_a_velocity_beside_a_wall_is_no_reading_of_its_cell(tmp_path: Path) -> N
     """Cells of 0.19 m have their middles 0.09 m from the wall; at 0.02 m the wall holds the water back."""
     found = import_of(tmp_path, CHANNEL + JUNE + "walls: true\n", a__csv="x,y,u\n4,0,0.4\n4,1.48,0.2\n4,-1.4,0.3\n")
     assert found.table.set_index("y")["used"].to_dict() == {0.0: True, 1.48: False, -1.4: True}
-    assert found.table.set_index("y")["reason"][1.48] == AT_WALL
+    assert found.table.set_index("y")["reason"][1.48] == Unused.AT_WALL
 
 
 def test_walls_leave_no_room_for_banks(tmp_path: Path) -> None:

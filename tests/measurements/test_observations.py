@@ -9,6 +9,7 @@ import pytest
 from vegglue.case.config import load_case
 from vegglue.errors import InputError
 from vegglue.measurements import observations
+from vegglue.measurements.kinds import Unused
 from vegglue.measurements.observations import (
     POINT_TYPES,
     PROFILE_TYPES,
@@ -151,7 +152,7 @@ def test_fitted_curve_passes_through_the_points():
 
 def test_points_outside_the_water_are_kept_with_the_reason():
     points = read_observations(changed(CASES["d3a"], surface=-3.0)).points
-    outside = points[points["reason"] == "above the water surface"]
+    outside = points[points["reason"] == Unused.ABOVE_SURFACE]
     assert (outside["z"] > -3.0).all()
     assert not outside["used"].any()
     assert len(points) == len(SHIPPED)

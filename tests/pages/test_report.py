@@ -11,11 +11,11 @@ from diagnoses import NOTHING, a_diagnosis, an_effect_found
 from report_runs import MEMBERS, a_toy, kict, told_of, written
 
 from vegglue.errors import StorageError
+from vegglue.measurements.kinds import Unused
 from vegglue.pages.findings import run_health
 from vegglue.pages.parameters import parameter_rows
 from vegglue.pages.run import Run, file_name, is_synthetic, station_zones
 from vegglue.pages.sections import section_panels
-from vegglue.wording.unused import EXCLUDED
 
 pytestmark = pytest.mark.slow  # whole pages
 VOID = {"meta", "link", "br", "hr", "img", "input"}
@@ -124,10 +124,10 @@ def test_the_flagged_station_is_shown_with_its_reason(d3a: tuple[Run, str]) -> N
 def test_a_station_that_does_not_count_is_found_by_its_place(tmp_path: Path) -> None:
     toy = a_toy(tmp_path)
     table = toy.observations.table.copy()
-    table.loc[9, ["used", "reason"]] = [False, EXCLUDED]  # a gauge of the first experiment
+    table.loc[9, ["used", "reason"]] = [False, Unused.EXCLUDED]  # a gauge of the first experiment
     text = written(replace(toy, observations=replace(toy.observations, table=table)))
     assert "<p>2 of 22 stations" in text
-    assert f"<li>with, x = 5.00 m, y = 5.00 m: {EXCLUDED}.</li>" in text
+    assert "<li>with, x = 5.00 m, y = 5.00 m: the diagnosis excludes it.</li>" in text
 
 
 def test_failed_members_are_counted_with_their_reasons(d3a: tuple[Run, str]) -> None:

@@ -48,7 +48,7 @@ from vegglue.diagnosis.station_check import (
     StationsOutsideGrid,
 )
 from vegglue.measurements.adv_section import DeadProbe
-from vegglue.measurements.kinds import UnstatedErrors
+from vegglue.measurements.kinds import UnstatedErrors, Unused
 from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues, Symptom
 from vegglue.measurements.section_discharge import CarriedDischarge, DischargeMismatch
 from vegglue.wording.sentences import macros, sentence, tag_of
@@ -109,7 +109,7 @@ EXAMPLES = [
     HeightsFromSurface(4, 4, (20.0, -1.0)),
     HeightsExchanged(Path("velocities.csv"), "z", 4, 4, (30.0, -1.0)),
     HeightsTakenForLevels("points.csv", ("low",), (0.051,), 5.0, 35.0, 0.03, "z [mm]"),
-    PointsOutsideWater(2, ("s20",), ("low",), "below the bed", (20.0, -1.0), -0.1, 1.04, False),
+    PointsOutsideWater(2, ("s20",), ("low",), Unused.BELOW_BED, (20.0, -1.0), -0.1, 1.04, False),
     ErrorsAcrossPlants((("low", "D3"),), (0.03, 0.03), (0.002, 0.004), (0.005, 0.005)),
     Breach(ContractRule.OFF_IS_OFF, "strength", water="moving"),
     Breach(ContractRule.POWER, "strength", (2,)),

@@ -14,12 +14,12 @@ from systems import NOT_SIMULATED
 import vegglue
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.inference.statements import ReadingsExcluded, posterior_statements
+from vegglue.measurements.kinds import Unused
 from vegglue.measurements.observations import read_observations
 from vegglue.progress import Progress
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.loop_results import comparison_that_fits, questions_that_fit
 from vegglue.results.result_files import stored_hash, write_diagnosis
-from vegglue.wording.unused import EXCLUDED
 from vegglue.workflow.case_run import CaseRun
 from vegglue.workflow.infer import is_inferred
 from vegglue.workflow.report import results_of
@@ -168,7 +168,7 @@ def test_a_posterior_leaves_out_what_the_diagnosis_set_aside(tmp_path: Path) -> 
     assert results_of(run, run).excluded_since == 2
     after = vegglue.infer(case, ensemble, method="glue", runs=runs, jobs=1)
     assert after.fit.used == 13
-    assert after.station.index[after.station["reason"] == EXCLUDED].tolist() == [3, 7]
+    assert after.station.index[after.station["reason"] == Unused.EXCLUDED].tolist() == [3, 7]
     assert ReadingsExcluded(2, 15) in posterior_statements(after)
     assert is_inferred(CaseRun(case, runs))
     assert results_of(run, run).excluded_since == 0

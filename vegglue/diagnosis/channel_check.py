@@ -19,10 +19,9 @@ from vegglue.case.schema import Case
 from vegglue.case.survey_error import stands_out
 from vegglue.case.zones import BANK_SLOPE, area_of, corners_of, share_in_patch, slope
 from vegglue.diagnosis.flow_check import dry_outlets
-from vegglue.measurements.kinds import UnstatedErrors, unstated_errors
+from vegglue.measurements.kinds import UnstatedErrors, Unused, unstated_errors
 from vegglue.measurements.observations import Observations
 from vegglue.results.ensemble import FieldsTooLarge, excess
-from vegglue.wording.unused import OUTSIDE
 
 # Share of the wet cells from which it matters that they are steep [-]: with banks twice as rough as the floor, a tenth
 # of the width changes its friction by a tenth, which is twice what imported cases allow the model for.
@@ -435,7 +434,7 @@ def remarks_on_ensemble(case: Case, observations: Observations) -> Iterator[obje
     for name in case.experiments:
         if not (used["experiment"] == name).any():
             yield ExperimentUnmeasured(name)
-    for row in table[~table["used"] & (table["reason"] != OUTSIDE)].itertuples():
+    for row in table[~table["used"] & (table["reason"] != Unused.OUTSIDE)].itertuples():
         yield StationUnused(str(row.experiment), float(row.x), float(row.y), str(row.reason))
 
 

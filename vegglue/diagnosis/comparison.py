@@ -32,13 +32,12 @@ from vegglue.engine.interface import Model, Point, linearise, predict
 from vegglue.engine.model import coarser
 from vegglue.inference.homogeneity import correlations_of_estimates, equal_values_test, without_prior
 from vegglue.inference.weighted_statistics import root_mean_square
-from vegglue.measurements.kinds import KINDS, leading_velocities
+from vegglue.measurements.kinds import KINDS, Unused, leading_velocities
 from vegglue.measurements.observations import section_places, station_table
 from vegglue.normal_range import NORMAL95
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.loop_results import HeldOut, InSample, ModelScore, PredictiveScores
 from vegglue.wording.sentences import phrase
-from vegglue.wording.unused import EXCLUDED
 
 # How often errors alone exceed the reported bound; 5 % is usual.
 BY_CHANCE = 0.05
@@ -283,7 +282,8 @@ def without_stations(station: pd.DataFrame, aside: pd.DataFrame) -> pd.DataFrame
     known = set(aside.itertuples(index=False, name=None))
     there = np.array([row in known for row in station[MEASUREMENT].itertuples(index=False, name=None)], dtype=bool)
     there &= station["used"].to_numpy()
-    return station.assign(used=station["used"].mask(there, False), reason=station["reason"].mask(there, EXCLUDED))
+    reason = station["reason"].mask(there, Unused.EXCLUDED)
+    return station.assign(used=station["used"].mask(there, False), reason=reason)
 
 
 def exclusion_in_words(aside: pd.DataFrame) -> str:

@@ -20,11 +20,10 @@ from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of, distance_to_outline
 from vegglue.diagnosis.flow_check import dry_outlets, exchanged_components
 from vegglue.measurements.adv_section import average_of, upward_column
-from vegglue.measurements.kinds import kind_of, velocity_rows
+from vegglue.measurements.kinds import Unused, kind_of, velocity_rows
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues, implausible_values
 from vegglue.measurements.section_discharge import neighbour_error
-from vegglue.wording.unused import ABOVE_SURFACE, BELOW_BED, OUTSIDE
 
 # Nearer to a patch edge than this share of a cell [-], a station is on it.
 ON_THE_EDGE = 0.02
@@ -123,7 +122,7 @@ class StationsNearWall:
 def remarks_on_stations(case: Case, site: Site, observations: Observations) -> Iterator[object]:
     """Stations outside the grid or above the expected water; one remark of each experiment."""
     table = observations.table
-    for experiment, rows in table[table["reason"] == OUTSIDE].groupby("experiment", sort=False):
+    for experiment, rows in table[table["reason"] == Unused.OUTSIDE].groupby("experiment", sort=False):
         places = rows.drop_duplicates(["x", "y"])
         yield StationsOutsideGrid(str(experiment), len(places), _first(places))
     yield from remarks_on_land(case, site, observations)
@@ -132,7 +131,7 @@ def remarks_on_stations(case: Case, site: Site, observations: Observations) -> I
 def remarks_on_land(case: Case, site: Site, observations: Observations) -> Iterator[StationsOnLand]:
     """Of each experiment the stations above the expected water; none if its outlet is dry, a remark of its own."""
     table, dry_ones = observations.table, dry_outlets(case, site)
-    inside = table[(table["reason"] != OUTSIDE) & _at_point(table) & ~table["experiment"].isin(list(dry_ones))]
+    inside = table[(table["reason"] != Unused.OUTSIDE) & _at_point(table) & ~table["experiment"].isin(list(dry_ones))]
     for experiment, rows in inside.groupby("experiment", sort=False):
         depth = expected_depth(case, in_experiment(site, str(experiment)), case.experiments[str(experiment)])
         i, j = (np.abs(np.subtract.outer(rows[name].to_numpy(), at)).argmin(axis=1)
@@ -162,7 +161,7 @@ def remarks_on_frames(case: Case, observations: Observations) -> Iterator[object
     table = observations.table[velocity_rows(observations.table)]
     if table.empty:
         return
-    lost = table[table["reason"] == OUTSIDE]
+    lost = table[table["reason"] == Unused.OUTSIDE]
     (west, east), (south, north) = case.grid.x, case.grid.y
 
     def all_inside(x_size: float, y_size: float) -> bool:
@@ -269,7 +268,7 @@ class PointsOutsideWater:
     points: int
     sections: tuple[str, ...]
     experiments: tuple[str, ...]
-    reason: str
+    reason: Unused
     first: tuple[float, float]
     height: float
     depth: float
@@ -354,14 +353,14 @@ def remarks_on_lost_points(observations: Observations, doubted: Collection[str] 
     if points.empty:
         return
     kept = points.groupby(["experiment", "section", "x", "y"])["used"].transform("any")
-    lost = points[kept & points["reason"].isin((BELOW_BED, ABOVE_SURFACE))]
+    lost = points[kept & points["reason"].isin((Unused.BELOW_BED, Unused.ABOVE_SURFACE))]
     for reason, some in lost.groupby("reason", sort=False):
         first, experiments = some.iloc[0], tuple(map(str, some["experiment"].unique()))
         yield PointsOutsideWater(
             points=len(some),
             sections=tuple(map(str, some["section"].unique())),
             experiments=experiments,
-            reason=str(reason),
+            reason=Unused(reason),
             first=(float(first["x"]), float(first["y"])),
             height=float(first["height"]),
             depth=float(first["depth"]),

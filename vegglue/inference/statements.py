@@ -11,10 +11,9 @@ from vegglue.inference.glue import sizes_as_stated
 from vegglue.inference.homogeneity import DIFFERS_BELOW, differing
 from vegglue.inference.refine import groups_left_out
 from vegglue.inference.weighted_statistics import TRUSTED_K_HAT, root_mean_square
-from vegglue.measurements.kinds import Kind, kind_of
+from vegglue.measurements.kinds import Kind, Unused, kind_of
 from vegglue.results.posterior import CLAIMED_FROM, IDENTIFIED_BELOW, NEAR_BOUND, Posterior, Transfer
 from vegglue.results.verdict import MisfitTooSmall, is_too_small
-from vegglue.wording.unused import EXCLUDED
 
 # |r| [-] above which a pair is named: the other parameter then explains half the variance of each (r² = 0.49).
 STRONG_CORRELATION = 0.7
@@ -492,7 +491,7 @@ def fit_statements(posterior: Posterior) -> Iterator[object]:
     value, band = station["value"].to_numpy(float), posterior.predicted.total_band
     outside = ((value < band[0]) | (value > band[-1])) & station["used"].to_numpy()
     yield MedianFit(sizes_of(fit.rmse), int(outside.sum()), fit.used)
-    if excluded := int((station["reason"] == EXCLUDED).sum()):
+    if excluded := int((station["reason"] == Unused.EXCLUDED).sum()):
         yield ReadingsExcluded(excluded, len(station))
     if math.isfinite(fit.chi2) and posterior.refinement is None:
         yield BestMemberFit(fit.chi2, fit.used)

@@ -14,7 +14,7 @@ from vegglue.case.schema import Case, Observation
 from vegglue.case.zones import cells_of_patch
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.csv_table import headings_of, read_table, refuse_repeated, refuse_rows
-from vegglue.measurements.kinds import WATER_LEVEL
+from vegglue.measurements.kinds import WATER_LEVEL, Unused
 from vegglue.measurements.section_discharge import (
     GRID_STEP,
     CrossSection,
@@ -36,7 +36,6 @@ from vegglue.measurements.vertical_profile import (
 )
 from vegglue.wording.numbers import in_digits, range_in_digits, so_many
 from vegglue.wording.sentences import sentence
-from vegglue.wording.unused import ABOVE_SURFACE, BELOW_BED
 
 EDGE = 0.05  # m, a vertical closer to the edge of a patch stands beside the plants as much as in them
 SMALLEST_ERROR = 0.001  # m/s, resolution of an ADV; keeps one calm point from outweighing all others
@@ -272,7 +271,7 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame, gauges: 
             f"{beside[0]:g} m; correct y (`flip` and `zero` of a file set its origin), or the grid."
         ) from None
     points = points if "z" in points else points.assign(z=bed + points["height"])
-    reason = np.select([points["z"] <= bed, points["z"] > surface], [BELOW_BED, ABOVE_SURFACE], "")
+    reason = np.select([points["z"] <= bed, points["z"] > surface], [Unused.BELOW_BED, Unused.ABOVE_SURFACE], "")
     if (reason != "").all():
         above, bounds = points["z"] - bed, [(float(np.min(one)), float(np.max(one))) for one in (points["y"], bed)]
         exchanged = ((points["u"] > bed) & (points["u"] <= surface)).all()

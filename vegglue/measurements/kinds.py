@@ -6,6 +6,7 @@ for files that are imported; `adv` in a case is a way of reading that yields vel
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Literal
 
 import numpy as np
@@ -14,6 +15,16 @@ from numpy.typing import NDArray
 
 from vegglue.errors import InputError
 from vegglue.wording.numbers import so_many
+
+
+class Unused(StrEnum):
+    """Why a station or a point is not used: `reason` in their tables, beside what a dead probe shows."""
+
+    OUTSIDE = "outside the grid"
+    AT_WALL = "at a side wall"
+    EXCLUDED = "excluded"
+    BELOW_BED = "below the bed"
+    ABOVE_SURFACE = "above the water surface"
 
 
 @dataclass(frozen=True)

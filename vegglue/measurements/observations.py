@@ -13,10 +13,9 @@ from vegglue.case.size_limits import MOST_STATIONS
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.adv_section import Section, across_averages, average_of, read_section
 from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
-from vegglue.measurements.kinds import KINDS, STREAMWISE, TRANSVERSE, WATER_LEVEL, Kind, kind_of
+from vegglue.measurements.kinds import KINDS, STREAMWISE, TRANSVERSE, WATER_LEVEL, Kind, Unused, kind_of
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
-from vegglue.wording.unused import AT_WALL, OUTSIDE
 
 # Columns of every table of stations, of ADV points and of verticals, with their types; points may have more, as in
 # their file (v, u_se, ...).
@@ -174,12 +173,13 @@ def read_observations(case: Case) -> Observations:
     # Outside the grid the model has no flow. A discharge has no y of its own.
     at_point = np.array([kind_of(name).at_point for name in table["kind"]], dtype=bool)
     inside = table["x"].between(*case.grid.x) & (table["y"].between(*case.grid.y) | ~at_point)
-    table = table.assign(used=table["used"] & inside, reason=table["reason"].mask(table["used"] & ~inside, OUTSIDE))
+    reason = table["reason"].mask(table["used"] & ~inside, Unused.OUTSIDE)
+    table = table.assign(used=table["used"] & inside, reason=reason)
     if case.friction.walls is not None:
         (south, north), half_cell = case.grid.y, NEAR_WALL * case.grid.cell[1]
         beside = np.minimum(table["y"] - south, north - table["y"]) < half_cell
         beside &= np.array([kind_of(name).velocity for name in table["kind"]], dtype=bool) & table["used"]
-        table = table.assign(used=table["used"] & ~beside, reason=table["reason"].mask(beside, AT_WALL))
+        table = table.assign(used=table["used"] & ~beside, reason=table["reason"].mask(beside, Unused.AT_WALL))
     # Errors of two stations at one place of a section would count as one error.
     correlated = np.array([kind_of(name).correlated for name in table["kind"]], dtype=bool)
     twice = table.duplicated(["experiment", "section", "kind", "x", "y"]) & correlated

@@ -29,6 +29,7 @@ from vegglue.pages.style import (
     within_width,
 )
 from vegglue.wording.numbers import section_in_words
+from vegglue.wording.sentences import phrase
 
 # A panel [px]: four of them stand side by side on a screen of 1,200; letters of the size of the captions.
 PANEL_WIDTH, PANEL_HEIGHT, PANEL_LETTERS, NOTE_LETTERS = 240.0, 222.0, 11.5, 9.0
@@ -226,8 +227,9 @@ def section_panels(run: Run) -> SectionPanels:
             drawn = draw_panel(panel, values, f"{kind.column} [{kind.unit}]", note)
             picture = published_picture(run, drawn.svg, name, "panel_words", panel_misfit(panel, kind.unit))
             pictures.append(picture)
-            reasons = rows[rows["section"] == section].sort_values("y")["reason"].tolist()
-            data.append(_numbers(picture.name, kind, panel, drawn) | {"reason": reasons})
+            reasons = rows[rows["section"] == section].sort_values("y")["reason"]
+            words = [phrase("why_unused", one) for one in reasons]
+            data.append(_numbers(picture.name, kind, panel, drawn) | {"reason": words})
         left = (rows["value"] - rows["before"])[~rows["aside"]]
         title = str(experiment) if kind.name == STREAMWISE else f"{experiment}, {kind.words}"
         experiments.append(ExperimentPanels(title, pictures, float(np.sqrt(np.mean(left**2))) if len(left) else 0.0))

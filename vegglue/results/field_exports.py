@@ -225,7 +225,8 @@ def write_station_table(
     """
     x, y = station["x"].astype(float), station["y"].astype(float)
     names = ("experiment", "kind", "section", "value", "standard_error", "used", "reason")
-    columns = [*_places(x, y, grid, frame), *(station[name] for name in names)]
+    reasons = np.array([phrase("why_unused", one) for one in station["reason"]], dtype=object)
+    columns = [*_places(x, y, grid, frame), *(station[name] for name in names[:-1]), reasons]
     more = [] if predicted is None else ["predicted"]
     _write(
         path, [*_place_headings(grid, frame), *names, *more], [*columns, *([] if predicted is None else [predicted])]
