@@ -73,8 +73,8 @@ def _table(records: Sequence[Record], told: Sequence[Told]) -> str:
     """Every line that has data, the field campaign beside all."""
     campaign = [one for one in records if one["case"] == "campaign"]
     rows = [
-        "| | wanted | sets | share | 95 % interval | met | campaign alone (sets) |",
-        "|---|---|---:|---:|---:|---|---:|",
+        "| | target | data sets | share (95 % interval) | field campaign only |",
+        "|---|---|---:|---:|---:|",
     ]
     for line in LINES:
         good, size = counts(records, line)
@@ -82,19 +82,18 @@ def _table(records: Sequence[Record], told: Sequence[Told]) -> str:
             continue
         low, high = interval(good, size)
         reached = is_met(line, good, size)
-        answer = "-" if reached is None else "no" if not reached else "yes" if size >= FEW_SETS else "too few sets"
+        answer = "**missed**" if not reached else "met" if size >= FEW_SETS else "too few"
+        target = "-" if reached is None else f"{wanted_of(line)}, {answer}"
         there, of = counts(campaign, line)
-        beside = f"{percent(there / of)} ({of})" if of else "-"
-        rows.append(
-            f"| {line.label} | {wanted_of(line)} | {size} | {percent(good / size)} "
-            f"| {100 * low:.0f} to {percent(high)} | {answer} | {beside} |"
-        )
+        beside = f"{percent(there / of)} of {of}" if of else "-"
+        share = f"{percent(good / size)} ({100 * low:.0f} to {100 * high:.0f})"
+        rows.append(f"| {line.label} | {target} | {size} | {share} | {beside} |")
     if told:
         away = distance(told)
         rows.append(
-            f"| Stated probabilities: distance from the true share | at most {100 * DISTANCE:.0f} points | "
-            f"{sum(one.count for one in told)} hypotheses | {100 * away:.1f} points | "
-            f"{100 * distance_by_chance(told):.1f} if all were right | {'yes' if away <= DISTANCE else 'no'} | - |"
+            f"| Stated probabilities: distance from the true share | at most {100 * DISTANCE:.0f} points, "
+            f"{'met' if away <= DISTANCE else '**missed**'} | {sum(one.count for one in told)} hypotheses | "
+            f"{100 * away:.1f} points ({100 * distance_by_chance(told):.1f} if all were right) | - |"
         )
     return "\n".join(rows)
 
@@ -109,7 +108,7 @@ def _left_out(records: Sequence[Record]) -> str:
             names.update(found[1].split(",") if found else ())
             others.update([] if found else [record["left_out"].partition(":")[0]])
     listed = ", ".join(sorted(names)) or "none"
-    text = f"- **Not visible at any plausible size in at least one of the channels, and left out there:** {listed}."
+    text = f"- **Left out of a channel, as not visible there at any plausible size:** {listed}."
     if others:
         text += " Left out for other reasons: " + "; ".join(f"{why} ({size})" for why, size in others.items()) + "."
     return fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
@@ -123,9 +122,9 @@ def _kept(records: Sequence[Record]) -> str:
     if not rising.size:
         return ""
     text = (
-        f"- **Held-out errors** change by {percent(float(np.median(change)))} (median of {change.size} sets) with what "
-        f"`extend --auto` keeps. In {rising.size} sets they rise: by {percent(float(np.median(rising)))} (median), "
-        f"{percent(float(rising.max()))} at most."
+        f"- **Held-out errors** change by {percent(float(np.median(change)))} (median of {change.size} data sets) with "
+        f"what `extend --auto` keeps. In {rising.size} data sets they rise: by {percent(float(np.median(rising)))} "
+        f"(median), {percent(float(rising.max()))} at most."
     )
     return fill(text, WIDTH, subsequent_indent="  ")
 
@@ -157,12 +156,13 @@ def _data_limits(
             return percent(float(np.mean([one[name] for one in groups[group]])))
 
         parts.append(
-            f"If the kind is unknown and all hypotheses compete to first order by the rules of a diagnosis, none of "
-            f"these is reported of {mean('told')} of {len(groups['unlisted'])} objects and a place within 1.5 m of "
-            f"{mean('near')}; always guessing a place reaches {mean('guessed')} (`tests/studies/object_limits.py`). "
-            f"Reporting a place at even odds would reach {mean('evenly')}, at the price of {mean('evenly', 'listed6')} "
-            f"of listed effects of 6 s.e. and {mean('evenly', 'listed3')} of 3 s.e. being reported as none of these, "
-            f"instead of {mean('told', 'listed6')} and {mean('told', 'listed3')}."
+            f"If the kind is unknown and all hypotheses compete to first order by the rules of a diagnosis, "
+            f"`none-of-these` is reported for {mean('told')} of {len(groups['unlisted'])} objects and a local anomaly "
+            f"within 1.5 m for {mean('near')}; always guessing a position reaches {mean('guessed')} "
+            f"(`tests/studies/object_limits.py`). Reporting an anomaly at even odds would give {mean('evenly')}, but "
+            f"also `none-of-these` for {mean('evenly', 'listed6')} of listed effects of 6 s.e. and "
+            f"{mean('evenly', 'listed3')} of 3 s.e., instead of {mean('told', 'listed6')} and "
+            f"{mean('told', 'listed3')}."
         )
     if not parts:
         return ""
@@ -171,40 +171,42 @@ def _data_limits(
 
 PAGE = """# How often the diagnosis is right
 
-Causes were hidden in synthetic measurements, and each set was diagnosed once without that knowledge. The
-rates below hold under the conditions below and under no others.
+Causes were hidden in synthetic measurements, and each data set was diagnosed once without that knowledge.
 
 ## Protocol
 
-- **The truth** is computed by a second solver (`tests/studies/second_solver.py`): explicit finite volumes with a
-  grid, a waterline and closures of their own, coded from the same formulas, without any code of vegglue.
-- **Two cases.** The small channel: 32 m, two patches, 93 stations (`configs/twin.yaml`), {twin} sets. The field
-  campaign: 100 m, seven patches, 270 stations (`configs/campaign.yaml`), {campaign} sets. Standard errors are 1 cm/s
-  for velocities and 3 mm for levels. Cells of the truth are 0.25 m x 0.125 m, those of the model 0.5 m x 0.1875 m.
-- **Errors of measurement** are new in each set: independent; in sets with nothing hidden also correlated between
-  neighbours by 0.5, or 1.5 times as large as stated.
-- **An imperfect site** is drawn anew in each set: floor of the bank law 1.1 to 1.6 (1.3 in the model); the logarithm
-  above plants 0.85 to 1.15 times Baptist's; bed under plants of 45 to 75 m^(1/2)/s (60 in the model); eddy viscosity
-  0.5 to 2.5 times the stated one; sides of patches up to 0.1 m off; stems 12 %, the bed 1 cm, probes 2 cm and
-  discharges 1 % off. Everything is hidden on such sites; sets with nothing hidden are half on exact sites.
-- **The model** may err as a user would state (`model_error`): friction 5 %, bed 1 cm, edges of patches 5 cm, probes
-  2 cm, discharges 1 %, stems 12 %. The eddy viscosity is calibrated with a prior of a factor of two. True parameters
-  lie 0.3 to 1 standard deviations from the middle of their priors.
-- **What is hidden**: an effect of the library, an object in no list (a pier, a hole, ...), an instrument that is off,
-  or two of these. Its size gives a signal of 3 or 6 standard errors (s.e.): the norm of the change of the predictions
-  that calibration cannot absorb, in standard errors of data, grid, model and site together.
+- **Truth.** A second solver computes it (`tests/studies/second_solver.py`): explicit finite volumes with their own
+  grid, waterline and closures, coded from the same formulas without any code of vegglue.
+- **Two channels.** The small channel: 32 m, two patches, 93 stations (`configs/twin.yaml`), {twin} data sets. The field
+  campaign: 100 m, seven patches, 270 stations (`configs/campaign.yaml`), {campaign} data sets. Cells are 0.25 x 0.125 m
+  in the truth and 0.5 x 0.1875 m in the model.
+- **Errors of measurement** are drawn anew for each data set, with standard errors of 1 cm/s for velocities and 3 mm for
+  levels. They are independent; with nothing hidden also correlated between neighbours by 0.5, or 1.5 times as large as
+  stated.
+- **Imperfect sites** are drawn anew for each data set: floor of the bank law 1.1 to 1.6 (1.3 in the model); the
+  logarithm above plants 0.85 to 1.15 times Baptist's; bed under plants of 45 to 75 m^(1/2)/s (60 in the model); eddy
+  viscosity 0.5 to 2.5 times the stated one; sides of patches up to 0.1 m off; stems 12 %, the bed 1 cm, probes 2 cm and
+  discharges 1 % off. Every cause is hidden on such sites; with nothing hidden half of the sites are exact.
+- **Errors allowed to the model** (`model_error`): friction 5 %, bed 1 cm, edges of patches 5 cm, probes 2 cm,
+  discharges 1 %, stems 12 %. The eddy viscosity is calibrated with a prior of a factor of two. True parameters lie 0.3
+  to 1 standard deviations from the middle of their priors.
+- **Hidden causes**: an effect of the library, an object in no list (a pier, a hole, ...), an instrument that is off,
+  or two of these, with a signal of 3 or 6 standard errors (s.e.). The signal is the norm of the change of the
+  predictions that calibration cannot absorb, in standard errors of data, grid, model and site together.
 
-A **name** is a cause in a verdict that names one; causes found before a verdict of "cannot tell" are no names. It is
-**false** if it is neither hidden nor an imperfection of the site (with the right sign); a place is false beyond 1.5 m
-of every object. An effect is **in the set** if it is among the hypotheses, or, with nothing false named, among what is
-not excluded. **Groups** are effects that the data cannot distinguish. **Not inspected** leaves out objects that were
-looked at, or changed, while rules were chosen. **Held-out errors** are at sections without measurements, against the
-truth, with the error of a probe added.
+| term | meaning |
+|---|---|
+| name | a cause in a verdict that names one; causes found before a verdict of `cannot-tell` do not count |
+| false | neither hidden nor an imperfection of the site (of the right sign); an anomaly over 1.5 m from every object |
+| in the credible set | among the hypotheses of the verdict or, with nothing false named, among what is not excluded |
+| groups | effects that the data cannot distinguish |
+| not inspected | without objects that were looked at, or changed, while rules were chosen |
+| held-out error | at sections without measurements, against the truth, with the error of a probe added |
 
 ## Result
 
-Of {lines} targets {met} are met. A target is met only if the share itself reaches it, whatever its interval (95 %,
-Clopper and Pearson), in at least 20 sets. All {sets} sets:
+Under these conditions, of {lines} targets {met} are met. A target is met only if the share itself reaches it, whatever
+its 95 % interval (Clopper and Pearson), in at least 20 data sets. All {sets} data sets:
 
 {table}
 
@@ -214,16 +216,16 @@ Clopper and Pearson), in at least 20 sets. All {sets} sets:
 
 ## Limits
 
-- **Chosen on the data.** Some rules for places, instruments and lists of what is not excluded were chosen after parts
-  of these sets. Only the lines "not inspected" are free of that, and only for objects.
-- **Several states of the code.** Sets that a later change could affect were diagnosed again, as far as time allowed;
-  what `extend --auto` keeps is counted by an earlier rule in all but 170 sets. `make blind` computes what is missing.
-- **Dependent sets.** True parameters lie at eight places of the prior. `own equations` in the figures ({own} sets) have
-  the model's own equations as truth: an easier test.
-- **Few sets** of a campaign with something hidden, of pairs and of bad readings; none with water that enters at a
-  place, none with the side of a patch within a cell. Laws have [their own study](discover.md#how-often-it-is-right).
+- **Chosen on the data.** Some rules for local anomalies, instruments and lists of what is not excluded were chosen
+  after parts of these data sets. Only the lines "not inspected" are free of that, and only for objects.
+- **Several states of the code.** Data sets that a later change could affect were diagnosed again, as far as time
+  allowed; what `extend --auto` keeps is counted by an earlier rule in all but 170. `make blind` computes the rest.
+- **Dependence.** True parameters lie at eight points of the prior. `own equations` in the figures ({own} data sets)
+  have the model's own equations as truth, an easier test.
+- **Few data sets** of a campaign with something hidden, of pairs and of bad readings; none with water that enters
+  locally, none with the side of a patch within a cell.
 {kept}
 {data_limits}
 {left_out}
-- **Natural reaches** have [rates of their own](diagnosis.md#drawn-natural-reaches), of 175 sets of 66 reaches.
+- **Others**: [laws](discover.md#how-often-it-is-right), [natural reaches](diagnosis.md#drawn-natural-reaches).
 """

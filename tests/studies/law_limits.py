@@ -10,9 +10,9 @@ from law_answers import Record, Said, causes, is_true
 
 # Ways to weigh in records of `law_angles`, and in words.
 WAYS = {
-    "as it is": "a model that is right but for the law, weighed as `discover` does",
-    "whole evidence": "the same, without an error of the traces",
-    "true law tried": "the same, and the hidden law itself among those that are tried",
+    "as it is": "a model that is right but for the law, weighted as by `discover`",
+    "whole evidence": "the same, without an error of the fingerprints",
+    "true law tried": "the same, with the hidden law itself among the candidates",
 }
 # Ends of the bins of the chance of the likeliest quantity [-].
 BINS = (0.0, 0.6, 0.8, 0.95, 1.0)

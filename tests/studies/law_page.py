@@ -24,8 +24,8 @@ GROUPS = {"law": "a law hidden", "nothing": "nothing hidden", "listed": "a liste
 LINES: tuple[tuple[str, str, float | None, Callable[[Record], bool | None]], ...] = (
     ("law", "the most probable hypothesis changes the right term", 0.8, says_term),
     ("law", "the same, and it is a law", None, law_says_term),
-    ("law", "the right quantity of the right term is in the 95 % set", 0.8, has_quantity),
-    ("law", "nothing else is in the set", 0.5, quantity_alone),
+    ("law", "the right quantity of the right term is in the 95 % credible set", 0.8, has_quantity),
+    ("law", "nothing else is in the credible set", 0.5, quantity_alone),
     ("law", "held-out RMSE at most 1.25 times that with the true law", 0.7, near_truth),
     ("law", "the same with the most probable hypothesis added, law or not", None, told_near_truth),
     (
@@ -61,27 +61,27 @@ def _lines(made: Sequence[Record]) -> str:
             continue
         share, (low, high) = sum(answers) / len(answers), interval(sum(answers), len(answers))
         reached = wanted is not None and share >= wanted
-        met = "-" if wanted is None else "no" if not reached else "yes" if len(answers) >= FEW_SETS else "too few sets"
+        met = "-" if wanted is None else "no" if not reached else "yes" if len(answers) >= FEW_SETS else "too few"
         target = "-" if wanted is None else f"at least {100 * wanted:.0f} %"
         ends = f"{100 * low:.0f} to {100 * high:.0f} %"
         rows.append(f"| {GROUPS[group]}: {words} | {target} | {len(answers)} | {100 * share:.0f} % | {ends} | {met} |")
     return "\n".join(rows)
 
 
-NUMBERS = """{sets} sets ({law} with a law, {nothing} with nothing, {listed} with a listed effect) of {planned} planned;
-{left_out} were left out, mostly as no plausible size is visible. A search takes {seconds} s of one core.
+NUMBERS = """{sets} data sets ({law} with a law, {nothing} with nothing, {listed} with a listed effect) of {planned}
+planned; {left_out} were left out, mostly as no plausible size is visible. A search takes {seconds} s of one core.
 
-| | wanted | sets | share | 95 % interval | met |
+| | target | data sets | share | 95 % interval | met |
 |---|---|---:|---:|---:|---|
 {lines}
 
-| probability of the most probable quantity | sets | mean | share that is right |
+| probability of the most probable quantity | data sets | mean | share that is right |
 |---|---:|---:|---:|
 {chances}
 
 What the data allow at most, to first order (`tests/studies/law_angles.py`):
 
-| | right quantity in the set | alone |
+| | right quantity in the credible set | alone |
 |---|---:|---:|
 {at_most}
 """

@@ -27,9 +27,9 @@ DOCS = Path(__file__).parents[2] / "docs"
 # Lines whose shares README.md states.
 IN_README = {
     "Nothing hidden, exact site: something named", "Nothing hidden, imperfect site: something named",
-    "Listed effect, 3 s.e.: in the set", "Listed effect, 6 s.e.: in the set",
-    "Unlisted object, not inspected: none of these", "Unlisted object, not inspected: a place within 1.5 m",
-    "Held-out error fell with what `extend --auto` kept",
+    "Listed effect, 3 s.e.: in the credible set", "Listed effect, 6 s.e.: in the credible set",
+    "Unlisted object, not inspected: none of these", "Unlisted object, not inspected: a local anomaly within 1.5 m",
+    "Held-out error lower with what `extend --auto` kept",
 }  # fmt: skip
 
 
@@ -296,12 +296,13 @@ def test_the_page_has_the_numbers_of_its_records(tmp_path: Path) -> None:
     ]  # fmt: skip
     write_page(records, tmp_path, {"pier0": 5.0}, {"pier0": 0.9, "pier1": 0.7}, {})
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
-    assert "| Listed effect, 6 s.e.: in the set | at least 90 % | 5 | 80 % | 28 to 99 % | no | 100 % (1) |" in page
-    assert "3 s.e.: in the set" not in page, "lines without data are left out"
+    row = "Listed effect, 6 s.e.: in the credible set | at least 90 %, **missed** | 5 | 80 % (28 to 99) | 100 % of 1"
+    assert f"| {row} |" in page
+    assert "3 s.e.: in the credible set" not in page, "lines without data are left out"
     assert "`sun`" not in page
     flat = " ".join(page.split())
-    for number in ("left out there:** sun.", "no steady flow (1)", "-20 % (median of 3 sets)", "rise: by 10 % (median)",
-                   "80 % of draws of the errors (2 objects", "5.0 to 5.0 s.e."):  # fmt: skip
+    for number in ("plausible size:** sun.", "no steady flow (1)", "-20 % (median of 3 data sets)",
+                   "rise: by 10 % (median)", "80 % of draws of the errors (2 objects", "5.0 to 5.0 s.e."):  # fmt: skip
         assert number in flat, number
     for name in ("chances", "held-out"):
         assert f"blind-{name}.svg" in page
@@ -316,7 +317,7 @@ def test_limits_of_the_data_are_means_over_what_is_hidden(tmp_path: Path) -> Non
     effects = {f"second/twin/listed{ratio}/0": {"told": 0.01, "evenly": 0.1 / ratio} for ratio in (3, 6)}
     write_page([], tmp_path, {}, {}, objects | effects)
     flat = " ".join((tmp_path / "blind.md").read_text(encoding="utf-8").split())
-    assert "of 60 % of 2 objects and a place within 1.5 m of 40 %" in flat
+    assert "for 60 % of 2 objects and a local anomaly within 1.5 m for 40 %" in flat
     assert "2 % of listed effects of 6 s.e. and 3 % of 3 s.e." in flat
 
 
@@ -326,7 +327,7 @@ def test_the_shipped_page_is_made_of_the_shipped_records() -> None:
     page = (DOCS / "blind.md").read_text(encoding="utf-8")
     lines, met = targets_met(made(records, "second"))
     told = chances_told(made(records, "second"))
-    assert f"Of {lines + 1} targets {met + (distance(told) <= DISTANCE)} are met." in page
+    assert f"of {lines + 1} targets {met + (distance(told) <= DISTANCE)} are met." in page
     assert len(page.splitlines()) <= 120
     readme = " ".join((DOCS.parent / "README.md").read_text(encoding="utf-8").split())
     for line in LINES:

@@ -72,8 +72,8 @@ def test_the_page_has_shares_with_their_intervals(tmp_path: Path) -> None:
     write_law_page([record(SPEED), listed, nothing, left_out], angles, page)
     text = page.read_text(encoding="utf-8")
     assert (text[:6], text[-6:], "old" in text) == ("before", "after\n", False)
-    assert "3 sets (1 with a law, 1 with nothing, 1 with a listed effect)" in text
-    assert "changes the right term | at least 80 % | 1 | 100 % | 2 to 100 % | too few sets |" in text
+    assert "3 data sets (1 with a law, 1 with nothing, 1 with a listed effect)" in text
+    assert "changes the right term | at least 80 % | 1 | 100 % | 2 to 100 % | too few |" in text
     assert "| 95 to 100 % | 1 | 100 % | 100 % |" in text
     assert f"| {WAYS['as it is']} | 100 % | 50 % |" in text
 
