@@ -16,8 +16,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if isinstance(value, int | str | None) else str(value)
-
-
-def number_kept(value: float | None) -> float:
-    """The number that JSON keeps, NaN for null. Errors: TypeError or ValueError where it is none."""
-    return math.nan if value is None else float(value)

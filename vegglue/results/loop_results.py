@@ -7,21 +7,26 @@ What belongs to another state of the case, or cannot be read, counts as not ther
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Annotated, Any, get_args
 
 import numpy as np
-from pydantic import TypeAdapter
+from pydantic import BeforeValidator, PlainValidator, TypeAdapter
 
 from vegglue.arrays import Array
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.measurements.kinds import KINDS
-from vegglue.plain_json import number_kept, plain
+from vegglue.plain_json import plain
 from vegglue.wording.numbers import in_short, in_short_html, so_many
 from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.wording.sentences import phrase, sentence, tag_of, tagged
+
+# Numbers of JSON, which has null for what is none.
+Number = Annotated[float, BeforeValidator(lambda kept: math.nan if kept is None else kept)]
+Errors = Annotated[Array, PlainValidator(lambda kept: np.array(TypeAdapter(list[Number]).validate_python(kept)))]
+Flags = Annotated[np.ndarray, PlainValidator(lambda kept: np.array(TypeAdapter(list[bool]).validate_python(kept)))]
 
 
 @dataclass(frozen=True)
@@ -38,16 +43,16 @@ class InSample:
         Root mean square measurement error of a velocity [m/s].
     """
 
-    rmse: dict[str, float]
-    chi2: float
+    rmse: dict[str, Number]
+    chi2: Number
     stations: int
-    noise_floor: float
+    noise_floor: Number
 
     @property
     def velocity(self) -> float:
         """That of velocities along x, else of the first other direction that was measured [m/s]; NaN without any."""
-        of_kinds = (self.rmse[kind.name] for kind in KINDS.values() if kind.velocity)
-        return next((error for error in of_kinds if np.isfinite(error)), float("nan"))
+        of_kinds = (self.rmse.get(kind.name, math.nan) for kind in KINDS.values() if kind.velocity)
+        return next((error for error in of_kinds if np.isfinite(error)), math.nan)
 
 
 @dataclass(frozen=True)
@@ -64,9 +69,9 @@ class HeldOut:
         Experiment and section of each.
     """
 
-    sections: Array
-    experiments: Array
-    velocity: np.ndarray
+    sections: Errors
+    experiments: Errors
+    velocity: Flags
     clusters: tuple[tuple[str, str], ...]
 
 
@@ -82,9 +87,9 @@ class PredictiveScores:
         Share within the 50 % and the 95 % band [-].
     """
 
-    log_score: float
-    inside50: float
-    inside95: float
+    log_score: Number
+    inside50: Number
+    inside95: Number
 
 
 @dataclass(frozen=True)
@@ -111,47 +116,13 @@ class ModelScore:
     name: str
     title: str
     effects: tuple[str, ...]
-    values: dict[str, tuple[float, float, float]]
+    values: dict[str, tuple[Number, Number, Number]]
     in_sample: InSample
     held_out: HeldOut
     predictive: PredictiveScores
-    homogeneity: dict[str, float]
-    validation: float
-    validation_inside95: float = float("nan")
-
-
-def model_score_from(tree: Mapping[str, Any]) -> ModelScore:
-    """The score of a model from an object of JSON, which has null for no number.
-
-    Errors: KeyError, TypeError or ValueError where it is none.
-    """
-    seen, held_out = tree["in_sample"], tree["held_out"]
-    return ModelScore(
-        name=str(tree["name"]),
-        title=str(tree["title"]),
-        effects=tuple(tree["effects"]),
-        values={name: (number_kept(a), number_kept(b), number_kept(c)) for name, (a, b, c) in tree["values"].items()},
-        in_sample=InSample(
-            rmse={kind: number_kept(seen["rmse"][kind]) for kind in KINDS},
-            chi2=number_kept(seen["chi2"]),
-            stations=int(seen["stations"]),
-            noise_floor=number_kept(seen["noise_floor"]),
-        ),
-        held_out=HeldOut(
-            sections=np.array([number_kept(error) for error in held_out["sections"]]),
-            experiments=np.array([number_kept(error) for error in held_out["experiments"]]),
-            velocity=np.array([bool(one) for one in held_out["velocity"]]),
-            clusters=tuple((str(experiment), str(section)) for experiment, section in held_out["clusters"]),
-        ),
-        predictive=PredictiveScores(**{name: number_kept(value) for name, value in tree["predictive"].items()}),
-        homogeneity={name: number_kept(p) for name, p in tree["homogeneity"].items()},
-        validation=number_kept(tree["validation"]),
-        validation_inside95=number_kept(tree.get("validation_inside95")),
-    )
-
-
-# Errors of a step, which may be unknown.
-ERRORS = ("in_sample", "held_out_sections", "held_out_experiments", "unseen", "noise_floor")
+    homogeneity: dict[str, Number]
+    validation: Number
+    validation_inside95: Number = math.nan
 
 
 @dataclass(frozen=True)
@@ -177,11 +148,11 @@ class ComparedModel:
     config_hash: str
     added: tuple[str, ...]
     parameters: int
-    in_sample: float
-    held_out_sections: float
-    held_out_experiments: float
-    unseen: float
-    noise_floor: float
+    in_sample: Number
+    held_out_sections: Number
+    held_out_experiments: Number
+    unseen: Number
+    noise_floor: Number
 
 
 @dataclass(frozen=True)
@@ -232,19 +203,6 @@ class ModelComparison:
         return in_short_html(repr(self).split("\n")[0], headings, rows)
 
 
-def comparison_from(tree: Mapping[str, Any]) -> ModelComparison:
-    """The comparison of an object of JSON, which has null for no number.
-
-    Errors: KeyError, TypeError or ValueError where it is none.
-    """
-    steps = []
-    for step in tree["steps"]:
-        errors = {name: number_kept(step[name]) for name in ERRORS}
-        steps.append(ComparedModel(**{**step, **errors, "added": tuple(step["added"])}))
-    reason, verdict, unclear = str(tree["reason"]), str(tree["verdict"]), tuple(map(str, tree["unclear"]))
-    return ModelComparison(tuple(steps), int(tree["left_out"]), reason, verdict, unclear)
-
-
 # Below this D^2 a measurement does not separate anything.
 SEPARATES = 4.0
 # Measurements shown of each question: more than these cannot be planned in one season.
@@ -284,7 +242,8 @@ class HiddenLaw:
 
 
 Subject = RivalEffects | OneOfRivals | HiddenEffect | HiddenLaw
-SUBJECTS: Mapping[str, type] = {tag_of(one): one for one in get_args(Subject)}
+SUBJECTS: dict[str, type] = {tag_of(one): one for one in get_args(Subject)}
+KeptSubject = PlainValidator(lambda kept: TypeAdapter(SUBJECTS[kept["kind"]]).validate_python(kept))
 
 
 @dataclass(frozen=True)
@@ -331,9 +290,9 @@ class Question:
         D^2 from which a diagnosis detects it 19 times of 20 [-]; infinite if that depends on no size.
     """
 
-    about: Subject
+    about: Annotated[Subject, KeptSubject]
     measurements: tuple[ProposedMeasurement, ...]
-    seen_from: float = math.inf
+    seen_from: Annotated[float, BeforeValidator(lambda kept: math.inf if kept is None else kept)] = math.inf
 
     @property
     def tells_apart(self) -> str:
@@ -362,41 +321,29 @@ class Question:
         return "\n".join([sentence(self), *(f"- {phrase('proposed_measurement', one)}" for one in self.useful)])
 
 
-def questions_from(tree: Sequence[Mapping[str, Any]]) -> tuple[Question, ...]:
-    """The questions of a list of JSON, null for a size that is never seen.
-
-    Errors: KeyError, TypeError or ValueError where it is none.
-    """
-    return tuple(
-        Question(
-            about=TypeAdapter(SUBJECTS[one["about"]["kind"]]).validate_python(one["about"]),
-            measurements=TypeAdapter(tuple[ProposedMeasurement, ...]).validate_python(one["measurements"]),
-            seen_from=math.inf if one["seen_from"] is None else float(one["seen_from"]),
-        )
-        for one in tree
-    )
-
-
 SCORE_FORMAT, COMPARISON_FORMAT, QUESTIONS_FORMAT = "vegglue rung 1", "vegglue comparison 3", "vegglue questions 4"
 SCORE_FILE, COMPARISON_FILE, QUESTIONS_FILE = "rung.json", "comparison.json", "questions.json"
-Kept = TypeVar("Kept")
 # A measurement that is left out: where it stands, and its value.
 MeasurementRow = Sequence[str | float]
 
 
+@dataclass(frozen=True)
+class KeptScore:
+    """A score, and the measurements that were left out."""
+
+    left_out: list[Any]
+    rung: ModelScore
+
+
 def write_model_score(folder: Path, score: ModelScore, left_out: Sequence[MeasurementRow], config_hash: str) -> None:
     """Keep what a model misses, calibrated without some measurements. Errors: StorageError."""
-    told = {"left_out": [*map(list, left_out)], "rung": asdict(score)}
-    _write(folder / SCORE_FILE, SCORE_FORMAT, config_hash, told)
+    _write(folder / SCORE_FILE, SCORE_FORMAT, config_hash, asdict(KeptScore([*map(list, left_out)], score)))
 
 
 def model_score_that_fits(folder: Path, left_out: Sequence[MeasurementRow], config_hash: str) -> ModelScore | None:
     """What the model of exactly this config misses, without exactly these measurements; None where it is not kept."""
-
-    def understand(told: Any) -> ModelScore | None:
-        return model_score_from(told["rung"]) if told["left_out"] == [*map(list, left_out)] else None
-
-    return _read_if_it_fits(folder / SCORE_FILE, SCORE_FORMAT, config_hash, understand)
+    kept = _read_if_it_fits(folder / SCORE_FILE, SCORE_FORMAT, config_hash, KeptScore)
+    return kept.rung if kept is not None and kept.left_out == [*map(list, left_out)] else None
 
 
 def write_comparison(folder: Path, comparison: ModelComparison, config_hash: str) -> None:
@@ -406,7 +353,7 @@ def write_comparison(folder: Path, comparison: ModelComparison, config_hash: str
 
 def comparison_that_fits(folder: Path, config_hash: str) -> ModelComparison | None:
     """The comparison kept there for exactly this config, None without."""
-    return _read_if_it_fits(folder / COMPARISON_FILE, COMPARISON_FORMAT, config_hash, comparison_from)
+    return _read_if_it_fits(folder / COMPARISON_FILE, COMPARISON_FORMAT, config_hash, ModelComparison)
 
 
 def write_questions(folder: Path, questions: Sequence[Question], config_hash: str) -> None:
@@ -416,7 +363,7 @@ def write_questions(folder: Path, questions: Sequence[Question], config_hash: st
 
 def questions_that_fit(folder: Path, config_hash: str) -> tuple[Question, ...] | None:
     """The questions kept there for exactly this config; None if none were asked, empty if nothing is left to ask."""
-    return _read_if_it_fits(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, questions_from)
+    return _read_if_it_fits(folder / QUESTIONS_FILE, QUESTIONS_FORMAT, config_hash, tuple[Question, ...])
 
 
 def _write(path: Path, file_format: str, config_hash: str, told: Any) -> None:
@@ -424,11 +371,12 @@ def _write(path: Path, file_format: str, config_hash: str, told: Any) -> None:
     write_text(path, json.dumps(plain(tree), ensure_ascii=False, indent=1, allow_nan=False) + "\n", MAKE_ROOM)
 
 
-def _read_if_it_fits(path: Path, file_format: str, config_hash: str, understand: Callable[[Any], Kept]) -> Kept | None:
+def _read_if_it_fits(path: Path, file_format: str, config_hash: str, kind: Any) -> Any:
+    """A value of this kind, None where there is none of this format and config."""
     try:
         tree = json.loads(read_text(path, LARGEST_JSON))
         if (tree["format"], tree["config_hash"]) != (file_format, config_hash):
             return None
-        return understand(tree["told"])
+        return TypeAdapter(kind).validate_python(tree["told"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         return None
