@@ -36,8 +36,6 @@ def first_refusal(tree: Mapping[str, Any], problems: Iterable[Mapping[str, Any]]
     if kind == "extra_forbidden":
         return CaseError(place, f"is not a known key: {nearest(str(place[-1]), _keys(place[:-1]))}")
     expected = expected_in_words(problem)
-    for short, whole in (("greater", "a number greater"), ("less", "a number less")):
-        expected = expected.replace(short, whole)
     advice = ""
     if isinstance(got, str) and "number" in expected:
         if re.fullmatch(r"[-+]?\d+,\d+.*", got):
@@ -65,7 +63,12 @@ def expected_in_words(problem: Mapping[str, Any]) -> str:
         return phrase("expected_at_least", problem["ctx"]["min_length"])
     if problem["type"] == "too_long":
         return phrase("expected_at_most", problem["ctx"]["max_length"])
+    if problem["type"] == "missing":
+        return "a value"
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if problem["type"] not in ("value_error", "literal_error"):
+        for short, whole in (("greater", "a number greater"), ("less", "a number less"), ("valid number", "number")):
+            expected = expected.replace(short, whole)
     return re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
 
 

@@ -329,8 +329,7 @@ def read_site(path: Path, completed: Any = None) -> FieldSite:
             before, dot, last = place.rpartition(".")
             short = {long: name for name, long in OF_FLOW}.get(last, last)
             raise InputError(f"{shown_path(path)}: `{before}{dot}{short}` is missing; add it.") from None
-        expected = expected_in_words(problem)
-        expected = expected.replace("valid number", "number").replace("valid string", "text in quotes")
+        expected = expected_in_words(problem).replace("valid string", "text in quotes")
         got = shown_value(problem["input"])
         raise InputError(f"{shown_path(path)}: `{place}` expected {expected}, got {got}; correct it.") from None
     counted = ["stems_per_m2" in one.model_fields_set for one in site.patches if one.file is None]
