@@ -206,13 +206,13 @@ def rows() -> str:
 
 
 def kills() -> str:
-    """The outcome of the kills: total, and by command."""
+    """The outcome of the kills."""
     table = json.loads(KILLS.read_text(encoding="utf-8"))
     total, in_time = (sum(one[key] for one in table.values()) for key in ("kills", "in_time"))
-    by_command = ", ".join(f"`{name}` {one['kills']}" for name, one in table.items())
     text = (
-        f"{total} kills, {in_time} of them before the command had ended ({by_command}). Every time the same command "
-        "then finished, and every file had the bits of an undisturbed run, but for the seconds that members took."
+        f"{total} kills of {len(table)} commands (`data/faults/kills.json`), {in_time} of them before the command had "
+        "ended. Every time the same command then finished, and every file had the bits of an undisturbed run, except "
+        "for the seconds that members took."
     )
     return fill(text, 120, break_on_hyphens=False)
 
@@ -222,62 +222,64 @@ def page() -> str:
     return TEXT.format(rows=rows(), kills=kills())
 
 
-TEXT = """# When something goes wrong
+TEXT = """# Full disks, kills and damaged files
 
-The tests make each of these faults happen, and then give the same command once more, undisturbed
+The tests cause each of these faults, and then run the same command again, undisturbed
 (`tests/end_to_end/test_fault_table.py`; `python tests/fault_table.py` writes this page).
 
 ## Faults and their outcome
 
-[Exit codes](commands.md#what-is-kept-and-how-a-command-ends) other than 0 come with one sentence on standard error: the
-file, what is wrong, and the command that mends it. If a command can go on, its numbers have the bits of an undisturbed
-run. The ensemble here has four chunks of members; the last column counts those that the command and the next `simulate`
-solve together.
+With an [exit code](commands.md#what-is-kept-and-how-a-command-ends) other than 0, one sentence on standard error gives
+the file, the fault, and the command that repairs it. If a command continues, its numbers have the bits of an
+undisturbed run. The ensemble here has four chunks of members; the last column counts the chunks that the command and
+the next `simulate` solve together.
 
 {rows}
 
-A worker that hangs cannot be distinguished from a slow one: the command waits. Stop it with Ctrl-C; finished work is
-kept.
+A hanging worker cannot be distinguished from a slow one: the command waits. Stop it with Ctrl-C; finished work is kept.
 
 ## Kills
 
-`make faults` kills every command with signal 9 at random moments; `make test` has a share of it.
+`make faults` kills every command with signal 9 at random moments; `make test` includes some of these kills.
 
 {kills}
 
-## How it is done
+## Mechanisms
 
-- A file appears under its name only when it is whole and on the disk.
-- Whole results end with the SHA-256 of all bytes before it. A separate process reads every result first, as the HDF5
-  library reads some damaged files without end.
-- Members are kept chunk by chunk in `ensemble.h5.part`; the next run takes over the chunks whose checksum is right.
-- An ensemble is written by one process at a time, by a lock of the operating system. Locks of some network disks reach
-  one machine only; the first of two runs then stops with a message, and the second is whole. Of two writers of a
-  diagnosis, a posterior or a page the later one stays.
+- A file appears under its name only when it is complete and on the disk.
+- Results end with the SHA-256 of all bytes before it. A separate process reads every result first, because the HDF5
+  library never finishes reading some damaged files.
+- Members are kept chunk by chunk in `ensemble.h5.part`; the next run reuses the chunks whose checksum is right.
+- A lock of the operating system allows one process at a time to write an ensemble. On some network disks locks do not
+  reach other machines; then the first of two runs stops with a message, and the second completes. Of two processes that
+  write a diagnosis, a posterior or a page, the later one wins.
 - A file with links or with data in other files is refused; a link in the folder of a run is replaced, not followed.
-- Configs that `import`, `extend` and `twin` write, if you edited them, are replaced with `--force` only.
+- Configs of `import`, `extend` and `twin` that you edited are replaced only with `--force`.
 
-## What other people's files hold
+## Damaged files from others
 
-Such a file is read, and `import` counts what it leaves out; or it is refused with exit code 2, and nothing is written.
-[How tables are read](own_files.md#how-tables-are-read) has the rules for tables.
+`import` reads such a file and counts what it leaves out, or refuses it with exit code 2 and writes nothing. See also [how
+tables are read](own_files.md#how-tables-are-read).
 
-| kind | what is done |
+| content | result |
 |---|---|
-| any field marked as missing, in every format | read as without its row or cell, or refused |
-| lost bottom track, ranges or ensembles of a boat | the ensemble has no place and is left out; a leap of the boat is refused |
-| raw ensembles with a wrong check sum or size, or cut short; cells of two sizes; a lost beam of four | the ensemble alone is left out; each cell keeps its place; three beams do if the file allows it |
-| velocities against the boat (reference NONE) | refused |
+| a value marked as missing, in any format | read without its row or cell, or refused |
+| lost bottom track, ranges or ensembles of a boat | the ensemble has no position and is left out; a jump of the boat is refused |
+| raw ensembles with a wrong checksum or size, or cut short | only the ensemble is left out |
+| cells of two sizes; a lost beam of four | each cell keeps its position; three beams are used if the file allows it |
+| velocities relative to the boat (reference NONE) | refused |
 | -999, zeros or constants as predictions of a command | failed members; refused if none is left, or if no parameter has an effect |
-| another system, datum or unit of a map; scale and offset of a raster | refused; applied |
-| words of gauging offices (Ice, Eqp), a row of types, -999999, 3.7D-01 | no value; read |
-| marks in flows of the site file, stems and corners | refused |
-| damaged MATLAB files, and files that unpack to more than 100 MB | read by a process of its own; refused |
+| another coordinate system, datum or unit of a map | refused |
+| scale and offset of a raster | applied |
+| codes of gauging offices (Ice, Eqp), a row of types, -999999 | no value |
+| 3.7D-01 | read as 0.37 |
+| missing-value codes in the site file, stems and corners | refused |
+| damaged MATLAB files, and files that unpack to more than 100 MB | refused, by a separate process |
 
 ## Following a run
 
-The growing file may be read at any time, also with HDF5's locks on. `progress/finished` lists the finished chunks;
-other rows are NaN. Open it, read, and close it again:
+The growing file may be read at any time, also with HDF5's locks. `progress/finished` lists the finished chunks; other
+rows are NaN. Open it, read, and close it again:
 
 ```python
 import h5py
