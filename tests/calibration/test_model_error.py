@@ -333,15 +333,26 @@ def test_errors_add_up_and_none_is_none(
     assert not site_error_columns(*flowing, ModelError(friction=0.05), cells).any()
 
 
-def test_probes_within_a_cell_of_a_wall_stand_up_to_half_a_cell_from_the_velocity_of_the_model() -> None:
-    """Of the model without walls none do; elsewhere a site without errors of its own has none."""
+def test_a_probe_within_a_cell_of_a_wall_errs_by_the_profile_over_it() -> None:
+    """By g^(1/2) n b^(-1/6) |u| / kappa, b the width of the cell; of the model without walls none does."""
     model, point = coarse_twin()
     (south, _), width = model.case.grid.y, model.case.grid.cell[1]
     walls = FrictionClass(law="manning", n=0.01)
     between = model.case.model_copy(update={"friction": model.case.friction.model_copy(update={"walls": walls})})
     beside_it = np.arange(len(model.station)) == 3
     station = model.station.assign(y=np.where(beside_it, south + 0.4 * width, model.station["y"]))
-    for case, beside in ((between, [3]), (model.case, [])):
-        assert np.flatnonzero(beside_walls(replace(model, case=case, station=station))).tolist() == beside
     cells = cell_responses(model, point, ("friction",))
-    assert site_error_columns(model, point, ModelError(friction=0.05), cells).shape[1] == 0
+    for case, beside in ((between, [3]), (model.case, [])):
+        there = replace(model, case=case, station=station)
+        assert np.flatnonzero(beside_walls(there)).tolist() == beside
+        columns = site_error_columns(there, point, ModelError(friction=0.05), cells)
+        assert columns.shape[1] == len(beside)
+        speed = np.abs(point.prediction[beside])
+        expected = np.sqrt(9.81) * 0.01 * width ** (-1.0 / 6.0) / 0.41 * speed
+        assert columns[beside].sum(axis=1) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_profile_varies_over_a_cell_by_its_shear_velocity() -> None:
+    """The standard deviation of ln(y) between the wall and the end of a cell is 1, however wide it is."""
+    y = (np.arange(100_000) + 0.5) / 100_000
+    assert np.log(0.05 * y).std() == pytest.approx(1.0, abs=1e-3)

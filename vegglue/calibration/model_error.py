@@ -12,8 +12,9 @@ missing effect:
 
 du/dy is how a velocity changes where a probe stands beside its place, Q_e answers to the discharge of experiment e, P_p
 to the friction of patch p, O_s to side s of a patch that lies 1 m further out and I_s to one 1 m further in, all in
-units of a station. A side lies out or in, with the same chance. Within a cell of a wall the model has one velocity, and
-a probe stands up to half a cell from it: there s_y is WITHIN_WALL_CELL of the width of a cell, at least.
+units of a station. A side lies out or in, with the same chance. Within a cell of a wall the model has one velocity,
+the mean of the profile u(y) = u*/kappa ln(y/z_0) whose standard deviation over the cell is u*/kappa; S has its square
+there, with u* = c_w^(1/2) |u| by the friction of the wall.
 
 Something unlisted at a place, once it is in the model, is a spot there and something else in nature: of all that it
 does, its force, water or volume A, shape_error may act in the n basis functions around it instead,
@@ -42,7 +43,9 @@ from vegglue.case.grid import Grid
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
 from vegglue.decision_constants import constants
+from vegglue.effects.physical_constants import KARMAN
 from vegglue.engine.interface import Cause, Model, Point, responses, responses_to_cells
+from vegglue.engine.newton import problem_at
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.parallel import in_threads
@@ -65,9 +68,6 @@ LEAST_CELLS = 1.5
 # Below it a basis function counts as zero [-]: responses hold seven digits. Smaller ones are lost in single precision
 # and take a processor ten times as long.
 LEAST_VALUE = 1e-15
-# Distance of a probe from where the model has its velocity, within a cell of a wall, over the width of that cell [-].
-# Chosen after the compound channel A1 of docs/measured.md, where two readings in the layer of a wall were an obstacle.
-WITHIN_WALL_CELL = 0.5
 # The name of an effect that is tried alone, and of its amplitude; no case has it.
 TRIED, AMOUNT = "error_of_the_site", "error_of_the_site_amount"
 UNKNOWN = Parameter(distribution="uniform", low=-1.0, high=1.0, unit="-")
@@ -258,11 +258,12 @@ def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: C
             of_discharge |= set(entry.experiments or model.case.experiments)
         elif effect_of(model.case, name).name == "patch_density":
             of_stems.add(int(float(entry.values.get("patch", 1.0))) - 1)
-    apart = np.where(beside_walls(model), WITHIN_WALL_CELL * model.case.grid.cell[1], 0.0)
-    apart = np.where(velocity_rows(model.station), np.maximum(apart, allowed.probes), 0.0)
-    if apart.any():
+    velocities = np.asarray(velocity_rows(model.station))
+    if allowed.probes:
         slope = responses(model, point, [_cause(model.case, "station_shift")])[:, 0]
-        columns.append((apart * np.diag(slope))[:, np.flatnonzero(apart)])
+        columns.append(allowed.probes * np.diag(slope)[:, velocities])
+    if (beside := beside_walls(model) & velocities).any():
+        columns.append(np.diag(_over_wall_cell(model, point))[:, beside])
     if allowed.discharge:
         stated = [name for name in model.case.experiments if name not in of_discharge]
         causes = [_cause(model.case, "discharge_error", name) for name in stated]
@@ -283,6 +284,13 @@ def beside_walls(model: Model) -> Mask:
     (south, north), width, y = model.case.grid.y, model.case.grid.cell[1], model.station["y"].to_numpy(float)
     near = np.minimum(np.abs(y - south), np.abs(north - y)) <= width
     return np.asarray(near & (model.case.friction.walls is not None))
+
+
+def _over_wall_cell(model: Model, point: Point) -> Array:
+    """u*/kappa = (c_w^(1/2) / kappa) |u| (n,) [m/s], see the head of this file."""
+    experiment = next(iter(point.flows))
+    rate = problem_at(model, experiment, point.z).walls.rate
+    return np.asarray(np.sqrt(rate[0] * model.site.grid.dy) / KARMAN * np.abs(point.prediction))
 
 
 def _cause(case: Case, effect: str, *experiments: str) -> Cause:
