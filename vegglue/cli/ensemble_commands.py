@@ -36,7 +36,7 @@ from vegglue.wording.sentences import phrase
 def check_command(
     config: Config, runs: Runs = RUNS, as_object: Json = False, quiet: Quiet = False, trust: Trust = False
 ) -> None:
-    """Read everything a case names, report what is odd, and draw the channel, before hours are spent."""
+    """Check all files of a case, report likely errors, and draw the channel."""
     case = vegglue.load_case(config, trust)
     with progress_reporter(quiet, as_object):
         found = vegglue.check(case, runs=runs)
@@ -46,7 +46,7 @@ def check_command(
 def simulate_command(
     config: Config,
     members: Members = None,
-    parameters: Annotated[Path | None, typer.Option(help=HELP["simulate.parameters"])] = None,
+    parameters: Annotated[Path | None, typer.Option(metavar="CSV", help=HELP["simulate.parameters"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,
@@ -55,7 +55,7 @@ def simulate_command(
     trust: Trust = False,
     force: Force = False,
 ) -> None:
-    """Solve every member of the ensemble; a run that was stopped goes on where it was.
+    """Solve all members of the ensemble; a stopped run is continued.
 
     With --force, members for which the command of an `engine` failed are run again.
     """
@@ -103,7 +103,7 @@ def infer_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Infer the parameters from the measurements and report what was found."""
+    """Compute the posterior of the parameters from the measurements."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         run = opened.with_settings(runs, jobs, watch)
@@ -120,7 +120,7 @@ def report_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Make the page and the figures of a run."""
+    """Write the page and the figures of a run."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch:
         run = opened.with_settings(runs, watch=watch)
@@ -141,7 +141,7 @@ def run_command(
     trust: Trust = False,
     force: Force = False,
 ) -> None:
-    """The whole loop: diagnose, add what is missing, watch the error fall; posterior and report of the last model."""
+    """Run the whole loop: diagnose, add effects while held-out errors fall; posterior and report of the last model."""
     opened, results = opened_run(config, trust), list[tuple[Any, Any]]()
 
     def show(of: Any, result: Any) -> None:
@@ -166,14 +166,14 @@ def run_command(
 
 
 def demo_command(
-    folder: Annotated[Path, typer.Argument(help=HELP["demo.folder"])] = RUNS / "demo",
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help=HELP["demo.folder"])] = RUNS / "demo",
     short: Annotated[bool, typer.Option("--short", metavar=FLAG, help=HELP["demo.short"])] = False,
     no_open: Annotated[bool, typer.Option("--no-open", metavar=FLAG, help=HELP["demo.no-open"])] = False,
     jobs: Jobs = -1,
     as_object: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run the loop on measurements that come with the package, up to one page that shows it."""
+    """Run the loop on synthetic measurements of the package, and open a page with the results."""
     results = list[tuple[Any, Any]]()
 
     def show(of: Any, result: Any) -> None:

@@ -20,18 +20,18 @@ FORMS: tuple[Literal["csv", "geotiff", "netcdf"], ...] = ("csv", "geotiff", "net
 
 
 def new_command(
-    name: Annotated[str, typer.Argument(help=HELP["new.name"], show_default=False)],
-    length: Annotated[float, typer.Option(help=HELP["new.length"])] = 40.0,
-    width: Annotated[float, typer.Option(help=HELP["new.width"])] = 3.0,
-    slope: Annotated[float, typer.Option(help=HELP["new.slope"])] = 0.001,
-    depth: Annotated[float, typer.Option(help=HELP["new.depth"])] = 0.9,
-    discharge: Annotated[float, typer.Option(help=HELP["new.discharge"])] = 1.5,
+    name: Annotated[str, typer.Argument(metavar="NAME", help=HELP["new.name"], show_default=False)],
+    length: Annotated[float, typer.Option(metavar="NUMBER", help=HELP["new.length"])] = 40.0,
+    width: Annotated[float, typer.Option(metavar="NUMBER", help=HELP["new.width"])] = 3.0,
+    slope: Annotated[float, typer.Option(metavar="NUMBER", help=HELP["new.slope"])] = 0.001,
+    depth: Annotated[float, typer.Option(metavar="NUMBER", help=HELP["new.depth"])] = 0.9,
+    discharge: Annotated[float, typer.Option(metavar="NUMBER", help=HELP["new.discharge"])] = 1.5,
     plants: Annotated[bool, typer.Option(metavar=FLAG, help=HELP["new.plants"])] = True,
-    folder: Annotated[Path, typer.Option(help=HELP["new.folder"])] = Path("."),
+    folder: Annotated[Path, typer.Option(metavar="FOLDER", help=HELP["new.folder"])] = Path("."),
     as_object: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make a working folder: a commented case of a straight reach, and example measurements that belong to it."""
+    """Make an example folder: a commented case of a straight reach, and its measurements."""
     from vegglue.workflow.new import Reach
 
     with progress_reporter(quiet, as_object):
@@ -54,9 +54,7 @@ def export_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Write the flow and the stations for maps and tables: CSV, GeoTIFF, netCDF (UGRID); or the case for PEST++ or
-    SPOTPY.
-    """
+    """Write flow and stations as CSV, GeoTIFF and netCDF (UGRID), or the case for PEST++ or SPOTPY."""
     if only is not None and to is not None:
         raise InputError("export: expected --only or --to, got both; leave one out.")
     case = vegglue.load_case(config, trust)
@@ -71,15 +69,17 @@ def export_command(
 
 
 def effects_command(
-    name: Annotated[str | None, typer.Argument(help=HELP["effects.name"], show_default=False)] = None,
-    config: Annotated[Path | None, typer.Option("--config", "--case", help=HELP["effects.config"])] = None,
-    check: Annotated[Path | None, typer.Option(help=HELP["effects.check"])] = None,
+    name: Annotated[str | None, typer.Argument(metavar="EFFECT", help=HELP["effects.name"], show_default=False)] = None,
+    config: Annotated[
+        Path | None, typer.Option("--config", "--case", metavar="CONFIG", help=HELP["effects.config"])
+    ] = None,
+    check: Annotated[Path | None, typer.Option(metavar="FILE", help=HELP["effects.check"])] = None,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Annotated[bool, typer.Option("--trust", metavar=FLAG, help=HELP["effects.trust"])] = False,
     runs: Runs = RUNS,
 ) -> None:
-    """List the physical effects that can be added, or show one of them."""
+    """List the physical effects of the library, or show one of them."""
     from vegglue.wording.sentences import layout, phrase, sentences
 
     if check is not None:
@@ -140,21 +140,21 @@ def effect_json(effect: "Effect") -> dict[str, object]:
 
 
 def twin_command(
-    config: Annotated[Path, typer.Argument(help=HELP["twin.config"], show_default=False)],
-    to: Annotated[Path, typer.Option(help=HELP["twin.to"], show_default=False)],
+    config: Annotated[Path, typer.Argument(metavar="CONFIG", help=HELP["twin.config"], show_default=False)],
+    to: Annotated[Path, typer.Option(metavar="FOLDER", help=HELP["twin.to"], show_default=False)],
     hide: Annotated[
         list[str] | None,
-        typer.Option(help=HELP["twin.hide"]),
+        typer.Option(metavar="EFFECT", help=HELP["twin.hide"]),
     ] = None,
-    snr: Annotated[float, typer.Option(min=0.1, help=HELP["twin.snr"])] = 6.0,
-    noise: Annotated[str, typer.Option(help=HELP["twin.noise"])] = "white",
-    seed: Annotated[int, typer.Option(min=0, help=HELP["twin.seed"])] = 1,
+    snr: Annotated[float, typer.Option(min=0.1, metavar="NUMBER", help=HELP["twin.snr"])] = 6.0,
+    noise: Annotated[str, typer.Option(metavar="KIND", help=HELP["twin.noise"])] = "white",
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help=HELP["twin.seed"])] = 1,
     as_object: Json = False,
     quiet: Quiet = False,
     force: Force = False,
     trust: Trust = False,
 ) -> None:
-    """Make measurements with a hidden effect, to play blind against `diagnose`; the answer is sealed."""
+    """Make synthetic measurements with a hidden effect, to test `diagnose`; the answer is encoded."""
     parent = vegglue.load_case(config, trust)
     case = vegglue.make_twin(parent, to, hide=hide or ["?"], snr=snr, noise=noise, seed=seed, force=force)
     from vegglue.measurements.observations import read_observations
@@ -170,13 +170,13 @@ def twin_command(
 
 
 def reveal_command(
-    folder: Annotated[Path, typer.Argument(help=HELP["reveal.folder"], show_default=False)],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help=HELP["reveal.folder"], show_default=False)],
     runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Open the seal of a twin, and report how well its diagnosis guessed."""
+    """Decode the answer of a twin, and compare it with its diagnosis."""
     lines = vegglue.reveal(folder, runs=runs, trust=trust)
     if as_object:
         print_object({"folder": folder, "sentences": lines})

@@ -33,17 +33,17 @@ from vegglue.wording.sentences import phrase
 
 
 def import_command(
-    folder: Annotated[Path, typer.Argument(help=HELP["import.folder"])],
-    to: Annotated[Path | None, typer.Option(help=HELP["import.to"])] = None,
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help=HELP["import.folder"])],
+    to: Annotated[Path | None, typer.Option(metavar="CONFIG", help=HELP["import.to"])] = None,
     as_object: Json = False,
     quiet: Quiet = False,
     force: Force = False,
 ) -> None:
-    """Make a case of a folder of measurements, with wide priors; `vegglue run` then needs no edit by hand.
+    """Make a case from a folder of measurements, with wide priors, ready for `vegglue run`.
 
-    Tables may have any separator, units and names of columns: one line reports what was taken from each.
+    Tables may have any separator, units and names of columns; for each file one line reports what was read.
 
-    The confluence set of R.B. Canelas makes two, one with the bed surveyed and one with a plane instead.
+    The confluence data set of R.B. Canelas makes two cases, with the surveyed bed and with a plane bed.
     """
     case = vegglue.import_folder(folder, to, force=force)
     target = shown_path(case.source)
@@ -80,7 +80,7 @@ def diagnose_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Find where the model fails, which effect is missing, and with which probability."""
+    """Find the cause of the misfit: a missing effect, a local anomaly or a faulty instrument."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.diagnose(opened.with_settings(runs, jobs, watch, memory=memory))
@@ -99,8 +99,8 @@ def diagnose_command(
 
 def discover_command(
     config: Config,
-    without: Annotated[list[str] | None, typer.Option(help=HELP["discover.without"])] = None,
-    to: Annotated[Path | None, typer.Option(help=HELP["discover.to"])] = None,
+    without: Annotated[list[str] | None, typer.Option(metavar="EFFECT", help=HELP["discover.without"])] = None,
+    to: Annotated[Path | None, typer.Option(metavar="CONFIG", help=HELP["discover.to"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,
@@ -109,7 +109,7 @@ def discover_command(
     trust: Trust = False,
     force: Force = False,
 ) -> None:
-    """Say which law, in no list, explains the misfit; write it as an effect file and a child config."""
+    """Find an unlisted law that explains the misfit; write it as an effect file and a child config."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.discover(opened.with_settings(runs, jobs, watch, force), without=without or [], to=to)
@@ -118,10 +118,10 @@ def discover_command(
 
 def extend_command(
     config: Config,
-    add: Annotated[list[str] | None, typer.Option(help=HELP["extend.add"])] = None,
-    shape: Annotated[list[str] | None, typer.Option(help=HELP["extend.shape"])] = None,
+    add: Annotated[list[str] | None, typer.Option(metavar="EFFECT", help=HELP["extend.add"])] = None,
+    shape: Annotated[list[str] | None, typer.Option(metavar="NAME=NUMBER", help=HELP["extend.shape"])] = None,
     auto: Annotated[bool, typer.Option("--auto", metavar=FLAG, help=HELP["extend.auto"])] = False,
-    to: Annotated[Path | None, typer.Option(help=HELP["discover.to"])] = None,
+    to: Annotated[Path | None, typer.Option(metavar="CONFIG", help=HELP["discover.to"])] = None,
     jobs: Jobs = -1,
     memory: MemoryLimit = None,
     cluster: Cluster = None,
@@ -131,7 +131,7 @@ def extend_command(
     trust: Trust = False,
     force: Force = False,
 ) -> None:
-    """Write a child config that extends its parent by one effect or more."""
+    """Write a child config with one or more further effects."""
     shapes = dict(number_given(text) for text in shape or [])
     if auto == bool(add):
         got = "both" if add else "neither"
@@ -157,14 +157,14 @@ def extend_command(
 
 
 def compare_command(
-    configs: Annotated[list[Path], typer.Argument(help=HELP["compare.configs"], show_default=False)],
+    configs: Annotated[list[Path], typer.Argument(metavar="CONFIG", help=HELP["compare.configs"], show_default=False)],
     jobs: Jobs = -1,
     runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Set models side by side: their errors on what they have seen, on what was held out, and what each step cost."""
+    """Compare the errors of models at calibration data and at held-out data."""
     opened = opened_runs(configs, trust)
     with progress_reporter(quiet, as_object) as watch:
         found = vegglue.compare([one.with_settings(runs, jobs, watch) for one in opened])
@@ -172,13 +172,13 @@ def compare_command(
 
 
 def overview_command(
-    configs: Annotated[list[Path], typer.Argument(help=HELP["overview.configs"], show_default=False)],
+    configs: Annotated[list[Path], typer.Argument(metavar="CONFIG", help=HELP["overview.configs"], show_default=False)],
     runs: Runs = RUNS,
     as_object: Json = False,
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Make one page of several runs: their answers, parameters side by side, and the way to each report."""
+    """Make one page of several runs: verdicts, parameters side by side, and links to the reports."""
     cases = [vegglue.load_case(config, trust) for config in configs]
     with progress_reporter(quiet, as_object) as watch:
         page = vegglue.overview(cases, runs=runs, trust=trust, watch=watch)
@@ -187,7 +187,7 @@ def overview_command(
 
 def next_command(
     config: Config,
-    between: Annotated[list[str] | None, typer.Option(help=HELP["next.between"])] = None,
+    between: Annotated[list[str] | None, typer.Option(metavar="EFFECT", help=HELP["next.between"])] = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,
     runs: Runs = RUNS,
@@ -195,7 +195,7 @@ def next_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Rank the measurements that would separate the remaining rivals, by gain per hour of field work."""
+    """Propose measurements that distinguish the remaining hypotheses, by gain per hour of field work."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch, vegglue.on_cluster(cluster):
         found = vegglue.next_measurement(opened.with_settings(runs, jobs, watch), between=between or [])
@@ -204,10 +204,10 @@ def next_command(
 
 def plan_command(
     config: Config,
-    about: Annotated[str, typer.Option(help=HELP["plan.about"])] = "",
-    size: Annotated[float | None, typer.Option(help=HELP["plan.size"])] = None,
-    between: Annotated[tuple[str, str] | None, typer.Option(help=HELP["plan.between"])] = None,
-    hours: Annotated[float | None, typer.Option(help=HELP["plan.hours"])] = None,
+    about: Annotated[str, typer.Option(metavar="EFFECT", help=HELP["plan.about"])] = "",
+    size: Annotated[float | None, typer.Option(metavar="NUMBER", help=HELP["plan.size"])] = None,
+    between: Annotated[tuple[str, str] | None, typer.Option(metavar="EFFECT EFFECT", help=HELP["plan.between"])] = None,
+    hours: Annotated[float | None, typer.Option(metavar="HOURS", help=HELP["plan.hours"])] = None,
     details: Annotated[bool, typer.Option("--details", metavar=FLAG, help=HELP["plan.details"])] = False,
     jobs: Jobs = -1,
     runs: Runs = RUNS,
@@ -215,7 +215,7 @@ def plan_command(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> None:
-    """Before measuring: report what planned measurements would show, which to add, and write a page to take along."""
+    """Report what planned measurements would show, and which to add; write a page for the field."""
     opened = opened_run(config, trust)
     with progress_reporter(quiet, as_object) as watch:
         settings = opened.with_settings(runs, jobs, watch)

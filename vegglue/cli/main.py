@@ -117,9 +117,9 @@ def about(
         typer.Option("--version", metavar=FLAG, callback=_print_version, is_eager=True, help=HELP["about.version"]),
     ] = False,
 ) -> None:
-    """Calibrate a model of flow through plants against measured velocities, and see where it fails.
+    """Calibrate a two-dimensional model of flow through plants, and find what it lacks.
 
-    Begin with check, then run, or take its steps one by one; all work in runs/<name>.
+    Begin with new or import, then check and run. Results are in runs/<name>/.
     """
 
 

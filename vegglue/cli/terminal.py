@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 # What stands for the value of an option that takes none: typer 0.29 would write `<bool>`, as if it took one.
 FLAG = " "
 
-Config = Annotated[Path, typer.Argument(help=HELP["config"], show_default=False)]
-Runs = Annotated[Path, typer.Option(help=HELP["runs"])]
+Config = Annotated[Path, typer.Argument(metavar="CONFIG", help=HELP["config"], show_default=False)]
+Runs = Annotated[Path, typer.Option(metavar="FOLDER", help=HELP["runs"])]
 # Where results lie by default.
 RUNS = Path("runs")
 
@@ -38,7 +38,7 @@ def _some(jobs: int) -> int:
     return jobs
 
 
-Jobs = Annotated[int, typer.Option(min=-1, callback=_some, help=HELP["jobs"])]
+Jobs = Annotated[int, typer.Option(min=-1, callback=_some, metavar="N", help=HELP["jobs"])]
 MemoryLimit = Annotated[float | None, typer.Option(min=0.1, metavar="GB", help=HELP["memory"])]
 Cluster = Annotated[
     str | None,
@@ -49,7 +49,7 @@ Cluster = Annotated[
 ]
 Members = Annotated[
     int | None,
-    typer.Option(min=1, help=HELP["members"]),
+    typer.Option(min=1, metavar="N", help=HELP["members"]),
 ]
 Json = Annotated[bool, typer.Option("--json", metavar=FLAG, help=HELP["json"])]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", metavar=FLAG, help=HELP["quiet"])]
