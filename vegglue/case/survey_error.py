@@ -78,6 +78,12 @@ class BedSurvey:
         return sorted(rows, key=lambda own: float(self.points[own, 0].mean()))
 
     @property
+    def of_lines(self) -> Array:
+        """1 where a point is one of a line, else 0 (n, lines)."""
+        numbers = np.array([self.line[rows[0]] for rows in self.lines])
+        return np.asarray(self.line[:, None] == numbers, dtype=np.float64)
+
+    @property
     def tells_its_error(self) -> bool:
         """Whether there are enough points and lines, and not too many points."""
         enough = FEWEST_SURVEYED <= len(self.points) <= MOST_SURVEYED
@@ -241,10 +247,7 @@ def line_offsets(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> t
     """d = 1'(Q z)_i / 1' Q_ii 1 and its standard error (1' Q_ii 1)^(-1/2) of each line i (lines,) [m]: by how much the
     whole line is too high; and the correlations of 1'(Q z)_i (lines, lines) [-].
     """
-    z, lines = survey.points[:, 2], survey.lines
-    whole = np.zeros((len(z), len(lines)))
-    for number, rows in enumerate(lines):
-        whole[rows, number] = 1.0
+    z, lines, whole = survey.points[:, 2], survey.lines, survey.of_lines
     off, squares = (np.zeros((len(covariances), len(lines))) for _ in range(2))
     together = np.zeros((len(lines), len(lines)))
     for index, one in enumerate(covariances):
@@ -299,10 +302,7 @@ def mean_level(
 
 def line_weights(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array) -> Array:
     """By how much `mean_level` at places (m, 2) [m] rises with the level of each line (m, lines) [-]."""
-    whole = np.zeros((len(survey.points), len(survey.lines)))
-    for number, rows in enumerate(survey.lines):
-        whole[rows, number] = 1.0
-    return mean_level(survey, covariances, places, whole)
+    return mean_level(survey, covariances, places, survey.of_lines)
 
 
 def bed_survey_text(survey: BedSurvey) -> str:
@@ -331,6 +331,55 @@ class _Seen:
         return _Seen(self.places[of], self.mean[of], self.apart[:, of], parts)
 
 
+@dataclass(frozen=True)
+class _Kriging:
+    """A survey under each covariance: Cholesky's L of K, L^-1 (X, z), Cholesky's root of X' K^-1 X, and beta."""
+
+    survey: BedSurvey
+    covariances: Sequence[CovarianceOfBed]
+    parts: list[tuple[Array, Array, Array, Array]]
+
+    def seen(self, places: Array, used: Array | None) -> _Seen:
+        """What the survey says at places (m, 2) [m]; used: as of `conditional`."""
+        there, chance = self.survey.basis(places), np.array([one.chance for one in self.covariances])
+        means, parts = [], []
+        for one, (lower, white, shape, beta) in zip(self.covariances, self.parts, strict=True):
+            near = solve_triangular(lower, one.sd**2 * _between(self.survey.points, places, one), lower=True)
+            of_mean = solve_triangular(shape, there.T - white[:, :-1].T @ near, lower=True)
+            means.append(there @ beta + near.T @ (white[:, -1] - white[:, :-1] @ beta))
+            parts.append((near, of_mean))
+        mean = chance @ np.array(means)
+        apart = np.sqrt(chance)[:, None] * (np.array(means) - mean)
+        if used is not None:
+            apart, mean = np.vstack([apart, used - mean]), used
+        return _Seen(places, mean, apart, parts)
+
+    def variance(self, at: _Seen) -> Array:
+        """(m,) [m2]."""
+        found = (at.apart**2).sum(axis=0)
+        for one, (near, of_mean) in zip(self.covariances, at.parts, strict=True):
+            found += one.chance * (one.sd**2 - (near**2).sum(axis=0) + (of_mean**2).sum(axis=0))
+        return np.asarray(found)
+
+    def covariance(self, of: _Seen, others: _Seen) -> Array:
+        """(m, count) [m2]."""
+        found = of.apart.T @ others.apart
+        for one, (near, of_mean), (its_near, its_mean) in zip(self.covariances, of.parts, others.parts, strict=True):
+            kernel = one.sd**2 * _between(of.places, others.places, one)
+            found += one.chance * (kernel - near.T @ its_near + of_mean.T @ its_mean)
+        return np.asarray(found)
+
+
+def _kriging(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> _Kriging:
+    basis, parts = survey.basis(survey.points), []
+    for one in covariances:
+        lower = cholesky(_of_readings(survey, one), lower=True)
+        white = solve_triangular(lower, np.column_stack([basis, survey.points[:, 2]]), lower=True)
+        shape = cholesky(white[:, :-1].T @ white[:, :-1], lower=True)
+        parts.append((lower, white, shape, cho_solve((shape, True), white[:, :-1].T @ white[:, -1])))
+    return _Kriging(survey, covariances, parts)
+
+
 def conditional(
     survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array, used: Array | None = None
 ) -> Conditional:
@@ -338,42 +387,16 @@ def conditional(
     mean; then B B' holds their distance from it, too. Of more than PLACES_FOLLOWED places every n-th decides how many
     columns B has: LEFT_OUT is then the share at these.
     """
-    points, basis, z = survey.points, survey.basis(survey.points), survey.points[:, 2]
-    chance, of_survey = np.array([one.chance for one in covariances]), []
-    for one in covariances:
-        lower = cholesky(_of_readings(survey, one), lower=True)
-        white = solve_triangular(lower, np.column_stack([basis, z]), lower=True)
-        shape = cholesky(white[:, :-1].T @ white[:, :-1], lower=True)
-        of_survey.append((one, lower, white, shape, cho_solve((shape, True), white[:, :-1].T @ white[:, -1])))
+    kriging = _kriging(survey, covariances)
 
     def seen(some: NDArray[np.int64]) -> _Seen:
-        there, means, parts = survey.basis(places[some]), [], []
-        for one, lower, white, shape, beta in of_survey:
-            near = solve_triangular(lower, one.sd**2 * _between(points, places[some], one), lower=True)
-            of_mean = solve_triangular(shape, there.T - white[:, :-1].T @ near, lower=True)
-            means.append(there @ beta + near.T @ (white[:, -1] - white[:, :-1] @ beta))
-            parts.append((near, of_mean))
-        mean = chance @ np.array(means)
-        apart = np.sqrt(chance)[:, None] * (np.array(means) - mean)
-        if used is not None:
-            apart, mean = np.vstack([apart, used[some] - mean]), used[some]
-        return _Seen(places[some], mean, apart, parts)
-
-    def covariance(of: _Seen, others: _Seen) -> Array:
-        """(m, count) [m2]."""
-        found = of.apart.T @ others.apart
-        for one, (near, of_mean), (its_near, its_mean) in zip(covariances, of.parts, others.parts, strict=True):
-            kernel = one.sd**2 * _between(of.places, others.places, one)
-            found += one.chance * (kernel - near.T @ its_near + of_mean.T @ its_mean)
-        return np.asarray(found)
+        return kriging.seen(places[some], None if used is None else used[some])
 
     # Cholesky's square root B by the largest variance left, of several places apart at once: their columns are one
     # product of matrices, which takes a tenth of the time of one by one.
     followed = np.arange(0, len(places), max(-(-len(places) // PLACES_FOLLOWED), 1))
     at_followed = seen(followed)
-    left = (at_followed.apart**2).sum(axis=0)
-    for one, (near, of_mean) in zip(covariances, at_followed.parts, strict=True):
-        left += one.chance * (one.sd**2 - (near**2).sum(axis=0) + (of_mean**2).sum(axis=0))
+    left = kriging.variance(at_followed)
     nearest = 0.5 * min(one.along for one in covariances), 0.5 * min(one.across for one in covariances)
     left, columns = np.maximum(left, 0.0), np.zeros((min(MOST_OF_SQUARE_ROOT, followed.size), followed.size))
     enough, chosen = LEFT_OUT * left.sum(), list[int]()
@@ -382,7 +405,7 @@ def conditional(
         while len(of) < min(PLACES_AT_ONCE, len(columns) - rank) and open_.max() > 0.5 * left.max():
             of.append(int(open_.argmax()))
             open_[(np.abs(at_followed.places[:, :2] - at_followed.places[of[-1], :2]) < nearest).all(axis=1)] = 0.0
-        rest = covariance(at_followed, at_followed.some(np.array(of))) - columns[:rank].T @ columns[:rank, of]
+        rest = kriging.covariance(at_followed, at_followed.some(np.array(of))) - columns[:rank].T @ columns[:rank, of]
         lower = cholesky(rest[of], lower=True)
         columns[rank : rank + len(of)] = solve_triangular(lower, rest.T, lower=True)
         left = np.maximum(left - (columns[rank : rank + len(of)] ** 2).sum(axis=0), 0.0)
@@ -395,7 +418,7 @@ def conditional(
     mean, root = np.empty(len(places)), np.empty((len(places), len(chosen)), "float32")  # 1 % is left out
     for part in np.array_split(np.arange(len(places)), len(places) // PLACES_AT_A_TIME + 1):
         here = seen(part)
-        mean[part], root[part] = here.mean, solve_triangular(lower, covariance(at_chosen, here), lower=True).T
+        mean[part], root[part] = here.mean, solve_triangular(lower, kriging.covariance(at_chosen, here), lower=True).T
     return Conditional(mean, root)
 
 
