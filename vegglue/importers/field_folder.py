@@ -60,7 +60,7 @@ from vegglue.importers.terrain import (
     with_banks,
 )
 from vegglue.importers.vector_files import (
-    drawn_centreline,
+    drawn_placement,
     planted_polygons,
     refuse_crossing,
     summary_of_plants,
@@ -119,10 +119,8 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     path, found = site_file(folder), site_of(folder)
     site = found.site if isinstance(found, SiteOfResult) else found
     _refuse_standing_water(path, site)
-    frame = site.frame.frame if site.frame is not None else None
-    given = site.grid.centreline if site.grid is not None else None
-    drawn = drawn_centreline(folder, given, frame) if given is not None else None
-    place = Placement(frame, drawn.line if drawn is not None else None)
+    drawn, place = drawn_placement(folder, site)
+    frame, given = place.frame, site.grid.centreline if site.grid is not None else None
     patches, drawn_patches = _patches(folder, site.patches, frame)
     # Files that the site file names and that hold no measurements.
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
@@ -187,24 +185,8 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
             0, record(source, None, drawn.taken) | {"columns": drawn.columns, "units": drawn.units}
         )
     if patches:
-        guess = site.canopy_height_guess_m
-        canopy = normal_prior(
-            guess, round(BY_EYE * guess, 4), "m", "h_d", phrase("meaning_of_parameter", "canopy_height"),
-            low=round(0.4 * guess, 4), high=round(1.8 * guess, 4),
-        )  # fmt: skip
-        numbered = {f"p{number}": patch for number, patch in enumerate(patches, 1)}
-        names = told_apart({number: case_name(patch.name or number, number) for number, patch in numbered.items()})
-        rows = []
-        for number, patch in numbered.items():
-            shape: Tree = {"x": list(patch.x or ()), "y": list(patch.y or ())}
-            if patch.polygon is not None:
-                shape = {"polygon": [list(corner) for corner in patch.polygon]}
-            rows.append({"name": names[number], "stand": "plants", **shape, "stems": patch.stems_per_m2})
-        densest = max(patch.stems_per_m2 for patch in patches)
-        stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
-        tree["plants"] = {"stands": {"plants": stand}, "patches": rows}
-        phi = loguniform_prior(0.02, 100.0, "-", "φ", phrase("meaning_of_parameter", "phi"))
-        tree["parameters"] |= {"phi": phi, "canopy_height": canopy}
+        plants, priors = _plants(patches, site.canopy_height_guess_m)
+        tree["plants"], tree["parameters"] = plants, tree["parameters"] | priors
     texts = {**ground.texts, **texts_of_tables(target, [*measured.tables, *held_out.tables])}
     kept = {"frame": frame.model_dump(exclude_none=True) | {"origin": list(frame.origin)}} if frame is not None else {}
     return FolderCase(tree | kept | ({"imported": measured.imported} if measured.imported else {}), texts)
@@ -310,6 +292,26 @@ def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -
             corners = tuple(polygon.corners)
             found.append(PlantedPatch(name=polygon.name, polygon=corners, stems_per_m2=density))
     return found, imported
+
+
+def _plants(patches: Sequence[PlantedPatch], guess: float) -> tuple[Tree, Tree]:
+    """The key `plants` of a case, of one stand, and the priors of its phi and of its height, which is guessed [m]."""
+    canopy = normal_prior(
+        guess, round(BY_EYE * guess, 4), "m", "h_d", phrase("meaning_of_parameter", "canopy_height"),
+        low=round(0.4 * guess, 4), high=round(1.8 * guess, 4),
+    )  # fmt: skip
+    phi = loguniform_prior(0.02, 100.0, "-", "φ", phrase("meaning_of_parameter", "phi"))
+    numbered = {f"p{number}": patch for number, patch in enumerate(patches, 1)}
+    names = told_apart({number: case_name(patch.name or number, number) for number, patch in numbered.items()})
+    rows = []
+    for number, patch in numbered.items():
+        shape: Tree = {"x": list(patch.x or ()), "y": list(patch.y or ())}
+        if patch.polygon is not None:
+            shape = {"polygon": [list(corner) for corner in patch.polygon]}
+        rows.append({"name": names[number], "stand": "plants", **shape, "stems": patch.stems_per_m2})
+    densest = max(patch.stems_per_m2 for patch in patches)
+    stand = {"phi": "phi", "canopy_height": "canopy_height", "bare_chezy": 60.0, "stems": densest}
+    return {"stands": {"plants": stand}, "patches": rows}, {"phi": phi, "canopy_height": canopy}
 
 
 def _straight_ground(folder: Path, site: FieldSite, channel: Channel, place: Placement) -> Ground:

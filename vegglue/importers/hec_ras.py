@@ -92,13 +92,9 @@ def _area(geometry: Any, results: Any, vertical: float, horizontal: float) -> di
     if "Cells Center Manning's n" in geometry:
         rough = np.asarray(geometry["Cells Center Manning's n"], dtype=np.float64)
     else:
-        n_face = np.where(np.isfinite(n_face), n_face, 0.0)
-        total, faces = np.zeros(count), np.zeros(count)
-        for side in range(2):
-            ok = inside[:, side] & (n_face > 0.0)
-            total += np.bincount(at[ok, side], n_face[ok], count)
-            faces += np.bincount(at[ok, side], minlength=count)
-        rough = np.where(faces > 0, total / np.maximum(faces, 1), np.nan)
+        stated = inside & (n_face > 0.0)[:, None]
+        faces = _sums(np.ones(len(cells)), cells, stated, count)
+        rough = np.where(faces > 0, _sums(n_face, cells, stated, count) / np.maximum(faces, 1), np.nan)
     centre = np.asarray(geometry["Cells Center Coordinate"], dtype=np.float64) * horizontal
     return {
         "x": centre[real, 0], "y": centre[real, 1], "bed": bed[real], "level": level[real], "depth": depth[real],
@@ -131,6 +127,13 @@ def _of_faces(geometry: Any, level: Array, vertical: float, length: Array) -> tu
     return area, rough
 
 
+def _sums(values: Array, cells: np.ndarray[Any, Any], used: np.ndarray[Any, Any], count: int) -> Array:
+    """Sums of values of faces (faces,) over the cells (faces, 2) at their sides that are used (faces, 2): (count,)."""
+    return sum(
+        (np.bincount(cells[here, side], values[here], count) for side, here in enumerate(used.T)), np.zeros(count)
+    )
+
+
 def _vectors(
     cells: np.ndarray[Any, Any], inside: np.ndarray[Any, Any], normal: Array, speed: Array, weight: Array, count: int
 ) -> tuple[Array, Array]:
@@ -142,12 +145,7 @@ def _vectors(
         "x": normal[:, 0] * speed, "y": normal[:, 1] * speed,
     }  # fmt: skip
     used = inside & (weight > 0.0)[:, None] & np.isfinite(speed)[:, None]
-    sums = {}
-    for key, value in of_face.items():
-        sums[key] = np.zeros(count)
-        for side in range(2):
-            here = used[:, side]
-            sums[key] += np.bincount(cells[here, side], (weight * value)[here], count)
+    sums = {key: _sums(weight * value, cells, used, count) for key, value in of_face.items()}
     matrix = np.stack([np.stack([sums["xx"], sums["xy"]], -1), np.stack([sums["xy"], sums["yy"]], -1)], -2)
     inverse = np.linalg.pinv(matrix, rcond=ONE_HEADING, hermitian=True)
     found = (inverse @ np.stack([sums["x"], sums["y"]], -1)[..., None])[..., 0]

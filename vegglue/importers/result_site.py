@@ -17,7 +17,6 @@ from scipy.interpolate import LinearNDInterpolator
 
 from vegglue.arrays import Array
 from vegglue.case.grid import Grid, centres
-from vegglue.case.messages import dotted, expected_in_words, shown_value
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import case_name
 from vegglue.errors import InputError, shown_path
@@ -27,9 +26,9 @@ from vegglue.importers.import_notes import FlowTaken
 from vegglue.importers.measured_files import data_folder, record
 from vegglue.importers.measured_rows import Placement
 from vegglue.importers.model_result import ModelResult
-from vegglue.importers.site_file import FieldSite, ResultEntry, read_keys, read_site, site_file
+from vegglue.importers.site_file import FieldSite, ResultEntry, read_keys, read_site, site_file, site_refusal
 from vegglue.importers.terrain import Ground, Terrain, ascii_grid, grid_of_keys, grid_of_terrain, ground_on_grid
-from vegglue.importers.vector_files import drawn_centreline
+from vegglue.importers.vector_files import drawn_placement
 from vegglue.measurements.their_flow import TheirFlow, text_of_flow
 from vegglue.wording.numbers import in_digits
 from vegglue.wording.sentences import phrase, sentences
@@ -106,12 +105,7 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
     try:
         stated = ResultEntry.model_validate(given.get("result") or {})
     except ValidationError as error:
-        problem = error.errors()[0]
-        key = dotted(("result", *problem["loc"]))
-        raise InputError(
-            f"{shown_path(path)}: `{key}` expected {expected_in_words(problem)}, got {shown_value(problem['input'])}; "
-            "correct it."
-        ) from None
+        raise site_refusal(path, error, "result") from None
     if not (paths := _result_files(folder, given, stated)):
         return read_site(path)
     results = {name: _read(one, one.stat().st_mtime_ns) for name, one in paths.items()}
@@ -128,7 +122,7 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
     site = read_site(
         path, completed | {"experiments": tried, "holdout": {name: filler | one for name, one in held.items()}}
     )
-    place = placement_of(folder, site)
+    _, place = drawn_placement(folder, site)
     placed = {name: _placed(paths[name], one, place, stated) for name, one in results.items()}
     terrain = _terrain(next(iter(placed.values())))
     tree = grid_of_terrain(next(iter(paths.values())), terrain, site.grid, place)
@@ -142,14 +136,6 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
                 one["level"] = level
     site = read_site(path, completed | {"experiments": experiments, "holdout": held})
     return SiteOfResult(site, place, paths, placed, stated, terrain, tree)
-
-
-def placement_of(folder: Path, site: FieldSite) -> Placement:
-    """Where the channel of a site lies on the map."""
-    frame = site.frame.frame if site.frame is not None else None
-    given = site.grid.centreline if site.grid is not None else None
-    drawn = drawn_centreline(folder, given, frame) if given is not None else None
-    return Placement(frame, drawn.line if drawn is not None else None)
 
 
 def ground_of_result(target: Path, found: SiteOfResult) -> GroundOfResult:

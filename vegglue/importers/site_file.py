@@ -323,15 +323,7 @@ def read_site(path: Path, completed: Any = None) -> FieldSite:
     try:
         site = FieldSite.model_validate(given)
     except ValidationError as error:
-        problem = error.errors()[0]
-        place = dotted(tuple(key for key in problem["loc"] if key != "[key]")) or "site.json"
-        if problem["type"] == "missing":  # `experiments.May.level`: as it may be written with a unit of its own
-            before, dot, last = place.rpartition(".")
-            short = {long: name for name, long in OF_FLOW}.get(last, last)
-            raise InputError(f"{shown_path(path)}: `{before}{dot}{short}` is missing; add it.") from None
-        expected = expected_in_words(problem).replace("valid string", "text in quotes")
-        got = shown_value(problem["input"])
-        raise InputError(f"{shown_path(path)}: `{place}` expected {expected}, got {got}; correct it.") from None
+        raise site_refusal(path, error) from None
     counted = ["stems_per_m2" in one.model_fields_set for one in site.patches if one.file is None]
     if any(counted) and not all(counted):  # the others would seem all but bare
         raise InputError(
@@ -339,6 +331,20 @@ def read_site(path: Path, completed: Any = None) -> FieldSite:
             f"`patches[{counted.index(False)}]`; add it there."
         )
     return site
+
+
+def site_refusal(path: Path, error: ValidationError, *above: str) -> InputError:
+    """The error about the first of pydantic's problems with a site file, or with the part of it below some keys."""
+    problem = error.errors()[0]
+    place = dotted((*above, *(key for key in problem["loc"] if key != "[key]"))) or "site.json"
+    if problem["type"] == "missing":  # `experiments.May.level`: as it may be written with a unit of its own
+        before, dot, last = place.rpartition(".")
+        short = {long: name for name, long in OF_FLOW}.get(last, last)
+        return InputError(f"{shown_path(path)}: `{before}{dot}{short}` is missing; add it.")
+    expected = expected_in_words(problem).replace("valid string", "text in quotes")
+    return InputError(
+        f"{shown_path(path)}: `{place}` expected {expected}, got {shown_value(problem['input'])}; correct it."
+    )
 
 
 def assumptions_of_site(folder: Path, site: FieldSite) -> list[object]:

@@ -77,41 +77,8 @@ def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
     WorkHorse Commands and Output Data Format (P/N 957-6156-00).
     """
     groups, damaged, of_surface = _sound_ensembles(path.read_bytes())
-    found: list[_RawEnsemble] = []
-    model = ""
-    for group in groups:  # the reader takes all cells for those of the first ensemble, and drops the last ensemble
-        with TemporaryDirectory() as folder:
-            copy = Path(folder) / path.name
-            copy.write_bytes(b"".join([*group, group[-1]]))
-            data = open_raw(copy, "WinRiver", named=path)
-        if missing := {"vel", "vel_bt", "dist_bt"} - set(data):
-            raise InputError(
-                f"{shown_path(path)}: expected velocities and bottom track, got none of {', '.join(sorted(missing))}; "
-                "without bottom track no boat has a place."
-            )
-        model = str(data.attrs["inst_model"])
-        lost = np.abs(data["vel_bt"]) > FASTEST  # -32.768 m/s marks a lost bottom; the reader keeps it
-        data["vel_bt"] = data["vel_bt"].where(~lost)
-        if data.attrs["coord_sys"] == "beam" and str(data.attrs.get("use_3beam", "")) == "yes":
-            for name in ("vel", "vel_bt"):
-                data[name] = (data[name].dims, _by_three_beams(np.asarray(data[name].values, dtype=np.float64)))
-        if data.attrs["coord_sys"] != "earth":
-            from mhkit import dolfyn  # which has opened the file
-
-            with read_by_library(path, "turned"):
-                data = dolfyn.rotate2(data, "earth", inplace=False)
-        own, beams, bottom, water, cells = (
-            np.asarray(data[name].values, dtype=np.float64) for name in ("depth", "dist_bt", "vel_bt", "vel", "range")
-        )
-        own = np.where((own >= 0.0) & (own <= DEEPEST_RIVER), own, np.nan)
-        beams = np.where((beams > 0.0) & (beams <= DEEPEST_RIVER), beams, np.nan)  # 0 marks a lost beam
-        half, slant = 0.5 * float(data.attrs["cell_size"]), math.cos(math.radians(float(data.attrs["beam_angle"])))
-        for i, time in enumerate(data["time"].values):
-            seen = beams[np.isfinite(beams[:, i]), i]
-            reached = cells + half <= (float(seen.min()) * slant if seen.size else 0.0)
-            depth = float(seen.mean()) if seen.size else 0.0
-            found.append(_RawEnsemble(time, own[i], bottom[:2, i], depth, cells[reached], water[:2, reached, i].T))
-    found.sort(key=lambda one: one.time)
+    read = [_raw_ensembles(path, group) for group in groups]
+    model, found = read[-1][0], sorted((one for _, some in read for one in some), key=lambda one: one.time)
     bottoms = np.array([one.bottom for one in found])
     known = (np.isfinite(bottoms) & (np.abs(np.nan_to_num(bottoms)) <= FASTEST)).all(axis=1)
     if not known.any():
@@ -143,8 +110,46 @@ def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
     return stations_of_transect(path, options, profiles, *form)
 
 
+def _raw_ensembles(path: Path, group: list[bytes]) -> tuple[str, list[_RawEnsemble]]:
+    """The instrument, and what it measured in ensembles with the same cells, velocities east and north."""
+    with TemporaryDirectory() as folder:  # the reader drops the last ensemble
+        copy = Path(folder) / path.name
+        copy.write_bytes(b"".join([*group, group[-1]]))
+        data = open_raw(copy, "WinRiver", named=path)
+    if missing := {"vel", "vel_bt", "dist_bt"} - set(data):
+        raise InputError(
+            f"{shown_path(path)}: expected velocities and bottom track, got none of {', '.join(sorted(missing))}; "
+            "without bottom track no boat has a place."
+        )
+    lost = np.abs(data["vel_bt"]) > FASTEST  # -32.768 m/s marks a lost bottom; the reader keeps it
+    data["vel_bt"] = data["vel_bt"].where(~lost)
+    if data.attrs["coord_sys"] == "beam" and str(data.attrs.get("use_3beam", "")) == "yes":
+        for name in ("vel", "vel_bt"):
+            data[name] = (data[name].dims, _by_three_beams(np.asarray(data[name].values, dtype=np.float64)))
+    model = str(data.attrs["inst_model"])
+    if data.attrs["coord_sys"] != "earth":
+        from mhkit import dolfyn  # which has opened the file
+
+        with read_by_library(path, "turned"):
+            data = dolfyn.rotate2(data, "earth", inplace=False)
+    own, beams, bottom, water, cells = (
+        np.asarray(data[name].values, dtype=np.float64) for name in ("depth", "dist_bt", "vel_bt", "vel", "range")
+    )
+    own = np.where((own >= 0.0) & (own <= DEEPEST_RIVER), own, np.nan)
+    beams = np.where((beams > 0.0) & (beams <= DEEPEST_RIVER), beams, np.nan)  # 0 marks a lost beam
+    half, slant = 0.5 * float(data.attrs["cell_size"]), math.cos(math.radians(float(data.attrs["beam_angle"])))
+    found = []
+    for i, time in enumerate(data["time"].values):
+        seen = beams[np.isfinite(beams[:, i]), i]
+        reached = cells + half <= (float(seen.min()) * slant if seen.size else 0.0)
+        depth = float(seen.mean()) if seen.size else 0.0
+        found.append(_RawEnsemble(time, own[i], bottom[:2, i], depth, cells[reached], water[:2, reached, i].T))
+    return model, found
+
+
 def _sound_ensembles(content: bytes) -> tuple[list[list[bytes]], int, bool]:
-    """Whole ensembles with a right check sum, those with the same cells together; how many are damaged; and whether
+    """Whole ensembles with a right check sum, those with the same cells together, as the reader takes all cells for
+    those of the first ensemble; how many are damaged; and whether
     blocks of a surface layer were taken out, whose cells of another size the reader misplaces.
 
     Each ensemble begins with its mark, its number of bytes without the check sum, and the places of its blocks.

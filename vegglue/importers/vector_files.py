@@ -26,7 +26,7 @@ from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.import_notes import CentrelineTaken, ImportNote, Noted, PatchesRead, UnitsAssumed
 from vegglue.importers.library_files import importing, read_by_library, readable_text
 from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, read_rows, rows_of_table
-from vegglue.importers.site_file import FileOfSite
+from vegglue.importers.site_file import FieldSite, FileOfSite
 from vegglue.importers.table_parser import WORKBOOKS, is_number, parse_table
 from vegglue.measurements.plausibility import is_mark_anywhere
 from vegglue.wording.sentences import sentence, sentences
@@ -91,25 +91,7 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
     InputError
         For another file, for degrees, and for a heading that is not there.
     """
-    unitless: tuple[str, ...] = ()
-    features: list[tuple[Ring, Properties]]
-    if path.suffix.lower() in TABLES:
-        features, unitless = _polygons_of_table(path, columns)
-    elif path.suffix.lower() == ".shp":
-        with shapes_and_records(path, "POLYGON", frame) as found:
-            features = [
-                (ring, one.record.as_dict()) for one in found for ring in _outlines(one.shape.__geo_interface__)
-            ]
-    else:
-        features = []
-        with geojson_features(path, "polygons", frame) as mapped:
-            for number, feature in enumerate(mapped, 1):
-                own = dict(feature.get("properties") or {})
-                geometry = feature["geometry"]
-                if geometry is None or geometry["type"] not in ("Polygon", "MultiPolygon"):
-                    got = "" if geometry is None else str(geometry["type"])[:40]
-                    raise InputError("no_polygon", file=path, feature=number, got=got)
-                features += [(ring, own) for ring in _outlines(geometry)]
+    features, unitless = _outlines_and_properties(path, frame, columns)
     if not features:
         raise InputError(f"{shown_path(path)}: expected polygons, got none; save the areas as polygons.")
     _refuse_degrees(path, frame, [ring for ring, _ in features])
@@ -167,6 +149,28 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
             )
         )
     return polygons
+
+
+def _outlines_and_properties(
+    path: Path, frame: Frame | None, columns: Mapping[str, str]
+) -> tuple[list[tuple[Ring, Properties]], tuple[str, ...]]:
+    """Of each part of each polygon in a file; and which of x and y have no stated unit."""
+    if path.suffix.lower() in TABLES:
+        return _polygons_of_table(path, columns)
+    features: list[tuple[Ring, Properties]] = []
+    if path.suffix.lower() == ".shp":
+        with shapes_and_records(path, "POLYGON", frame) as found:
+            for one in found:
+                features += [(ring, one.record.as_dict()) for ring in _outlines(one.shape.__geo_interface__)]
+        return features, ()
+    with geojson_features(path, "polygons", frame) as mapped:
+        for number, feature in enumerate(mapped, 1):
+            own, geometry = dict(feature.get("properties") or {}), feature["geometry"]
+            if geometry is None or geometry["type"] not in ("Polygon", "MultiPolygon"):
+                got = "" if geometry is None else str(geometry["type"])[:40]
+                raise InputError("no_polygon", file=path, feature=number, got=got)
+            features += [(ring, own) for ring in _outlines(geometry)]
+    return features, ()
 
 
 def planted_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = NONE_NAMED) -> list[NamedPolygon]:
@@ -402,6 +406,14 @@ class DrawnCentreline:
     columns: Tree
     units: Tree
     taken: str
+
+
+def drawn_placement(folder: Path, site: FieldSite) -> tuple[DrawnCentreline | None, Placement]:
+    """The centreline of a site, if it has one, and where its channel lies on the map. InputError."""
+    frame = site.frame.frame if site.frame is not None else None
+    given = site.grid.centreline if site.grid is not None else None
+    drawn = drawn_centreline(folder, given, frame) if given is not None else None
+    return drawn, Placement(frame, drawn.line if drawn is not None else None)
 
 
 def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: Frame | None) -> DrawnCentreline:
