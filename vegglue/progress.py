@@ -15,9 +15,16 @@ LEFT_SHOWN_FROM, LEFT_SHOWN_AFTER = 0.02, 60.0
 
 @dataclass(frozen=True)
 class Progress:
-    """What a long command does now. total: how many there are to do, None where nothing is counted.
+    """What a long command does now.
 
-    unit: what is counted; failed: those of the done that failed; resumed: those that an earlier run had done.
+    Attributes
+    ----------
+    phase
+        In words.
+    done, total, unit
+        How many are done, of how many, None where nothing is counted, and what these are.
+    failed, resumed
+        Those of the done that failed, and those that an earlier run had done.
     """
 
     phase: str
@@ -92,5 +99,11 @@ def pace_in_words(progress: Progress, done: int, seconds: float) -> str:
 
 
 def progress_lines() -> Watch:
-    """What a verb is given as `watch` to print plain lines now and then, in a notebook or a script."""
+    """What a verb is given as `watch` to print plain lines now and then, in a notebook or a script.
+
+    Returns
+    -------
+    callable
+        Of a `Progress`: prints a line when a phase begins, and within it at most one in 10 s.
+    """
     return now_and_then(lambda line: print(line, flush=True))

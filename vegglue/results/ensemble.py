@@ -134,9 +134,24 @@ def excess(case: Case, grid: Grid) -> FieldsTooLarge | None:
 
 
 def predict_at(fields: Fields, x: float, y: float, quantity: Quantity = "u") -> Array:
-    """A quantity at a point, bilinear between cell centres as sensors read it, (member, experiment) [m, m/s].
+    """q = sum_ij w_i w_j q_ij over the four cells around a point, weights linear in x and y, as sensors read it.
 
-    NaN where a cell that counts is dry throughout in that member. Errors: InputError for a point outside the window.
+    Parameters
+    ----------
+    fields : Fields
+    x, y : float
+        Place in the coordinates of the grid [m].
+    quantity : {"u", "v", "level"}
+
+    Returns
+    -------
+    array
+        (member, experiment) [m/s; level m], NaN where a cell that counts is dry throughout in that member.
+
+    Raises
+    ------
+    InputError
+        If the point is outside the fields that were kept.
     """
     dx, dy = fields.x[1] - fields.x[0], fields.y[1] - fields.y[0]
     (west, east), (south, north) = fields.range, (fields.y[0] - 0.5 * dy, fields.y[-1] + 0.5 * dy)
@@ -208,14 +223,36 @@ class Header:
 
 @dataclass(frozen=True)
 class Ensemble:
-    """All members of a finished run, failed ones included."""
+    """All members of a finished run, failed ones included.
 
-    parameters: dict[str, np.ndarray]  # (member,) each
-    prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]  # NaN for failed members
-    status: Annotated[np.ndarray, Stored(("member",), fill=NOT_YET, type=np.int8)]  # one of `flow.status`
-    reason: Annotated[np.ndarray, Stored(("member",), fill=b"", type="S240")]  # '' or a sentence
+    Attributes
+    ----------
+    parameters
+        By name, (member,) [unit of the parameter].
+    prediction
+        (member, station) [unit of the kind], NaN for failed members.
+    status, reason
+        (member,) one of `flow.status`, and why a member failed, '' if it did not.
+    iterations, seconds
+        (member,) of the solver; [s].
+    mass_error
+        (member,) largest |Q - Q_in| / Q_in over all that enters [-].
+    section_flow
+        (member, experiment, section) discharge [m3/s].
+    station
+        Table of all stations, used or not.
+    experiments, sections
+        Names of experiments; names and places along the channel of sections [m].
+    config, config_hash, seed, version
+        Of the run.
+    """
+
+    parameters: dict[str, np.ndarray]
+    prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]
+    status: Annotated[np.ndarray, Stored(("member",), fill=NOT_YET, type=np.int8)]
+    reason: Annotated[np.ndarray, Stored(("member",), fill=b"", type="S240")]
     iterations: Annotated[np.ndarray, Stored(("member",), fill=0, type=np.int32)]
-    mass_error: Annotated[np.ndarray, Stored(("member",))]  # largest |Q - Q_in| over all that enters
+    mass_error: Annotated[np.ndarray, Stored(("member",))]
     seconds: Annotated[np.ndarray, Stored(("member",), "s")]
     section_flow: Annotated[np.ndarray, Stored(("member", "experiment", "section"), "m3/s")]
     station: pd.DataFrame

@@ -38,10 +38,18 @@ class Work(Enum):
 @dataclass(frozen=True)
 class PlannedPiece:
     """A piece of field work: verticals of a transect, a vertical, a gauge or a gauging in one experiment, or a line of
-    bed levels, which is of all (experiment '').
+    bed levels, which is of all.
 
-    x, y: its places [m], y empty for a gauging; hours: without those of another flow. new: whether the experiment is a
-    flow that the case does not have; again: whether the same is measured before.
+    Attributes
+    ----------
+    work, experiment
+        Its kind, and the flow it is done in, '' for all.
+    x, y
+        Its places [m], y empty for a gauging.
+    hours
+        Without those of another flow [h].
+    new, again
+        Whether the experiment is a flow that the case does not have, and whether the same is measured before.
     """
 
     work: Work
@@ -70,13 +78,25 @@ class Confusion:
 class PlannedEffect:
     """An effect as the planned measurements would show it.
 
-    Named means that the first step of a diagnosis has it, alone or as one of a few. smallest: distance of its amplitude
-    from off that is named with 90 %, averaged over all draws of the priors [unit of the amplitude], infinite if no size
-    is; best, worst: the same in the draws where it is least and largest. plausible: a plausible distance; furthest: the
-    largest possible one. chance_plausible: that the plausible size is named; chance: that a size drawn from the prior
-    of the amplitude is. visibility: share of the trace that calibration cannot mimic. confused: other effects with a
-    similar trace, the most similar first; place: the term at a place that is; parameter, cosine: the parameter whose
-    change is most like it.
+    Named means that the first step of a diagnosis has it, alone or as one of a few.
+
+    Attributes
+    ----------
+    name, title, unit
+        Of the effect, and of its amplitude.
+    smallest, best, worst
+        Distance of the amplitude from off that is named with 90 % [unit], infinite if no size is: averaged over all
+        draws of the priors, and in those where it is least and largest.
+    plausible, furthest
+        A plausible distance, and the largest possible one [unit].
+    chance_plausible, chance
+        That the plausible size is named, and one drawn from the prior of the amplitude [-].
+    visibility
+        Share of the trace that calibration cannot mimic [-].
+    confused, place
+        Other effects with a similar trace, the most similar first, and the term at a place that has one.
+    parameter, cosine
+        The parameter whose change is most like it, and the cosine between both [-].
     """
 
     name: str
@@ -152,8 +172,16 @@ class PlannedInstruments:
 
 @dataclass(frozen=True)
 class PlannedParameter:
-    """How well a parameter would be known: standard error over that of its prior [-], the mean over all draws, and 95 %
-    intervals before and after around the middle of the prior [unit].
+    """How well a parameter would be known.
+
+    Attributes
+    ----------
+    name, unit, meaning
+        Of the parameter.
+    share
+        Standard error over that of its prior [-].
+    before, after
+        95 % intervals around the middle of the prior [unit].
     """
 
     name: str
@@ -193,8 +221,15 @@ PlanQuestion = EffectsInGeneral | OneEffect | TwoEffects
 
 @dataclass(frozen=True)
 class ProposedPieces:
-    """Pieces that could be added together, as one more discharge takes more than one; hours with those of another flow,
-    and the answer to the question before and after [-], the mean over all draws, with the least of them.
+    """Pieces that could be added together, as one more discharge takes more than one.
+
+    Attributes
+    ----------
+    pieces : tuple of PlannedPiece
+    hours
+        Field work, with that of another flow [h].
+    before, after, least
+        The answer to the question before and after, the mean over all draws, and the least of them after [-].
     """
 
     pieces: tuple[PlannedPiece, ...]
@@ -213,10 +248,26 @@ class ProposedPieces:
 class FieldPlan:
     """What planned measurements would show, and which ones to add.
 
-    at_hand: stations measured before; proposed: whether the pieces are proposed for a budget of hours, as none were
-    planned. draws: places of the prior that all is computed at. answer: to the question now; further: the best
-    single additions, the largest gain per hour first; extended: the best set for the hours that are left, and its
-    answer.
+    Attributes
+    ----------
+    case, at_hand
+        Name of the case, and stations that are measured.
+    pieces, proposed
+        Pieces of field work, and whether they are proposed for the budget, as none were planned.
+    hours, budget
+        Of field work [h].
+    draws
+        Places of the prior at which all is computed.
+    effects, places, instruments, parameters
+        PlannedEffect, PlannedPlaces, PlannedInstruments and PlannedParameter of each.
+    question, answer
+        What is asked, and the answer to it now [-].
+    further : tuple of ProposedPieces
+        The best single additions, the largest gain per hour first.
+    extended : ProposedPieces or None
+        The best set for the hours that are left.
+    chances_of_places : PlaceChances or None
+        Of drag, to be drawn.
     """
 
     case: str

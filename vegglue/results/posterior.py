@@ -37,57 +37,117 @@ OWN_UNIT = "that of the parameter, see `unit`"
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """The errors of the data that the misfit is weighed by."""
+    """The errors of the data that the misfit is weighed by.
 
-    errors: str  # stated or estimated
-    correlation: float  # of the errors of neighbours along a section [-]
-    scale: float  # of the stated errors [-]
-    grid_error: float  # root mean square, from a grid of twice the cell size [m/s, m]; NaN where that cannot be made
+    Attributes
+    ----------
+    errors
+        "stated" or "estimated".
+    correlation
+        Of the errors of neighbours along a section [-].
+    scale
+        Of the stated errors [-].
+    grid_error
+        Root mean square, from a grid of twice the cell size [m/s, m]; NaN where that cannot be made.
+    """
+
+    errors: str
+    correlation: float
+    scale: float
+    grid_error: float
 
 
 @dataclass(frozen=True)
 class PosteriorModes:
-    """Where the search for the best fit ended, the best mode first."""
+    """Where the search for the best fit ended, the best mode first.
 
-    starts: int  # members that were followed downhill
+    Attributes
+    ----------
+    starts
+        Members that were followed downhill.
+    mode_theta
+        (mode, parameter) parameters of each.
+    mode_chi2
+        (mode,) misfit of each [-].
+    mode_weight
+        (mode,) weight of the draws nearest to each [-].
+    """
+
+    starts: int
     mode_theta: Annotated[np.ndarray, Stored(("mode", "parameter"), OWN_UNIT)]
     mode_chi2: Annotated[np.ndarray, Stored(("mode",))]
-    mode_weight: Annotated[np.ndarray, Stored(("mode",))]  # of the draws nearest to each
+    mode_weight: Annotated[np.ndarray, Stored(("mode",))]
 
 
 @dataclass(frozen=True)
 class ImportanceDraws:
-    """How the members were drawn, and as many draws from the prior to compare them with."""
+    """How the members were drawn, and as many draws from the prior to compare them with.
 
-    drawn: Annotated[np.ndarray, Stored(("round",), type=WHOLE_NUMBERS)]  # members after each round
-    worth: Annotated[np.ndarray, Stored(("round",))]  # effective members after each round
-    log_density: Annotated[np.ndarray, Stored(("member",))]  # of the posterior up to a constant; -inf failed
-    prior_theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]  # draws from the prior
+    Attributes
+    ----------
+    drawn, worth
+        (round,) members, and what they are worth as equal ones, after each round.
+    log_density
+        (member,) ln of the density of the posterior up to a constant; -inf if it failed.
+    prior_theta
+        (parameter, member) draws from the prior.
+    """
+
+    drawn: Annotated[np.ndarray, Stored(("round",), type=WHOLE_NUMBERS)]
+    worth: Annotated[np.ndarray, Stored(("round",))]
+    log_density: Annotated[np.ndarray, Stored(("member",))]
+    prior_theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
 
 
 @dataclass(frozen=True)
 class LeaveOneOut:
-    """Each station predicted from all others."""
+    """Each station predicted from all others.
 
-    elpd: float  # sum of the log predictive densities of stations left out in turn [-]
+    Attributes
+    ----------
+    elpd, elpd_error
+        Sum of the log predictive densities of stations left out in turn, and its standard error [-].
+    inside50, inside95
+        Shares of measurements within the 50 % and the 95 % band of the prediction from all others [-].
+    p_calibration
+        Chance that shares below are as uneven as these (Kolmogorov-Smirnov) [-].
+    score, score_k
+        (station,) log predictive density given all other stations, and its Pareto k [-].
+    below
+        (station,) share of the prediction below the measurement.
+    """
+
+    elpd: float
     elpd_error: float
-    inside50: float  # share of measurements within the 50 % band of the prediction from all others [-]
+    inside50: float
     inside95: float
-    p_calibration: float  # chance that shares below are as uneven as these (Kolmogorov-Smirnov) [-]
-    score: Annotated[np.ndarray, Stored(("station",))]  # log predictive density given all other stations
-    score_k: Annotated[np.ndarray, Stored(("station",))]  # k-hat of it
-    below: Annotated[np.ndarray, Stored(("station",))]  # share of the prediction below the measurement
+    p_calibration: float
+    score: Annotated[np.ndarray, Stored(("station",))]
+    score_k: Annotated[np.ndarray, Stored(("station",))]
+    below: Annotated[np.ndarray, Stored(("station",))]
 
 
 @dataclass(frozen=True)
 class MisfitTest:
-    """Whether the errors explain what the best member leaves, at all stations together and at each."""
+    """Whether the errors explain what the best member leaves, at all stations together and at each.
 
-    chi2: float  # of the best member, whitened by the covariance of the errors [-]
+    Attributes
+    ----------
+    chi2, freedom
+        Of the best member, whitened by the covariance of the errors [-], and its degrees of freedom.
+    p_misfit
+        Chance of a chi2 as large under errors alone [-].
+    surprise
+        (station,) residual that calibration cannot explain, in its errors.
+    outlier
+        (station,) one such among all is no chance.
+    """
+
+    chi2: float
     freedom: int
-    p_misfit: float  # chance of a chi2 as large under errors alone [-]
-    surprise: Annotated[np.ndarray, Stored(("station",))]  # residual that calibration cannot explain, in its errors
-    outlier: Annotated[np.ndarray, Stored(("station",), type=YES_OR_NO)]  # one such among all is no chance
+    p_misfit: float
+    surprise: Annotated[np.ndarray, Stored(("station",))]
+    outlier: Annotated[np.ndarray, Stored(("station",), type=YES_OR_NO)]
 
     @property
     def worst_outlier(self) -> int:
@@ -97,17 +157,31 @@ class MisfitTest:
 
 @dataclass(frozen=True)
 class GroupsLeftOut:
-    """Each section, and each experiment, predicted from all other stations."""
+    """Each section, and each experiment, predicted from all other stations.
 
-    left_out: Annotated[np.ndarray, Stored(("group",), type=IN_WORDS)]  # sections and experiments left out in turn
+    Attributes
+    ----------
+    left_out, left_out_stations
+        (group,) sections and experiments left out in turn, and how many stations each has.
+    left_out_score, left_out_k
+        (group,) log predictive density of the stations of each together, and its Pareto k [-].
+    """
+
+    left_out: Annotated[np.ndarray, Stored(("group",), type=IN_WORDS)]
     left_out_stations: Annotated[np.ndarray, Stored(("group",), type=WHOLE_NUMBERS)]
-    left_out_score: Annotated[np.ndarray, Stored(("group",))]  # log predictive density of them together
+    left_out_score: Annotated[np.ndarray, Stored(("group",))]
     left_out_k: Annotated[np.ndarray, Stored(("group",))]
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """What a refined posterior knows more than a weighted ensemble."""
+    """What a refined posterior knows more than a weighted ensemble.
+
+    Attributes
+    ----------
+    error_model, modes, draws, leave_one_out, misfit, groups
+        ErrorModel, PosteriorModes, ImportanceDraws, LeaveOneOut, MisfitTest and GroupsLeftOut.
+    """
 
     error_model: ErrorModel
     modes: PosteriorModes
@@ -130,40 +204,84 @@ ByKind = Annotated[dict[str, float], Stored(("kind",), VALUE_UNIT)]
 
 @dataclass(frozen=True)
 class InferenceSettings:
-    """How the members were weighed, and which ensemble they come from."""
+    """How the members were weighed, and which ensemble they come from.
 
-    method: str  # glue: members of the ensemble weighed; refine: draws around the modes; surrogate: of a surrogate
-    likelihood: str  # gaussian, nse or inverse-variance
-    sigma_rule: str  # best-member or known
-    threshold: float  # smallest efficiency of a member with weight [-]; -inf: none
-    ensemble_hash: str  # config hash of the ensemble, '' where none was needed
+    Attributes
+    ----------
+    method
+        "glue": members of the ensemble weighed; "refine": draws around the modes; "surrogate": of a surrogate.
+    likelihood
+        "gaussian", "nse" or "inverse-variance".
+    sigma_rule
+        "best-member" or "known".
+    threshold
+        Smallest efficiency of a member with weight [-]; -inf: none.
+    ensemble_hash
+        Config hash of the ensemble, '' where none was needed.
+    seed, version
+        Of the draws; and that of vegglue.
+    """
+
+    method: str
+    likelihood: str
+    sigma_rule: str
+    threshold: float
+    ensemble_hash: str
     seed: int
     version: str
 
 
 @dataclass(frozen=True)
 class WeightedSample:
-    """The members: their parameters, what each predicts, how well, and its weight."""
+    """The members: their parameters, what each predicts, how well, and its weight.
+
+    Attributes
+    ----------
+    members, failed, best
+        How many, those without a flow among them, and the one that fits best.
+    unit, theta
+        By parameter: its unit, and its values (member,).
+    weights
+        (member,) w, of sum 1 [-].
+    efficiency
+        (member,) 1 - sum (y - f)^2 / sum (y - mean y)^2 (Nash-Sutcliffe) [-].
+    log_likelihood
+        (member, station) Gaussian; of a refined posterior that of each station given all others [-].
+    prediction
+        (member, station) f [unit of the kind].
+    """
 
     members: int
     failed: int
-    best: int  # member that fits best
+    best: int
     unit: Annotated[dict[str, str], Stored(("parameter",), type=IN_WORDS)]
     theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
-    weights: Annotated[np.ndarray, Stored(("member",))]  # sum 1
-    efficiency: Annotated[np.ndarray, Stored(("member",))]  # Nash-Sutcliffe
-    log_likelihood: Annotated[np.ndarray, Stored(("member", "station"))]  # Gaussian, refined: given all other stations
+    weights: Annotated[np.ndarray, Stored(("member",))]
+    efficiency: Annotated[np.ndarray, Stored(("member",))]
+    log_likelihood: Annotated[np.ndarray, Stored(("member", "station"))]
     prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]
 
 
 @dataclass(frozen=True)
 class WeightStatistics:
-    """What the weights are worth."""
+    """What the weights are worth.
 
-    weighed: int  # members solved and above the threshold
-    effective_size: float  # Kish: equal members that the weights are worth [-]
-    largest_weight: float  # [-]
-    pareto_k: float  # shape of the tail of the weights [-]; above 0.7 they are not to be trusted
+    Attributes
+    ----------
+    weighed
+        Members solved and above the threshold.
+    effective_size
+        N = 1 / sum w^2 (Kish): equal members that the weights w are worth [-].
+    largest_weight
+        Largest w [-].
+    pareto_k
+        Shape of the tail of the weights [-]; above 0.7 they are not to be trusted.
+    """
+
+    weighed: int
+    effective_size: float
+    largest_weight: float
+    pareto_k: float
 
 
 @dataclass(frozen=True)
@@ -171,6 +289,26 @@ class Marginals:
     """Each parameter by its name, beside its prior, and the correlation of all pairs.
 
     Of a log-uniform or lognormal parameter, correlation, width_ratio and bound_mass are those of its log10.
+
+    Attributes
+    ----------
+    median, sd
+        Median and standard deviation [unit of the parameter].
+    quantiles, prior_quantiles
+        (parameter, level) of the posterior and of the prior at LEVELS.
+    log10_median, log10_sd
+        The same of log10, if the prior is log-uniform or lognormal [-].
+    correlation
+        (parameter, other_parameter) of all pairs [-].
+    width_ratio
+        (parameter,) 95 % range of the posterior over that of the prior [-].
+    identified
+        (parameter,) whether that is below IDENTIFIED_BELOW.
+    bounds
+        (parameter, side) of the prior, maybe infinite.
+    bound_mass, bound_hit
+        (parameter, side) share of the weight within 2 % of the range of a bound [-]; and whether it presses against
+        it.
     """
 
     median: ByParameter
@@ -180,45 +318,85 @@ class Marginals:
     log10_median: ByLogParameter
     log10_sd: ByLogParameter
     correlation: Annotated[np.ndarray, Stored(("parameter", "other_parameter"))]
-    width_ratio: Annotated[dict[str, float], Stored(("parameter",))]  # 95 % range, posterior over prior
+    width_ratio: Annotated[dict[str, float], Stored(("parameter",))]
     identified: Annotated[dict[str, bool], Stored(("parameter",), type=YES_OR_NO)]
-    bounds: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), OWN_UNIT)]  # of the prior, maybe infinite
-    bound_mass: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"))]  # within 2 % of the range of a bound
-    bound_hit: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), type=YES_OR_NO)]  # it presses against it
+    bounds: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), OWN_UNIT)]
+    bound_mass: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"))]
+    bound_hit: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), type=YES_OR_NO)]
 
 
 @dataclass(frozen=True)
 class GoodnessOfFit:
-    """What is left between measured and predicted, and the errors it is compared with, by kind of observation."""
+    """What is left between measured and predicted, and the errors it is compared with, by kind of observation.
 
-    used: int  # stations that count
-    chi2: float  # of the best member against known standard errors [-], NaN where one is unknown
-    sigma: ByKind  # RMS residual of the best member, or of the known standard errors
-    rmse: ByKind  # of the median prediction
+    Attributes
+    ----------
+    used
+        Stations that count.
+    chi2
+        sum ((y - f) / s)^2 of the best member, s known standard errors [-]; NaN where one is unknown.
+    sigma
+        Root mean square residual of the best member, or of the known standard errors, by kind [its unit].
+    rmse, best_rmse
+        Root mean square residual of the median prediction, and of the best member, by kind [its unit].
+    noise
+        (station,) standard deviation of a residual, NaN if unknown.
+    residual, best_residual
+        (station,) y - f of the median prediction, and of the best member.
+    """
+
+    used: int
+    chi2: float
+    sigma: ByKind
+    rmse: ByKind
     best_rmse: ByKind
-    noise: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # residual standard deviation, NaN unknown
-    residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # measured minus median prediction
-    best_residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # measured minus best member
+    noise: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
+    residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
+    best_residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
 
 
 @dataclass(frozen=True)
 class PredictiveDistribution:
-    """What the posterior predicts at the stations: quantiles, and draws of equal weight."""
+    """What the posterior predicts at the stations: quantiles, and draws of equal weight.
 
-    model_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]  # spread of the members alone
-    total_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]  # with the residual error
-    draws: Annotated[np.ndarray, Stored(("chain", "draw"), type=WHOLE_NUMBERS)]  # member indices, equal weights
-    predictive: Annotated[np.ndarray, Stored(("chain", "draw", "station"), VALUE_UNIT)]  # draws with residual error
+    Attributes
+    ----------
+    model_band, total_band
+        (level, station) quantiles at LEVELS of the members alone, and with the residual error.
+    draws
+        (chain, draw) members of draws of equal weight.
+    predictive
+        (chain, draw, station) what these predict, with residual error.
+    """
+
+    model_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]
+    total_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]
+    draws: Annotated[np.ndarray, Stored(("chain", "draw"), type=WHOLE_NUMBERS)]
+    predictive: Annotated[np.ndarray, Stored(("chain", "draw", "station"), VALUE_UNIT)]
 
 
 @dataclass(frozen=True)
 class CorrectedCanopy:
-    """phi of a stand for another canopy height: equal Chézy coefficient at the same depth."""
+    """phi of a stand for another canopy height: equal Chézy coefficient at the same depth.
+
+    Attributes
+    ----------
+    parameter
+        Name of phi.
+    from_height, to_height, depth
+        Of the canopy [m], and depth of the water [m].
+    phi
+        (member,) phi of each [-].
+    median, sd, quantiles
+        Median, standard deviation, and quantiles at LEVELS [-].
+    log10_median, log10_sd
+        Median and standard deviation of log10 phi [-].
+    """
 
     parameter: str
-    from_height: float  # [m]
-    to_height: float  # [m]
-    depth: float  # [m]
+    from_height: float
+    to_height: float
+    depth: float
     phi: Annotated[np.ndarray, Stored(("member",))]
     median: float
     sd: float
@@ -233,12 +411,33 @@ class Transfer:
 
     Values and errors on the scale on which the prior is flat (log10 of a log-uniform one); NaN where the data constrain
     little. chi2 of homogeneity with its freedom and chance; misfits chi2 in the joint fit and alone.
+
+    Attributes
+    ----------
+    scale
+        Of the errors, from what the experiments alone leave [-].
+    gain
+        By which chi2 falls when every experiment has its own parameters [-].
+    more
+        How many parameters more these are.
+    p_all
+        Chance of such a gain by errors alone [-].
+    experiments
+        (experiment,) names.
+    value, error
+        (experiment, parameter) estimate of each experiment alone, and its standard error.
+    chi2, freedom, p
+        (parameter,) of homogeneity, its degrees of freedom, and its chance by errors alone [-].
+    misfit_together, misfit_alone
+        (experiment,) chi2 in the joint fit, and of the experiment alone [-].
+    stations
+        (experiment,) how many.
     """
 
-    scale: float  # of the errors, from what the experiments alone leave [-]
-    gain: float  # by which chi2 falls when every experiment has its own parameters [-]
-    more: int  # how many parameters more these are
-    p_all: float  # chance of such a gain by errors alone [-]
+    scale: float
+    gain: float
+    more: int
+    p_all: float
     experiments: Annotated[np.ndarray, Stored(("experiment",), type=IN_WORDS)]
     value: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
     error: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
@@ -255,22 +454,49 @@ class Surrogate:
     """Of a command: what a posterior by a surrogate rests on, and how far it is known.
 
     Errors are standard errors over realisations of what the surrogate does not know, the largest of any parameter.
+
+    Attributes
+    ----------
+    runs, failed
+        Of the command, and those of them that failed.
+    settled
+        1 if the errors were small enough, and stayed so when runs were added.
+    median_error
+        Of a median [standard deviations of the posterior].
+    sd_error
+        Of a standard deviation, over itself [-].
+    last_error
+        Of the surrogate at the last runs, root mean square [standard errors of the data].
+    validation_low, validation_high
+        Discharges at which measurements would test it [m3/s]; NaN if the case has any.
+    station_error
+        (station,) of the surrogate, counted in the errors.
     """
 
-    runs: int  # of the command, with those that failed
+    runs: int
     failed: int
-    settled: int  # 1 if the errors were small enough, and stayed so when runs were added
-    median_error: float  # of a median [standard deviations of the posterior]
-    sd_error: float  # of a standard deviation, over itself [-]
-    last_error: float  # of the surrogate at the last runs, root mean square [standard errors of the data]
-    validation_low: float  # discharges at which measurements would test it [m3/s]; NaN if the case has any
+    settled: int
+    median_error: float
+    sd_error: float
+    last_error: float
+    validation_low: float
     validation_high: float
-    station_error: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # of the surrogate, counted in the errors
+    station_error: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Everything one inference finds. Arrays over stations count all rows of the table `station`."""
+    """Everything one inference finds. Arrays over stations count all rows of the table `station`.
+
+    Attributes
+    ----------
+    settings, sample, weighting, marginals, fit, predicted
+        InferenceSettings, WeightedSample, WeightStatistics, Marginals, GoodnessOfFit and PredictiveDistribution.
+    station
+        Table of all stations, used or not.
+    canopy, refinement, transfer, surrogate
+        CorrectedCanopy, Refinement, Transfer (of several experiments) and Surrogate (of a command), None without.
+    """
 
     settings: InferenceSettings
     sample: WeightedSample
@@ -281,8 +507,8 @@ class Posterior:
     station: pd.DataFrame
     canopy: CorrectedCanopy | None
     refinement: Refinement | None
-    transfer: Transfer | None  # of several experiments
-    surrogate: Surrogate | None = None  # of a command, with `method: surrogate`
+    transfer: Transfer | None
+    surrogate: Surrogate | None = None
 
     @property
     def parameters(self) -> tuple[str, ...]:

@@ -57,10 +57,27 @@ Result = TypeVar("Result")
 
 
 def read_ensemble(path: Path, expected_hash: str | None = None, config: Path | None = None) -> Ensemble:
-    """Read a finished ensemble. config: the file of the case, for the command that a refusal names.
+    """Read a finished ensemble.
 
-    Errors: InputError when there is none, or it was made from another config than the one with `expected_hash`;
-    StorageError when the file is broken.
+    Parameters
+    ----------
+    path : Path
+        `ensemble.h5`.
+    expected_hash : str, optional
+        That of the config which the ensemble has to be of.
+    config : Path, optional
+        The file of the case, for the command that a refusal names.
+
+    Returns
+    -------
+    Ensemble
+
+    Raises
+    ------
+    InputError
+        If there is none, or it was made from another config.
+    StorageError
+        If the file is broken.
     """
     if not path.exists() and part_file(path).exists():
         command = _made_by("simulate", config, path)
@@ -69,7 +86,25 @@ def read_ensemble(path: Path, expected_hash: str | None = None, config: Path | N
 
 
 def read_fields(path: Path, expected_hash: str | None = None) -> Fields:
-    """Read the fields of a finished ensemble, whole; errors as those of read_ensemble."""
+    """Read the fields of a finished ensemble, whole.
+
+    Parameters
+    ----------
+    path : Path
+        `fields.h5`.
+    expected_hash : str, optional
+        That of the config which they have to be of.
+
+    Returns
+    -------
+    Fields
+        Arrays (member, experiment, x, y), which `results.ensemble.predict_at` reads at a point.
+
+    Raises
+    ------
+    InputError, StorageError
+        As `read_ensemble`.
+    """
     if not path.exists():
         remedy = KEEP_FIELDS.format(shown_command("simulate", None))
         raise InputError(f"{path}: expected fields of the members, found no file; {remedy}.")
@@ -86,7 +121,22 @@ def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: 
 
 
 def read_posterior(path: Path, expected_hash: str | None = None, config: Path | None = None) -> Posterior:
-    """Read a posterior; errors as those of read_ensemble, for `vegglue infer`."""
+    """Read a posterior.
+
+    Parameters
+    ----------
+    path, expected_hash, config
+        `posterior.h5`, and as `read_ensemble`.
+
+    Returns
+    -------
+    Posterior
+
+    Raises
+    ------
+    InputError, StorageError
+        As `read_ensemble`, for `vegglue infer`.
+    """
     return _read(path, expected_hash, _made_by("infer", config, path), posterior_from)
 
 
@@ -97,7 +147,22 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, config: str, config_hash: 
 
 
 def read_diagnosis(path: Path, expected_hash: str | None = None) -> Diagnosis:
-    """Read a diagnosis; errors as those of read_ensemble, for `vegglue diagnose`."""
+    """Read a diagnosis.
+
+    Parameters
+    ----------
+    path, expected_hash
+        `diagnosis.h5`, and as `read_ensemble`.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    InputError, StorageError
+        As `read_ensemble`, for `vegglue diagnose`.
+    """
     return _read(path, expected_hash, shown_command("diagnose", None), diagnosis_from)
 
 

@@ -39,8 +39,14 @@ ALIKE_IN_ALL = [*MEASUREMENT, "standard_error", "used"]
 
 @dataclass(frozen=True)
 class Comparison:
-    """One score for each model, in the order they were given, and the measurements that none of them uses, since a
-    diagnosis excludes them.
+    """Models side by side.
+
+    Attributes
+    ----------
+    model_scores : tuple of ModelScore
+        One for each model, in the order they were given.
+    left_out : DataFrame
+        Measurements that none of them uses, since a diagnosis excludes them.
     """
 
     model_scores: tuple[ModelScore, ...]

@@ -190,11 +190,24 @@ def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False
 class Mark:
     """One hidden cause compared with a diagnosis.
 
-    verdict: kind of the verdict, '' without a diagnosis; found: whether it counts as found for its kind of cause;
-    named: whether the verdict is this effect alone; inside: whether it is in the set; open: whether it is listed among
-    what is not excluded; holds: whether the 95 % interval holds the true amplitude, None if it is not in the set; away:
-    distance [m] of the nearest place found from the true one, NaN without either; groups: of effects that the data
-    cannot separate, for each step; said: the set; shapes: (name, found, true) of shapes that differ by 5 % or more.
+    Attributes
+    ----------
+    hidden, kind
+        The cause, and what kind of cause it is.
+    verdict
+        Kind of the verdict, '' without a diagnosis.
+    found, named
+        Whether it counts as found for its kind of cause, and whether the verdict is this effect alone.
+    inside, open
+        Whether it is in the set, and whether it is listed among what is not excluded.
+    holds
+        Whether the 95 % interval holds the true amplitude, None if it is not in the set.
+    away
+        Distance of the nearest place found from the true one [m], NaN without either.
+    groups, said
+        Groups of effects that the data cannot separate, for each step, and the set.
+    shapes
+        (name, found, true) of shapes that differ by 5 % or more.
     """
 
     hidden: Hidden
