@@ -60,11 +60,11 @@ def _as_list(given: Any) -> Any:
     return given if isinstance(given, list | tuple) or given is None else [given]
 
 
-Length = Annotated[float, BeforeValidator(lambda value: in_si(value, "length", ""))]
-Angle = Annotated[float, BeforeValidator(lambda value: in_si(value, "angle", ""))]
-Name = Annotated[str, BeforeValidator(str)]
+LengthInSI = Annotated[float, BeforeValidator(lambda value: in_si(value, "length", ""))]
+AngleInSI = Annotated[float, BeforeValidator(lambda value: in_si(value, "angle", ""))]
+Label = Annotated[str, BeforeValidator(str)]
 ByRole = Annotated[dict[str, str], BeforeValidator(_by_role)]
-Place = tuple[Length, Length]
+PointInPlan = tuple[LengthInSI, LengthInSI]
 OfMap = Literal["map", "channel"]
 
 
@@ -112,24 +112,24 @@ class FileOptions:
     columns: ByRole = field(default_factory=dict)
     units: Annotated[ByRole, AfterValidator(_known_units)] = field(default_factory=dict)
     missing: Annotated[tuple[Number, ...] | None, BeforeValidator(_as_list)] = None
-    experiment: Name | None = None
-    section: Name | None = None
+    experiment: Label | None = None
+    section: Label | None = None
     standard_error: Annotated[dict[str, Annotated[Number, Field(ge=0)]], BeforeValidator(_errors_by_unit)] = field(
         default_factory=dict
     )
     coordinates: OfMap | None = None
     directions: OfMap | None = None
     flip: Annotated[tuple[Literal["x", "y"], ...], BeforeValidator(_as_list)] = ()
-    zero: Place | None = None
-    x: Length | None = None
-    line: Annotated[tuple[Place, Place], BeforeValidator(_two_ends)] | None = None
-    start: Place | None = None
-    position: tuple[Length, Length, Length] | None = None
-    sheet: Name | None = None
-    floor: Length | None = None
-    surface: Length | None = None
-    draft: Length | None = None
-    declination: Angle = 0.0
+    zero: PointInPlan | None = None
+    x: LengthInSI | None = None
+    line: Annotated[tuple[PointInPlan, PointInPlan], BeforeValidator(_two_ends)] | None = None
+    start: PointInPlan | None = None
+    position: tuple[LengthInSI, LengthInSI, LengthInSI] | None = None
+    sheet: Label | None = None
+    floor: LengthInSI | None = None
+    surface: LengthInSI | None = None
+    draft: LengthInSI | None = None
+    declination: AngleInSI = 0.0
     factor: Annotated[Number, Field(gt=0, le=LARGEST_FACTOR)] | None = None
 
 

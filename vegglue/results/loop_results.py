@@ -24,9 +24,11 @@ from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.wording.sentences import phrase, sentence, tag_of, tagged
 
 # Numbers of JSON, which has null for what is none.
-Number = Annotated[float, BeforeValidator(lambda kept: math.nan if kept is None else kept)]
-Errors = Annotated[Array, PlainValidator(lambda kept: np.array(TypeAdapter(list[Number]).validate_python(kept)))]
-Flags = Annotated[np.ndarray, PlainValidator(lambda kept: np.array(TypeAdapter(list[bool]).validate_python(kept)))]
+KeptNumber = Annotated[float, BeforeValidator(lambda kept: math.nan if kept is None else kept)]
+KeptErrors = Annotated[
+    Array, PlainValidator(lambda kept: np.array(TypeAdapter(list[KeptNumber]).validate_python(kept)))
+]
+KeptFlags = Annotated[np.ndarray, PlainValidator(lambda kept: np.array(TypeAdapter(list[bool]).validate_python(kept)))]
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,10 @@ class InSample:
         Root mean square measurement error of a velocity [m/s].
     """
 
-    rmse: dict[str, Number]
-    chi2: Number
+    rmse: dict[str, KeptNumber]
+    chi2: KeptNumber
     stations: int
-    noise_floor: Number
+    noise_floor: KeptNumber
 
     @property
     def velocity(self) -> float:
@@ -69,9 +71,9 @@ class HeldOut:
         Experiment and section of each.
     """
 
-    sections: Errors
-    experiments: Errors
-    velocity: Flags
+    sections: KeptErrors
+    experiments: KeptErrors
+    velocity: KeptFlags
     clusters: tuple[tuple[str, str], ...]
 
 
@@ -87,9 +89,9 @@ class PredictiveScores:
         Share within the 50 % and the 95 % band [-].
     """
 
-    log_score: Number
-    inside50: Number
-    inside95: Number
+    log_score: KeptNumber
+    inside50: KeptNumber
+    inside95: KeptNumber
 
 
 @dataclass(frozen=True)
@@ -116,13 +118,13 @@ class ModelScore:
     name: str
     title: str
     effects: tuple[str, ...]
-    values: dict[str, tuple[Number, Number, Number]]
+    values: dict[str, tuple[KeptNumber, KeptNumber, KeptNumber]]
     in_sample: InSample
     held_out: HeldOut
     predictive: PredictiveScores
-    homogeneity: dict[str, Number]
-    validation: Number
-    validation_inside95: Number = math.nan
+    homogeneity: dict[str, KeptNumber]
+    validation: KeptNumber
+    validation_inside95: KeptNumber = math.nan
 
 
 @dataclass(frozen=True)
@@ -148,11 +150,11 @@ class ComparedModel:
     config_hash: str
     added: tuple[str, ...]
     parameters: int
-    in_sample: Number
-    held_out_sections: Number
-    held_out_experiments: Number
-    unseen: Number
-    noise_floor: Number
+    in_sample: KeptNumber
+    held_out_sections: KeptNumber
+    held_out_experiments: KeptNumber
+    unseen: KeptNumber
+    noise_floor: KeptNumber
 
 
 @dataclass(frozen=True)
