@@ -129,9 +129,10 @@ def _of_faces(geometry: Any, level: Array, vertical: float, length: Array) -> tu
 
 def _sums(values: Array, cells: np.ndarray[Any, Any], used: np.ndarray[Any, Any], count: int) -> Array:
     """Sums of values of faces (faces,) over the cells (faces, 2) at their sides that are used (faces, 2): (count,)."""
-    return sum(
-        (np.bincount(cells[here, side], values[here], count) for side, here in enumerate(used.T)), np.zeros(count)
-    )
+    sums = np.zeros(count)
+    for side, here in enumerate(used.T):
+        sums += np.bincount(cells[here, side], values[here], count)
+    return sums
 
 
 def _vectors(
