@@ -178,9 +178,7 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError, cells: 
         return np.zeros((len(model.station), 0))
     cells = cells or cell_responses(model, point, terms_that_err(model.case, allowed))
     objects = _objects(model.case)
-    half, grid = half_width(model.site), model.site.grid
-    friction = gaussian_basis(grid, FRICTION_RADIUS * half, FRICTION_RADIUS * half)
-    bed = gaussian_basis(grid, BED_RADIUS * half, BED_RADIUS * half)
+    friction, bed = error_bases(model)
     return np.hstack(
         [
             allowed.friction * field_columns(cells, "friction", friction),
@@ -190,6 +188,13 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError, cells: 
             site_error_columns(model, point, allowed, cells),
         ]
     )
+
+
+def error_bases(model: Model) -> tuple[GaussianBasis, GaussianBasis]:
+    """Basis functions of the errors of friction and of the bed, so many half widths of the floor wide."""
+    half = half_width(model.site)
+    friction, bed = (gaussian_basis(model.site.grid, one * half, one * half) for one in (FRICTION_RADIUS, BED_RADIUS))
+    return friction, bed
 
 
 def terms_that_err(case: Case, allowed: ModelError) -> tuple[Term, ...]:

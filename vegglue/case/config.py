@@ -237,6 +237,12 @@ def _observations(case: Case) -> Iterator[tuple[KeyPath, Observation, Iterable[s
             yield ("validation", "observations", i), one, unseen
 
 
+def _planned(case: Case) -> Iterator[tuple[KeyPath, Any]]:
+    """Every planned piece of field work, and where it stands."""
+    for group in ("transects", "points", "gauges", "discharges") if case.planned is not None else ():
+        yield from ((("planned", group, i), one) for i, one in enumerate(getattr(case.planned, group)))
+
+
 def _coefficients(place: KeyPath, law: FrictionClass) -> Iterator[tuple[KeyPath, Value | None, bool]]:
     for key in COEFFICIENT_OF.values():
         yield (*place, key), getattr(law, key), True
@@ -274,10 +280,9 @@ def _agree_on_names(case: Case) -> None:
     for name, entry in case.effects.items():
         for word in entry.experiments or ():
             _declared(("effects", name, "experiments"), word, case.experiments, "experiment")
-    for group in ("transects", "points", "gauges", "discharges") if case.planned is not None else ():
-        for i, one in enumerate(getattr(case.planned, group)):
-            for word in one.experiments or ():
-                _declared(("planned", group, i, "experiments"), word, case.experiments, "experiment")
+    for at, one in _planned(case):
+        for word in one.experiments or ():
+            _declared((*at, "experiments"), word, case.experiments, "experiment")
     if case.canopy_correction is not None:
         _declared(("canopy_correction", "stand"), case.canopy_correction.stand, stands, "stand")
     beds: list[tuple[KeyPath, Iterable[BedLayer]]] = [((), case.bed)]
@@ -379,14 +384,12 @@ def _agree_on_values(case: Case) -> None:
         if part is not None and (part[0] < low or part[1] > high):
             got = f"{part[0]:g} to {part[1]:g}"
             raise CaseError(place, f"expected a range within {low:g} to {high:g} m, got {got} m")
-    for group in ("transects", "points", "gauges", "discharges") if case.planned is not None else ():
-        for i, one in enumerate(getattr(case.planned, group)):
-            for axis, (low, high) in (("x", case.grid.x), ("y", case.grid.y)):
-                given = getattr(one, axis, None)
-                for value in given if isinstance(given, tuple) else () if given is None else (given,):
-                    if not low <= value <= high:
-                        complaint = f"expected a place within {low:g} to {high:g} m, got {value:g}"
-                        raise CaseError(("planned", group, i, axis), complaint)
+    for at, one in _planned(case):
+        for axis, (low, high) in (("x", case.grid.x), ("y", case.grid.y)):
+            given = getattr(one, axis, None)
+            for value in given if isinstance(given, tuple) else () if given is None else (given,):
+                if not low <= value <= high:
+                    raise CaseError((*at, axis), f"expected a place within {low:g} to {high:g} m, got {value:g}")
     if case.infer.behavioural is not None and case.infer.likelihood == "gaussian":
         raise CaseError(
             ("infer", "behavioural"),

@@ -283,8 +283,7 @@ def _verdict(
     own = [(abs(float(z[j])), name) for j, name in enumerate(model.names) if name not in of_effects]
     far, strained = max(own, default=(0.0, ""))
     # Whether two single readings are excluded that stand side by side in one section.
-    single = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
-    rows = [int(np.flatnonzero(base.noise.rows == station)[0]) for station in single]
+    rows = single_readings(base.noise, found)
     neighbours = any(0.0 < base.noise.separation[a, b] < NEIGHBOURS_WITHIN for a in rows for b in rows)
     beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
     surroundings: list[Note] = [*mapped_places(model.case, named_places(found.places, undecided))]
@@ -322,6 +321,12 @@ def _verdict(
             bed=of_bed,
         )
     )
+
+
+def single_readings(noise: Noise, found: SearchState) -> list[int]:
+    """Rows of the single readings that are excluded."""
+    stations = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
+    return [int(np.flatnonzero(noise.rows == station)[0]) for station in stations]
 
 
 def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnSection | None:

@@ -35,7 +35,7 @@ from vegglue.diagnosis.competition import (
     odds_against_nothing,
     tempered_probabilities,
 )
-from vegglue.diagnosis.conclusion import NEIGHBOURS_WITHIN, assemble_diagnosis
+from vegglue.diagnosis.conclusion import NEIGHBOURS_WITHIN, assemble_diagnosis, single_readings
 from vegglue.diagnosis.refits import calibrated_with, pruned
 from vegglue.diagnosis.search_state import (
     PriorWeight,
@@ -230,9 +230,8 @@ def beside_excluded(base: Baseline, instrument: Instrument, found: SearchState) 
     """Whether a single reading stands side by side with one that is excluded already."""
     if instrument.kind != "reading":
         return False
-    earlier = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
-    rows = [int(np.flatnonzero(base.noise.rows == station)[0]) for station in earlier]
-    return any(0.0 < base.noise.separation[row, instrument.readings[0]] < NEIGHBOURS_WITHIN for row in rows)
+    separation, own = base.noise.separation, instrument.readings[0]
+    return any(0.0 < separation[row, own] < NEIGHBOURS_WITHIN for row in single_readings(base.noise, found))
 
 
 def branch_with(

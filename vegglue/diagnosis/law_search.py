@@ -28,6 +28,7 @@ from vegglue.calibration.law_screening import (
     VALUES_SEEN,
     LawInCase,
     LawScreening,
+    ProductScreening,
     first_order_gain,
     law_fingerprints,
     screen_laws,
@@ -226,6 +227,12 @@ PRODUCT_ALARMS = 0.01
 PRODUCTS_REFITTED = 2
 
 
+def _trial(screening: LawScreening | ProductScreening, column: int, one: LawInCase, z: Array) -> RefitTrial:
+    """The refit of a law at the shapes of a column, from the size that the screening gives it beside z (p,)."""
+    start = start_with(one.candidate, z, first_order_gain(screening.kind, column, one))
+    return RefitTrial(one.candidate, screening.settings[column], (start,))
+
+
 def product_beside(
     search: SearchModel, listed: Fingerprints, law: LawInCase, refit: Refit, watch: Watch
 ) -> ProductFound | None:
@@ -243,11 +250,8 @@ def product_beside(
     of_each = [np.flatnonzero(screening.law_of == j) for j in range(len(screening.products))]
     best_columns = [int(columns[np.argmax(evidence[columns])]) for columns in of_each]
     columns = sorted(best_columns, key=lambda column: -evidence[column])[:PRODUCTS_REFITTED]
-    trials = []
-    for column in columns:
-        one = screening.products[screening.law_of[column]]
-        start = start_with(one.candidate, full.point.z, first_order_gain(screening.kind, column, one))
-        trials.append(RefitTrial(one.candidate, screening.settings[column], (start,)))
+    products = screening.products
+    trials = [_trial(screening, column, products[screening.law_of[column]], full.point.z) for column in columns]
     refits = refits_of(full, trials, watch)
     ends = [(column, one) for column, one in zip(columns, refits, strict=True) if one is not None]
     if not ends:
@@ -343,11 +347,7 @@ def refitted_laws(screening: LawScreening, known: float, watch: Watch) -> tuple[
     for rank, subject in enumerate(ranked):  # more than one form of the first quantities
         forms = sorted(screening.subjects[subject], key=lambda law: -evidence[screening.best_column(law)])
         tried += [(subject, law) for law in forms[: FORMS_REFITTED if rank < SEVERAL_FORMS else 1]]
-    trials = []
-    for _, law in tried:
-        one, column = screening.laws[law], screening.best_column(law)
-        start = start_with(one.candidate, search.point.z, first_order_gain(screening.kind, column, one))
-        trials.append(RefitTrial(one.candidate, screening.settings[column], (start,)))
+    trials = [_trial(screening, screening.best_column(law), screening.laws[law], search.point.z) for _, law in tried]
     refits = refits_of(search, trials, watch)
     found, of_columns = [], np.full(evidence.size, -np.inf)
     for subject in ranked:

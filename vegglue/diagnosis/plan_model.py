@@ -16,8 +16,8 @@ from vegglue.calibration.candidates import Candidate, candidates_of, cause_of, e
 from vegglue.calibration.detection import own_and_shared, trace_lengths
 from vegglue.calibration.fingerprints import consecutive_columns
 from vegglue.calibration.fit import prediction_at
-from vegglue.calibration.model_error import BED_RADIUS, FRICTION_RADIUS, gaussian_basis, model_error_columns
-from vegglue.case.channel_geometry import cells_across, expected_depth, half_width
+from vegglue.calibration.model_error import error_bases, model_error_columns
+from vegglue.case.channel_geometry import cells_across, expected_depth
 from vegglue.case.gridded_site import build_site, in_experiment
 from vegglue.case.schema import Case, Planned, PlannedDischarge, PlannedGauge, PlannedPoint, PlannedTransect
 from vegglue.case.zones import corners_of
@@ -548,9 +548,7 @@ def _bed_levels(model: Model, places: Array, count: int) -> Array:
     found = np.zeros((len(places), count))
     if not places.size:
         return found
-    half, grid = half_width(model.site), model.site.grid
-    friction = gaussian_basis(grid, FRICTION_RADIUS * half, FRICTION_RADIUS * half)
-    bed = gaussian_basis(grid, BED_RADIUS * half, BED_RADIUS * half)
+    friction, bed = error_bases(model)
     along = np.exp(-(((places[:, :1] - bed.x) / bed.length) ** 2))
     across = np.exp(-(((places[:, 1:] - bed.y) / bed.width) ** 2))
     variance = (bed.along**2).sum(axis=0).mean() * (bed.across**2).sum(axis=0).mean()
