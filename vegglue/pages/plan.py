@@ -9,9 +9,11 @@ from vegglue.calibration.score_test import alike_groups
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.schema import Case
+from vegglue.case.site_schema import Interval
 from vegglue.case.zones import corners_of
 from vegglue.pages.style import (
     COLOUR,
+    Scale,
     inline,
     linear_scale,
     palette_css,
@@ -132,6 +134,72 @@ def days_of_work(case: Case, plan: FieldPlan, places: Sequence[FieldPlace]) -> l
     return found
 
 
+@dataclass(frozen=True)
+class _PlanMap:
+    """Where the reach lies in the drawing: scales of x and y onto px, and the lower edge of the map [px].
+
+    upright: the flow downwards, for a phone; else to the right.
+    """
+
+    along: Scale
+    across: Scale
+    foot: float
+    upright: bool
+
+    def at(self, x: float, y: float) -> tuple[float, float]:
+        """A place x, y [m] in the drawing [px]."""
+        a, b = float(self.along(x)), float(self.across(y))
+        return (b, a) if self.upright else (a, b)
+
+    def path(self, x: Iterable[float], y: Iterable[float]) -> str:
+        """Straight lines from place to place."""
+        return "M" + "L".join("{:.1f},{:.1f}".format(*self.at(a, b)) for a, b in zip(x, y, strict=True))
+
+    def symbols(self, place: FieldPlace, y: Sequence[float]) -> list[str]:
+        """Lines of transects, dots of stations, a triangle for a gauge and a square for a discharge."""
+        parts, (px, py) = list[str](), self.at(place.x, y[0])
+        if place.work in (Work.TRANSECT, Work.SURVEY_LINE):
+            dashes = {"stroke_dasharray": "4 3"} if place.work is Work.SURVEY_LINE else {}
+            line = self.path([place.x, place.x], [y[0], y[-1]])
+            parts.append(svg_element("path", d=line, stroke=COLOUR["ink"], stroke_width=1, **dashes))
+        if place.work in (Work.TRANSECT, Work.POINT):
+            radius = 2.4 if len(y) > 1 else 4
+            for px, py in (self.at(place.x, one) for one in y):
+                parts.append(svg_element("circle", cx=px, cy=py, r=radius, fill=COLOUR["measured"]))
+        elif place.work is Work.GAUGE:
+            parts.append(svg_element("path", d=f"M{px - 6:.1f},{py - 5:.1f}h12l-6,10z", fill=COLOUR["model"]))
+        elif place.work is Work.DISCHARGE:
+            parts.append(svg_element("path", d=f"M{px - 5:.1f},{py - 5:.1f}h10v10h-10z", fill=COLOUR["model"]))
+        return parts
+
+    def name_of(self, place: FieldPlace, y: float) -> str:
+        """The name of a place beside it; of a line across, at the edge of the map."""
+        px, py = self.at(place.x, y)
+        if place.work not in (Work.TRANSECT, Work.SURVEY_LINE):
+            halo = {"stroke": COLOUR["paper"], "stroke_width": "3", "paint_order": "stroke", "stroke_linejoin": "round"}
+            return svg_words(px + 7.0, py - 6.0, place.name, "ink", text_anchor="start", **halo)
+        if self.upright:
+            right = UPRIGHT_WIDTH - UPRIGHT_MARGIN + 6.0
+            return svg_words(right, py + 4.0, place.name, text_anchor="start", font_weight="bold")
+        return svg_words(px, MAP_HEAD - 6.0, place.name, text_anchor="middle", font_weight="bold")
+
+    def axes(self, x: Interval, y: Interval, width: float) -> list[str]:
+        """Numbers below and beside the map, and the names of both axes; width: of the drawing [px]."""
+        ticks = (round_ticks(*x, 9), self.along), (round_ticks(*y, 5), self.across)
+        (below, to_the_right), (beside, downwards) = ticks[::-1] if self.upright else ticks
+        parts = []
+        for value, words in zip(below, tick_labels(below), strict=True):
+            px = float(to_the_right(value))
+            parts.append(svg_element("path", d=f"M{px:.1f},{self.foot:.1f}v5", stroke=COLOUR["muted"]))
+            parts.append(svg_words(px, self.foot + 18.0, words, "muted", text_anchor="middle"))
+        for value, words in zip(beside, tick_labels(beside), strict=True):
+            parts.append(svg_words(BESIDE - 8.0, float(downwards(value)) + 4.0, words, "muted", text_anchor="end"))
+        along, upwards = ("y_in_metres", "down") if self.upright else ("along", "y_in_metres")
+        name = phrase("label", along)
+        parts.append(svg_words(width - MAP_MARGIN, self.foot + 32.0, name, "muted", text_anchor="end"))
+        return [*parts, svg_words(0.0, MAP_HEAD - 10.0, phrase("label", upwards), "muted")]
+
+
 def draw_plan_map(
     case: Case,
     site: Site,
@@ -151,75 +219,35 @@ def draw_plan_map(
     if wet.size:
         south, north = max(south, float(wet[0]) - site.grid.dy), min(north, float(wet[-1]) + site.grid.dy)
     if upright:
-        foot = MAP_HEAD + UPRIGHT_HEIGHT * UPRIGHT_WIDTH
-        width, along = UPRIGHT_WIDTH, linear_scale(west, east, MAP_HEAD, foot)
+        width, foot = UPRIGHT_WIDTH, MAP_HEAD + UPRIGHT_HEIGHT * UPRIGHT_WIDTH
+        along = linear_scale(west, east, MAP_HEAD, foot)
         across = linear_scale(south, north, BESIDE, UPRIGHT_WIDTH - UPRIGHT_MARGIN)
     else:
-        inner = MAP_WIDTH - BESIDE - MAP_MARGIN
+        width, inner = MAP_WIDTH, MAP_WIDTH - BESIDE - MAP_MARGIN
         foot = MAP_HEAD + float(np.clip((north - south) / (east - west), FLATTEST, STEEPEST_LABEL)) * inner
-        width, along = MAP_WIDTH, linear_scale(west, east, BESIDE, MAP_WIDTH - MAP_MARGIN)
+        along = linear_scale(west, east, BESIDE, MAP_WIDTH - MAP_MARGIN)
         across = linear_scale(south, north, foot, MAP_HEAD)
-
-    def at(x: float, y: float) -> tuple[float, float]:
-        a, b = float(along(x)), float(across(y))
-        return (b, a) if upright else (a, b)
-
-    def path(x: Iterable[float], y: Iterable[float]) -> str:
-        return "M" + "L".join("{:.1f},{:.1f}".format(*at(a, b)) for a, b in zip(x, y, strict=True))
-
+    plan_map = _PlanMap(along, across, foot, upright)
     columns = [k for k in range(site.grid.x.size) if water[k].any()]
     step = max(len(columns) // 200, 1)
     columns = sorted({*columns[::step], columns[-1]}) if columns else []
     low = [float(site.grid.y[water[k]][0]) - 0.5 * site.grid.dy for k in columns]
     high = [float(site.grid.y[water[k]][-1]) + 0.5 * site.grid.dy for k in columns]
-    x = [float(site.grid.x[k]) for k in columns]
-    parts = [svg_element("path", d=path([*x, *x[::-1]], [*low, *high[::-1]]) + "Z", fill=COLOUR["water"])] if x else []
+    x, parts = [float(site.grid.x[k]) for k in columns], list[str]()
+    if x:
+        edge = plan_map.path([*x, *x[::-1]], [*low, *high[::-1]]) + "Z"
+        parts.append(svg_element("path", d=edge, fill=COLOUR["water"]))
     if chances is not None:
-        parts += _shading(chances, path)
+        parts += _shading(chances, plan_map.path)
     for patch in case.plants.patches:
         corners = corners_of(case, patch)
-        outline = path(corners[:, 0], corners[:, 1]) + "Z"
+        outline = plan_map.path(corners[:, 0], corners[:, 1]) + "Z"
         parts.append(svg_element("path", d=outline, fill=COLOUR["plants"], stroke=COLOUR["stems"]))
-    names = list[str]()
-    halo = {"stroke": COLOUR["paper"], "stroke_width": "3", "paint_order": "stroke", "stroke_linejoin": "round"}
-    for place in places:
-        y = place.y or (0.5 * (south + north),)
-        ink, first = COLOUR["ink"], at(place.x, y[0])
-        if place.work in (Work.TRANSECT, Work.SURVEY_LINE):
-            dashes = {"stroke_dasharray": "4 3"} if place.work is Work.SURVEY_LINE else {}
-            line = path([place.x, place.x], [y[0], y[-1]])
-            parts.append(svg_element("path", d=line, stroke=ink, stroke_width=1, **dashes))
-        if place.work in (Work.TRANSECT, Work.POINT):
-            for px, py in (at(place.x, one) for one in y):
-                parts.append(svg_element("circle", cx=px, cy=py, r=2.4 if len(y) > 1 else 4, fill=COLOUR["measured"]))
-        elif place.work is Work.GAUGE:
-            d = f"M{first[0] - 6:.1f},{first[1] - 5:.1f}h12l-6,10z"
-            parts.append(svg_element("path", d=d, fill=COLOUR["model"]))
-        elif place.work is Work.DISCHARGE:
-            d = f"M{first[0] - 5:.1f},{first[1] - 5:.1f}h10v10h-10z"
-            parts.append(svg_element("path", d=d, fill=COLOUR["model"]))
-        if place.work not in (Work.TRANSECT, Work.SURVEY_LINE):
-            names.append(svg_words(first[0] + 7.0, first[1] - 6.0, place.name, "ink", text_anchor="start", **halo))
-        elif upright:
-            right = UPRIGHT_WIDTH - UPRIGHT_MARGIN + 6.0
-            names.append(svg_words(right, first[1] + 4.0, place.name, text_anchor="start", font_weight="bold"))
-        else:
-            above = MAP_HEAD - 6.0
-            names.append(svg_words(first[0], above, place.name, text_anchor="middle", font_weight="bold"))
-    parts += names
-    ticks_along, ticks_across = round_ticks(west, east, 9), round_ticks(south, north, 5)
-    if upright:
-        below, to_the_right, beside, downwards = ticks_across, across, ticks_along, along
-    else:
-        below, to_the_right, beside, downwards = ticks_along, along, ticks_across, across
-    for value, words in zip(below, tick_labels(below), strict=True):
-        parts.append(svg_element("path", d=f"M{float(to_the_right(value)):.1f},{foot:.1f}v5", stroke=COLOUR["muted"]))
-        parts.append(svg_words(float(to_the_right(value)), foot + 18.0, words, "muted", text_anchor="middle"))
-    for value, words in zip(beside, tick_labels(beside), strict=True):
-        parts.append(svg_words(BESIDE - 8.0, float(downwards(value)) + 4.0, words, "muted", text_anchor="end"))
-    foot_words, head_words = ("y_in_metres", "down") if upright else ("along", "y_in_metres")
-    parts.append(svg_words(width - MAP_MARGIN, foot + 32.0, phrase("label", foot_words), "muted", text_anchor="end"))
-    parts.append(svg_words(0.0, MAP_HEAD - 10.0, phrase("label", head_words), "muted"))
+    stations = [(place, place.y or (0.5 * (south + north),)) for place in places]
+    for place, y in stations:
+        parts += plan_map.symbols(place, y)
+    parts += [plan_map.name_of(place, y[0]) for place, y in stations]
+    parts += plan_map.axes((west, east), (south, north), width)
     return svg_document(width, foot + MAP_FOOT + 4.0, parts, title, PLAN_LETTERS)
 
 
