@@ -133,8 +133,20 @@ class PlannedEffect:
 
 @dataclass(frozen=True)
 class PlannedPlaces:
-    """Something unlisted at a place that changes a term: how large a plausible one is [unit], the share of the places
-    under water where that is detected with 90 %, and the size that is at half of them.
+    """Something unlisted at a place that changes a term.
+
+    Attributes
+    ----------
+    term, unit
+        The term, and the unit of its sizes.
+    plausible
+        A plausible size [unit].
+    places
+        How many are under water.
+    share
+        Of these, where the plausible size is detected with 90 % [-].
+    smallest
+        Size that is detected with 90 % at half of them [unit].
     """
 
     term: str
@@ -147,8 +159,14 @@ class PlannedPlaces:
 
 @dataclass(frozen=True)
 class PlaceChances:
-    """Chance that drag of a plausible size is detected at each place x, y [m], (place,) each, of half length and half
-    width of one spot [m].
+    """Chance that drag of a plausible size is detected at each place.
+
+    Attributes
+    ----------
+    x, y, chance
+        Places [m] and the chance at each [-], (place,).
+    length, width
+        Half length and half width of one spot [m].
     """
 
     x: tuple[float, ...]
@@ -160,8 +178,16 @@ class PlaceChances:
 
 @dataclass(frozen=True)
 class PlannedInstruments:
-    """Instruments of one kind: how many, the offset that is detected with 90 % in half of them, and a plausible
-    one, both over the standard error of a reading [-].
+    """Instruments of one kind.
+
+    Attributes
+    ----------
+    instrument, count
+        The kind, and how many there are.
+    smallest
+        Offset that is detected with 90 % in half of them, over the standard error of a reading [-].
+    plausible
+        A plausible offset over that error [-].
     """
 
     instrument: str

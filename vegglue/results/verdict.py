@@ -25,7 +25,17 @@ TOO_SMALL = 0.001
 
 @dataclass(frozen=True)
 class ChiSquare:
-    """chi2 = |W (y - f)|^2 of a model [-], its degrees of freedom, and the chance p of a chi2 as large [-]."""
+    """chi2 = |W (y - f)|^2 of a model, with W'W the inverse covariance of the errors of y - f.
+
+    Attributes
+    ----------
+    value
+        chi2 [-].
+    freedom
+        Its degrees of freedom.
+    p
+        Chance of a chi2 as large under errors alone [-], NaN where it was not asked for.
+    """
 
     value: float
     freedom: int
@@ -34,8 +44,18 @@ class ChiSquare:
 
 @dataclass(frozen=True)
 class EstimatedErrors:
-    """The errors as estimated: correlation of neighbours [-], true over stated errors [-], root mean square error of
-    the grid in velocities [m/s], NaN without any, and rows of the stations rejected as outliers.
+    """The errors as estimated from the residuals.
+
+    Attributes
+    ----------
+    correlation
+        Of neighbours [-].
+    scale
+        True over stated errors [-].
+    grid_error
+        Root mean square error of the grid in velocities [m/s], NaN without any.
+    flagged
+        Rows of the stations rejected as outliers.
     """
 
     correlation: float
@@ -200,11 +220,22 @@ Reason = (
 
 @dataclass(frozen=True)
 class EffectFound:
-    """An accepted effect: its title, amplitude [unit] with its 95 % interval, and what it may be instead.
+    """An accepted effect, and what it may be instead.
 
-    probability: of it and of those alike together, among all that was tried [-]; alike: effects that leave the same
-    trace in these data; rivals: others with their probabilities, the likeliest first; likelier: a place that is
-    likelier than every group of effects, with its probability, NaN without one.
+    Attributes
+    ----------
+    name, title
+        Its name, with the place or instrument that it is limited to, and its title.
+    amplitude, interval95, unit
+        Size with its 95 % interval.
+    probability
+        Of it and of those alike together, among all that was tried [-].
+    alike
+        Effects that leave the same trace in these data.
+    rivals
+        Others with their probabilities, the likeliest first.
+    likelier, likelier_probability
+        A place that is likelier than every group of effects, and its probability [-]; None and NaN without one.
     """
 
     name: str
@@ -226,8 +257,16 @@ class EffectFound:
 
 @dataclass(frozen=True)
 class EffectsTested:
-    """How many effects were tested, as how many candidates (one effect in one experiment, section, device or patch
-    each), and how many of these would be seen at twice a plausible size.
+    """How many effects were tested.
+
+    Attributes
+    ----------
+    effects
+        How many.
+    candidates
+        As how many: one effect in one experiment, section, device or patch each.
+    testable
+        Effects that would be seen at twice a plausible size.
     """
 
     effects: int
@@ -247,9 +286,14 @@ class ErrorsStillLarger:
 
 @dataclass(frozen=True)
 class EffectsStillSignificant:
-    """Effects that are significant and were not accepted, the clearest first, with the family-wise p of each [-].
+    """Effects that are significant and were not accepted.
 
-    remainder: whether they may be a remainder of what was accepted.
+    Attributes
+    ----------
+    effects
+        Names with the family-wise p of each [-], the clearest first.
+    remainder
+        Whether they may be a remainder of what was accepted.
     """
 
     effects: tuple[tuple[str, float], ...]
@@ -289,7 +333,17 @@ class ImplausibleAmplitude:
 
 @dataclass(frozen=True)
 class EstimateAtBound:
-    """A calibrated parameter within PRESSES of an end of its prior, from low to high: the bound decides its value."""
+    """A calibrated parameter within PRESSES of an end of its prior: the bound decides its value.
+
+    Attributes
+    ----------
+    parameter, value, unit
+        Its name and calibrated value.
+    low, high
+        The ends of its prior.
+    lower
+        Whether it is the lower one.
+    """
 
     parameter: str
     value: float
@@ -301,7 +355,17 @@ class EstimateAtBound:
 
 @dataclass(frozen=True)
 class BeyondHandbook:
-    """A calibrated parameter beyond low to high [unit] of a handbook; source: which one, and for what."""
+    """A calibrated parameter beyond what a handbook has.
+
+    Attributes
+    ----------
+    parameter, value, unit
+        Its name and calibrated value.
+    low, high
+        The range of the handbook.
+    source
+        Which handbook, and for what.
+    """
 
     parameter: str
     value: float
@@ -313,8 +377,16 @@ class BeyondHandbook:
 
 @dataclass(frozen=True)
 class InflowDevelops:
-    """An accepted fault of the probes of a section so near the inflow, distance [m] and depths [-] behind it, that the
-    profile over the depth may still develop there; length: over which it does [depths].
+    """An accepted fault of the probes of a section near the inflow, where the profile over the depth may develop.
+
+    Attributes
+    ----------
+    effect
+        The fault.
+    distance, depths
+        Of the section behind the inflow [m], and over the depth [-].
+    length
+        Over which the profile develops [depths].
     """
 
     effect: str
@@ -382,8 +454,16 @@ class StatedErrorsTooSmall:
 
 @dataclass(frozen=True)
 class InstrumentExcluded:
-    """An instrument whose readings are excluded; clear: whether it is off by more than `least`, which chance or the
-    model may make [standard errors].
+    """An instrument whose readings are excluded.
+
+    Attributes
+    ----------
+    instrument
+        Which, and by how much it is off.
+    clear
+        Whether by more than `least`.
+    least
+        What chance or the model may make [standard errors].
     """
 
     instrument: FaultyInstrument
@@ -393,8 +473,16 @@ class InstrumentExcluded:
 
 @dataclass(frozen=True)
 class EffectsUntestable:
-    """Effects that these data cannot show, by the parameter whose change leaves their trace, '' for none; counts of
-    both; also: whether others that are named elsewhere are untestable, too.
+    """Effects that these data cannot show.
+
+    Attributes
+    ----------
+    groups
+        Their names by the parameter whose change leaves their trace, '' for none.
+    effects, candidates
+        How many there are.
+    also
+        Whether others that are named elsewhere are untestable, too.
     """
 
     groups: tuple[tuple[str, tuple[str, ...]], ...]
@@ -412,10 +500,22 @@ class PlacesOnMap:
 
 @dataclass(frozen=True)
 class BedCorrected:
-    """A spot in which flow and survey put the bed higher by `change` than the survey alone, on average, with its 95 %
-    interval [m]: middle x, y with standard errors, half length and half width [m]; log_factor: ln of the Bayes factor
-    against no mean error there, local_log_factor: of a local error beside all that the survey leaves open [-]; between:
-    x of the surveyed lines on both sides [m], NaN beyond the last.
+    """A spot in which flow and survey put the bed elsewhere than the survey alone.
+
+    Attributes
+    ----------
+    x, y, x_error, y_error
+        Middle with its standard errors [m].
+    length, width
+        Half length and half width [m].
+    change, interval95
+        Mean rise of the bed with its 95 % interval [m].
+    log_factor
+        ln of the Bayes factor against no mean error there [-].
+    local_log_factor
+        ln of that of a local error beside all that the survey leaves open [-].
+    between
+        x of the surveyed lines on both sides [m], NaN beyond the last.
     """
 
     x: float
@@ -433,7 +533,17 @@ class BedCorrected:
 
 @dataclass(frozen=True)
 class MeasuredStretch:
-    """Velocities lie between x = low and high in a model of some length [m]; effects: that act along the channel."""
+    """Velocities lie in a stretch of the model only.
+
+    Attributes
+    ----------
+    low, high
+        Least and largest x of them [m].
+    length
+        Of the model [m].
+    effects
+        Of the case, those that act along the channel.
+    """
 
     low: float
     high: float
@@ -457,12 +567,24 @@ class MisfitRemains:
 
 @dataclass(frozen=True)
 class CommandCompared:
-    """How the linear model of a command of `engine` was made and how far it is from the command.
+    """How the linear model of a command of `engine` was made, and how far it is from the command.
 
-    repeated: how often its differences were taken; parameters: how many; errors: root mean square difference at the
-    last parameters [standard errors], NaN when unknown; failure: why the command gave nothing, '' when it did; rough:
-    parameters whose differences are mostly noise; settled: whether the search for the best place settled; careful:
-    whether sizes and chances have to be taken with care.
+    Attributes
+    ----------
+    repeated
+        How often its differences were taken.
+    parameters
+        How many there are.
+    errors
+        Root mean square difference at the last parameters [standard errors], NaN when unknown.
+    failure
+        Why the command gave nothing, '' when it did.
+    rough
+        Parameters whose differences are mostly noise.
+    settled
+        Whether the search for the best place settled.
+    careful
+        Whether sizes and chances have to be taken with care.
     """
 
     repeated: int
@@ -476,16 +598,28 @@ class CommandCompared:
 
 @dataclass(frozen=True)
 class ResultCompared:
-    """The flow of a finished run of another model beside the built-in engine's with the same parameters, over all wet
-    cells.
+    """The flow of a finished run of another model beside that of the built-in engine, parameters alike, over wet cells.
 
-    code: the program; velocity_share: rms difference of the velocity vector over its mean size [-]; level_share: that
-    of the level over the mean depth [-]; area_share: cells that are wet in one flow only, over those wet in theirs [-];
-    velocity, level: the rms differences [m/s, m]; beyond_mesh: cells wet in ours where they have no mesh, over those
-    wet in theirs [-]; discharge_spread: standard deviation of their discharge along the channel over its mean [-];
-    measured: rms difference of theirs, as it is, from the measured velocities [m/s], NaN without any; alike: whether
-    all shares are within their limits, so that a diagnosis may use slopes of the built-in engine; limits: of the three
-    shares [-].
+    Attributes
+    ----------
+    code
+        The program.
+    velocity_share, level_share
+        Root mean square difference of the velocity vector over its mean size, and of the level over the mean depth [-].
+    area_share
+        Cells that are wet in one flow only, over those wet in theirs [-].
+    velocity, level
+        The root mean square differences [m/s, m].
+    beyond_mesh
+        Cells wet in ours where they have no mesh, over those wet in theirs [-].
+    discharge_spread
+        Standard deviation of their discharge along the channel over its mean [-].
+    measured
+        Root mean square difference of theirs, as it is, from the measured velocities [m/s], NaN without any.
+    alike
+        Whether all shares are within their limits, so that a diagnosis may use slopes of the built-in engine.
+    limits
+        Of the three shares [-].
     """
 
     code: str
@@ -553,7 +687,7 @@ Conclusion = Literal[
 class Verdict:
     """The verdict: its kind, what was found, and why no more is known.
 
-    Parameters
+    Attributes
     ----------
     kind
         One of the six kinds.
