@@ -6,6 +6,7 @@ import pytest
 from reach import ROOT
 
 from vegglue.case import size_limits
+from vegglue.case.schema import Case
 from vegglue.case.site_schema import COEFFICIENT_OF, FrictionClass, VegetationType
 from vegglue.case.size_limits import factor_bytes
 from vegglue.effects.bed_laws import BED_LAWS
@@ -35,6 +36,12 @@ def test_sparse_factors_take_what_is_said(nx: int, ny: int) -> None:
     parts = dissection(nx, ny)
     held = 4.0 * parts.memory_start[:, -1].sum()
     assert 0.8 < held / factor_bytes(nx, ny) < 1.05
+
+
+def test_help_of_a_case_has_its_keys_with_their_units() -> None:
+    assert "Attributes\n----------\nsource\n    file the case was read from\nname\n" in str(Case.__doc__)
+    assert "eddy_viscosity\n    [m2/s]\n" in str(Case.__doc__)
+    assert str(FrictionClass.__doc__).startswith("C of a bed [m^1/2/s]: h^(1/6) / n")
 
 
 def test_a_config_knows_the_laws_there_are() -> None:

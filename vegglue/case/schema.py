@@ -126,6 +126,8 @@ def unusable(distribution: str, numbers: Mapping[str, float | None]) -> str | No
 
 
 class Experiment(Part):
+    """A steady flow, and what differs in it from the others."""
+
     discharge: dict[str, Value] = Field(description="one value, or one for each inflow [m3/s]")
     level: Value = Field(description="water level at the outlet, in the datum of the bed [m]")
     plants: bool | tuple[str, ...] = Field(default=True, description="true, false, or the names of the patches present")
@@ -136,6 +138,12 @@ class Experiment(Part):
 
 
 class Parameter(Part):
+    """p(theta): the prior of an unknown, truncated to low <= theta <= high [unit].
+
+    uniform: constant; loguniform: 1/theta; normal: exp(-(theta - mean)^2 / (2 sd^2)); lognormal: the same of ln theta
+    around ln median, with log_sd; all up to a constant.
+    """
+
     distribution: Literal["uniform", "loguniform", "normal", "lognormal"] = Field(description="kind of prior")
     low: Number | None = Field(default=None, description="lower bound")
     high: Number | None = Field(default=None, description="upper bound")
@@ -174,11 +182,15 @@ class EffectEntry(Part):
 
 
 class Offset(Part):
+    """Where the origin of a file lies in the model."""
+
     x: Number = Field(default=0.0, description="added to x of the file [m]")
     y: Number = Field(default=0.0, description="added to y of the file [m]")
 
 
 class Observation(Part):
+    """Measurements of one kind in one file."""
+
     kind: str = Field(description="what was measured, e.g. velocity or level; adv: points in the vertical")
     file: Path = Field(description="CSV file")
     experiment: str | None = Field(default=None, description="experiment of all rows, if the file has no such column")
@@ -223,6 +235,8 @@ class ImportedFile(Part):
 
 
 class Survey(Part):
+    """A survey of the plants, from which phi is known before any flow is measured."""
+
     file: Path = Field(description="CSV of the plant survey: quantity,mean,standard_deviation,samples [SI]")
     debris: bool = Field(default=False, description="true: stem diameters with the debris that hangs in them")
     spread: Literal["plants", "mean"] = Field(default="plants", description="one plant for all, or their mean")
@@ -233,6 +247,8 @@ class Survey(Part):
 
 
 class Numerics(Part):
+    """Choices of the solver."""
+
     film_depth: Positive = Field(default=0.01, description="depth at the waterline, a tenth of it on dry land [m]")
     bank_argument_minimum: Annotated[Number, Field(gt=1)] = Field(default=1.3, description="floor of 12 h/k_s [-]")
     emergent: Literal["constant", "proportional"] = Field(
@@ -254,10 +270,14 @@ class Numerics(Part):
 
 
 class KeptFields(Part):
+    """The stretch of which the fields of all members are kept."""
+
     x: Interval = Field(description="range along x, over the whole width of the grid [m]")
 
 
 class Simulate(Part):
+    """The ensemble: how many members are drawn from the priors, and what of them is kept."""
+
     members: Annotated[int, Field(strict=True, gt=0, le=MOST_MEMBERS)] = Field(
         default=4096, description="size of the ensemble"
     )
@@ -269,6 +289,8 @@ class Simulate(Part):
 
 
 class Infer(Part):
+    """How the posterior is found, and how measurements weigh in it."""
+
     method: Literal["refine", "surrogate", "glue"] = Field(
         default="refine", description="draws around the best members, the same of a surrogate of `engine`, or members"
     )
@@ -300,12 +322,16 @@ class Validation(Part):
 
 
 class Reference(Part):
+    """Values of others for the same site."""
+
     source: str = Field(default="", description="origin of these values")
     table: dict[str, Number | tuple[Number, Number]] = Field(default_factory=dict, description="[median, sd] or number")
     made_with: dict[str, Number] = Field(default_factory=dict, description="what a synthetic record was made from")
 
 
 class CanopyCorrection(Part):
+    """phi of a stand for another height of the canopy, with C kept at one depth."""
+
     stand: str = Field(description="stand whose phi is corrected")
     from_height: Positive = Field(description="canopy height the ensemble was made with [m]")
     to_height: Positive = Field(description="canopy height to correct for [m]")
@@ -313,6 +339,8 @@ class CanopyCorrection(Part):
 
 
 class PlannedTransect(Part):
+    """Verticals along a line across the channel."""
+
     x: Number = Field(description="where it crosses the channel [m]")
     spacing: Positive = Field(description="distance between its verticals [m]")
     y: Interval | None = Field(default=None, description="from where to where; all of the water when left out [m]")
@@ -320,18 +348,24 @@ class PlannedTransect(Part):
 
 
 class PlannedPoint(Part):
+    """A single vertical."""
+
     x: Number = Field(description="of a vertical, such as one among plants [m]")
     y: Number = Field(description="[m]")
     experiments: tuple[str, ...] | None = Field(default=None, description="in which; in all when left out")
 
 
 class PlannedGauge(Part):
+    """A water level."""
+
     x: Number = Field(description="[m]")
     y: Number | None = Field(default=None, description="in the middle of the channel when left out [m]")
     experiments: tuple[str, ...] | None = Field(default=None, description="in which; in all when left out")
 
 
 class PlannedDischarge(Part):
+    """A gauging of a cross-section."""
+
     x: Number = Field(description="of the cross-section that is gauged [m]")
     experiments: tuple[str, ...] | None = Field(default=None, description="in which; in all when left out")
 

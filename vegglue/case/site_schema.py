@@ -2,6 +2,7 @@
 and what all parts of a case are made of: numbers, ranges, polygons, and values that may be parameters.
 """
 
+import inspect
 import math
 import re
 from collections.abc import Mapping
@@ -37,9 +38,15 @@ Value = Annotated[Number | str, BeforeValidator(_number_or_name)]
 
 
 class Part(BaseModel):
-    """What all parts of a case share: they are values, and know all their keys."""
+    """What all parts of a case share: they are values, know all their keys, and describe them in their docstring."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_keywords: Any) -> None:
+        """Add what the keys mean to the docstring, as numpydoc has the attributes of a class."""
+        keys = [f"{name}\n    {key.description}" for name, key in cls.model_fields.items() if key.description]
+        cls.__doc__ = "\n".join([inspect.cleandoc(cls.__doc__ or ""), "", "Attributes", "----------", *keys])
 
 
 def exactly(part: Part, chosen: str, wanted: Mapping[str, tuple[str, ...]], allowed: tuple[str, ...] = ()) -> None:
@@ -111,6 +118,8 @@ NEAREST_POINTS = 1e-3
 
 
 class Stretch(Part):
+    """A straight part of a centreline, or an arc."""
+
     length: _Run | None = Field(default=None, description="length of a straight part [m]")
     radius: _Run | None = Field(default=None, description="radius of an arc [m]")
     angle: _Turn | None = Field(default=None, description="turn of an arc, positive to the left [degrees]")
@@ -134,6 +143,8 @@ STRETCHES = {"a straight part": ("length",), "an arc": ("radius", "angle")}
 
 
 class CentrelineShape(Part):
+    """The line that x runs along: points on the map, or parts one after the other."""
+
     points: Annotated[tuple[tuple[_OnMap, _OnMap], ...], Field(min_length=2)] | None = Field(
         default=None, description="x, y on the map, upstream first, a smooth curve passes through them [m]"
     )
@@ -153,6 +164,8 @@ class CentrelineShape(Part):
 
 
 class GridExtent(Part):
+    """The regular grid of the model: nx ny cells of dx by dy."""
+
     x: Interval = Field(description="from upstream to downstream [m]")
     y: Interval = Field(description="across [m]")
     cell: tuple[Positive, Positive] = Field(description="size of a cell along x and y [m]")
@@ -175,6 +188,8 @@ class GridExtent(Part):
 
 
 class Trapezoid(Part):
+    """A channel by its numbers: z = level - bed_slope (x - x_0) on the floor, rising by bank_slope beside it."""
+
     axis: Number = Field(description="y of the channel axis [m]")
     bottom_width: Positive = Field(description="width of the floor [m]")
     top_width: Positive | None = Field(default=None, description="width between the tops of the banks, flat beyond [m]")
@@ -190,6 +205,8 @@ class Trapezoid(Part):
 
 
 class CovarianceOfBed(Part):
+    """How far the bed may lie from its mean cross-section, and over which lengths."""
+
     chance: Annotated[Number, Field(gt=0, le=1)] = Field(description="chance of it among all [-]")
     rough: bool = Field(default=False, description="whether the bed is rough along, not smooth")
     along: Positive = Field(description="length along [m]")
@@ -199,6 +216,8 @@ class CovarianceOfBed(Part):
 
 
 class LinesLeftOut(Part):
+    """How well lines of a survey are predicted from all others."""
+
     count: Annotated[int, Field(strict=True, gt=0)] = Field(description="how many lines, or points in no line")
     error: Positive = Field(description="root mean square error of their prediction from all others [m]")
     stated: Positive = Field(description="the same as the covariance states it [m]")
@@ -211,6 +230,8 @@ class LinesLeftOut(Part):
 
 
 class SurveyOfBed(Part):
+    """The survey that the levels of a layer come from."""
+
     file: Path = Field(description="CSV of surveyed points x,y,z,line in the frame of the grid [m]; line -1 for none")
     covariances: Annotated[tuple[CovarianceOfBed, ...], Field(min_length=1)] = Field(
         description="of the bed around its mean cross-section, see case/survey_error.py"
@@ -225,6 +246,8 @@ class SurveyOfBed(Part):
 
 
 class BedLayer(Part):
+    """Levels of the bed from one source."""
+
     trapezoid: Trapezoid | None = Field(default=None, description="channel from design numbers")
     raster: Path | None = Field(default=None, description="ESRI ASCII grid of bed levels [m]")
     points: Path | None = Field(default=None, description="CSV of surveyed points x,y,z [m]")
@@ -246,6 +269,8 @@ COEFFICIENT_OF = {"manning": "n", "keulegan": "k_s", "chezy": "c"}
 
 
 class FrictionClass(Part):
+    """C of a bed [m^1/2/s]: h^(1/6) / n, 18 log10(12 h / k_s), or a value."""
+
     law: Literal["manning", "keulegan", "chezy"] = Field(description="C = h^(1/6)/n, 18 log10(12 h/k_s), or given")
     n: Value | None = Field(default=None, description="Manning coefficient [s m^-1/3]")
     k_s: Value | None = Field(default=None, description="Nikuradse roughness height [m]")
@@ -264,6 +289,8 @@ class FrictionClass(Part):
 
 
 class Zone(Part):
+    """Where a friction class holds, by one rule."""
+
     friction_class: str | None = Field(default=None, alias="class", description="friction class of the zone")
     steeper_than: Positive | None = Field(default=None, description="cells where |grad z_b| is above this [-]")
     beyond_slope_break: Positive | None = Field(
@@ -286,6 +313,8 @@ class Zone(Part):
 
 
 class Friction(Part):
+    """Resistance of the bed and of walls."""
+
     classes: dict[str, FrictionClass] = Field(min_length=1, description="resistance laws by name")
     default: str = Field(description="friction class where no zone applies")
     zones: tuple[Zone, ...] = Field(default=(), description="rules in order, later ones win")
@@ -297,6 +326,8 @@ class Friction(Part):
 
 
 class VegetationType(Part):
+    """Plants of one kind."""
+
     phi: Value = Field(description="plant drag C_d m D h_d at `stems` [-]")
     canopy_height: Value = Field(description="height h_d of the deflected canopy [m]")
     bare_chezy: Value = Field(default=60.0, description="Chézy coefficient C_b of the bed under the plants [m^1/2/s]")
@@ -307,12 +338,16 @@ class VegetationType(Part):
 
 
 class VegetationOverride(Part):
+    """What differs of plants in one experiment."""
+
     phi: Value | None = Field(default=None, description="plant drag in this experiment [-]")
     canopy_height: Value | None = Field(default=None, description="canopy height in this experiment [m]")
     bare_chezy: Value | None = Field(default=None, description="Chézy coefficient under the plants [m^1/2/s]")
 
 
 class Patch(Part):
+    """Where plants of one kind stand."""
+
     name: str = Field(description="name of the patch")
     stand: str = Field(description="stand growing in it")
     stems: Positive = Field(default=1.0, description="density of the patch [1/m2]")
@@ -328,11 +363,15 @@ class Patch(Part):
 
 
 class Plants(Part):
+    """All plants of the site."""
+
     stands: dict[str, VegetationType] = Field(default_factory=dict, description="kinds of plants by name")
     patches: tuple[Patch, ...] = Field(default=(), description="where they stand, later ones win")
 
 
 class Inflow(Part):
+    """Where water enters."""
+
     side: Literal["west", "south", "north"] = Field(description="side of the grid the water enters by")
     range: Interval | None = Field(default=None, description="part of that side, all of it when left out [m]")
     spread: Literal["conveyance", "uniform"] = Field(default="conveyance", description="by h^(5/3), or evenly")
@@ -348,4 +387,6 @@ class Inflow(Part):
 
 
 class Outlet(Part):
+    """Where water leaves: at the east side."""
+
     range: Interval | None = Field(default=None, description="part of the east side in y, all of it when left out [m]")
