@@ -52,13 +52,24 @@ from vegglue.wording.sentences import file_text, phrase, sentence
 
 @dataclass(frozen=True)
 class LawFound:
-    """A law with its reference r, its strength a and the 95 % interval of it [-].
+    """A law, term -> term exp(a g(quantity)), that the data know.
 
-    chance: that its term changes with its quantity, in whatever form; the law is the form that explains most.
-
-    scale: a plausible strength; same_as: the listed effect that it restates, or empty; seen: from where to where the
-    data have seen its quantity; alike: listed effects and laws that leave the same trace at the stations; first: the
-    reference of the law that a product multiplies, where that has one.
+    Attributes
+    ----------
+    law, same_as
+        The law, and the listed effect that it restates, '' for none.
+    reference, first
+        r of its quantity, and of that of the law that a product multiplies, where they have one.
+    scale, strength, interval95
+        A plausible a, and the calibrated one with its 95 % interval [-].
+    chance
+        That its term changes with its quantity, in whatever form [-]; the law is the form that explains most.
+    log_evidence
+        ln evidence [-].
+    seen
+        From where to where the data have seen its quantity.
+    alike
+        Listed effects and laws that leave the same trace at the stations.
     """
 
     law: Law
@@ -108,8 +119,14 @@ class LawFound:
 
 @dataclass(frozen=True)
 class ProductFound:
-    """found: a product of the best law with another quantity, reported as any law; refit: of it, beside that law, whose
-    a is then strength_of_law [-]. found.chance: that it is what is left, among all else that could be.
+    """A product of the best law with another quantity.
+
+    Attributes
+    ----------
+    found
+        The product, reported as any law; its chance is that it is what is left, among all else that could be.
+    refit, strength_of_law
+        Of it, beside the law whose a is then strength_of_law [-].
     """
 
     found: LawFound
@@ -125,12 +142,21 @@ class ProductFound:
 
 @dataclass(frozen=True)
 class Discovery:
-    """p: chance that errors alone make laws stand out as much; tried: the number of laws that had something to act on.
+    """What a search among all laws found.
 
-    laws, others: the laws, best first, and the names of other causes with their chances, that hold 95 % together; none
-    where nothing is found. compared: ln evidence of all that was calibrated, by name [-];
-    likeliest: the likeliest of these, where it is in the model and not in the data; product: of the best law with
-    another quantity, where that law leaves a misfit.
+    Attributes
+    ----------
+    p, tried
+        Chance that errors alone make laws stand out as much [-], and the number of laws that had something to act on.
+    laws, others
+        The laws, best first, and the names of other causes with their chances, that hold 95 % together; none where nothing
+        is found.
+    compared
+        ln evidence of all that was calibrated, by name [-].
+    likeliest
+        The likeliest of these, where it is in the model and not in the data.
+    product
+        Of the best law with another quantity, where that law leaves a misfit.
     """
 
     p: float
