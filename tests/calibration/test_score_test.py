@@ -131,23 +131,14 @@ def smooth_fingerprints() -> tuple[Array, Array, np.ndarray]:
     random = np.random.default_rng(5)
     place, centres = np.linspace(0.0, 1.0, ROWS), np.linspace(0.0, 1.0, SMOOTH_PRINTS)
     prints = np.exp(-(((place[:, None] - centres) / 0.03) ** 2)) + 0.1 * random.standard_normal((ROWS, SMOOTH_PRINTS))
-    return (
-        3.0 * random.standard_normal((ROWS, SLOPES)),
-        prints,
-        np.arange(SMOOTH_PRINTS) % 3 == 0,
-    )
+    return 3.0 * random.standard_normal((ROWS, SLOPES)), prints, np.arange(SMOOTH_PRINTS) % 3 == 0
 
 
 @pytest.fixture(scope="module")
 def family() -> Family:
     slopes, prints, only_sign = smooth_fingerprints()
     errors = np.random.default_rng(11).standard_normal((score_test.NULL_DRAWS, ROWS))
-    return family_of(
-        score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints),
-        only_sign,
-        errors,
-        3,
-    )
+    return family_of(score_test.project(slopes, np.zeros(ROWS), np.zeros(SLOPES), prints), only_sign, errors, 3)
 
 
 @pytest.fixture(scope="module")

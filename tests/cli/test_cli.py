@@ -163,8 +163,7 @@ def test_a_mistake_in_the_config_is_one_sentence(
 
 
 @pytest.mark.parametrize(
-    ("step", "expected"),
-    [("infer --method glue", "run `vegglue simulate {}`"), ("report", "run `vegglue infer {}`")],
+    ("step", "expected"), [("infer --method glue", "run `vegglue simulate {}`"), ("report", "run `vegglue infer {}`")]
 )
 def test_a_step_out_of_turn_names_the_one_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], step: str, expected: str

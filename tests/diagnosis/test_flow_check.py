@@ -94,10 +94,7 @@ def test_a_steep_channel_is_supercritical(tmp_path, changes, steep):
 
 @pytest.mark.parametrize(
     ("law", "chezy"),
-    [
-        ("{law: chezy, c: 30}", 30.0),
-        ("{law: manning, n: 0.05}", (2.0 / 3 * 0.05 / 0.05**0.5) ** (3 / 5 / 6) / 0.05),
-    ],
+    [("{law: chezy, c: 30}", 30.0), ("{law: manning, n: 0.05}", (2.0 / 3 * 0.05 / 0.05**0.5) ** (3 / 5 / 6) / 0.05)],
 )
 def test_the_froude_number_is_that_of_even_flow(tmp_path, law, chezy):
     """A floor 3 m wide, 2 m3/s: h = (n q / S^(1/2))^(3/5) for Manning's law."""

@@ -32,8 +32,7 @@ def suspected(
     laws = [SimpleNamespace(law=LAWS[name], candidate=SimpleNamespace(amplitude=LAWS[name].effect.amplitude))
             for name in NAMES]  # fmt: skip
     prints = SimpleNamespace(
-        candidates=[SimpleNamespace(name="wind"), SimpleNamespace(name="waves")],
-        columns=[np.array([0]), np.array([1])],
+        candidates=[SimpleNamespace(name="wind"), SimpleNamespace(name="waves")], columns=[np.array([0]), np.array([1])]
     )
     cosine = np.eye(5)
     cosine[1, 2:] = 0.95  # every law looks like waves

@@ -442,8 +442,7 @@ def test_with_significant_laws_the_verdict_is_never_nothing_missing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("steps", "parts"),
-    [((), {"places": (an_anomaly(),)}), ((), {"undecided": UNSURE, "strained": ("k_s", 4.5)})],
+    ("steps", "parts"), [((), {"places": (an_anomaly(),)}), ((), {"undecided": UNSURE, "strained": ("k_s", 4.5)})]
 )
 def test_a_law_beside_what_was_found_is_a_note(steps: tuple[Step, ...], parts: dict[str, Any]) -> None:
     found = verdict_on(*steps, laws=LIKELY, **parts)

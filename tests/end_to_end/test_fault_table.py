@@ -50,11 +50,7 @@ def words(command: str) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS, ids=[f"{one.command}: {one.what}" for one in FAULTS])
 def test_a_fault_has_its_code_and_loses_nothing(
-    fault: Fault,
-    undisturbed: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    fault: Fault, undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_reach(tmp_path, *CHANGES)

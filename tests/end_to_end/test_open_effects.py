@@ -10,11 +10,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize(
     ("name", "hidden", "true"),
-    [
-        ("open-c", "streamlining", -0.9),
-        ("open-d", "discharge_error[high]", 0.09),
-        ("open-e", "mixing_length", 0.5),
-    ],
+    [("open-c", "streamlining", -0.9), ("open-d", "discharge_error[high]", 0.09), ("open-e", "mixing_length", 0.5)],
 )
 def test_what_is_hidden_is_found_and_added(name: str, hidden: str, true: float, campaigns: Path) -> None:
     """And open-b, on which the tutorial runs: `test_documents`."""

@@ -26,10 +26,7 @@ TREE = {
     "grid": {"x": (0.0, 6.0), "y": (0.0, 0.9), "cell": (0.25, 0.075)},
     "bed": [{"trapezoid": {"axis": 0.45, "bottom_width": 2.0, "bank_slope": 1.0, "bed_slope": 0.002, "level": 0.0}}],
     "friction": BED,
-    "inflows": {
-        "main": {"side": "west"},
-        "side": {"side": "south", "range": (2.0, 2.5), "spread": "uniform"},
-    },
+    "inflows": {"main": {"side": "west"}, "side": {"side": "south", "range": (2.0, 2.5), "spread": "uniform"}},
     "experiments": {"one": {"discharge": {"main": 0.04, "side": 0.004}, "level": 0.1}},
     "eddy_viscosity": 0.002,
     "numerics": {"film_depth": 0.002},

@@ -14,15 +14,7 @@ from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.effects.library import library
-from vegglue.engine.interface import (
-    Model,
-    Point,
-    flow_at_centres,
-    linearise,
-    predict,
-    responses,
-    responses_to_cells,
-)
+from vegglue.engine.interface import Model, Point, flow_at_centres, linearise, predict, responses, responses_to_cells
 from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.local_changes import TERMS, Term

@@ -132,10 +132,7 @@ def test_a_channel_wider_than_long_has_cells(tmp_path: Path) -> None:
 
 def test_what_is_not_stated_is_assumed_and_listed(tmp_path: Path) -> None:
     folder = field_folder(
-        tmp_path / "site",
-        weather="fine",
-        experiments=put(SITE["experiments"], ("low", "plants"), False),
-        holdout={},
+        tmp_path / "site", weather="fine", experiments=put(SITE["experiments"], ("low", "plants"), False), holdout={}
     )
     assert assumptions_of_site(folder, read_site(folder / "site.json")) == [
         SiteAssumptions("site.json", viscosity=2.0, canopy=None, alike=False, bare=False),
@@ -189,11 +186,7 @@ def test_a_second_file_of_what_is_held_out_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("key", "said"),
-    [
-        ("stem_diameter_mm", "diameter [1/m]"),
-        ("number_of_stems", "area of the patch"),
-        ("species", None),
-    ],
+    [("stem_diameter_mm", "diameter [1/m]"), ("number_of_stems", "area of the patch"), ("species", None)],
 )
 def test_what_has_no_key_is_told_with_what_to_write_instead(tmp_path: Path, key: str, said: str | None) -> None:
     """A diameter was taken as a note, and where else it belongs was not told."""

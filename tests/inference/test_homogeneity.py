@@ -16,13 +16,7 @@ from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
-from vegglue.inference.homogeneity import (
-    chance_of_as_much,
-    equal_values_test,
-    one_experiment,
-    transfer,
-    without_prior,
-)
+from vegglue.inference.homogeneity import chance_of_as_much, equal_values_test, one_experiment, transfer, without_prior
 from vegglue.inference.statements import (
     CalibrationDiffers,
     ErrorsOfComparison,

@@ -88,10 +88,7 @@ def two_experiments(folder: Path) -> tuple[Case, Observations]:
     ((name, one),) = case.experiments.items()
     more = one.model_copy(update={"level": one.level + 0.05})
     case = case.model_copy(
-        update={
-            "experiments": {name: one, "more": more},
-            "simulate": case.simulate.model_copy(update={"members": 16}),
-        }
+        update={"experiments": {name: one, "more": more}, "simulate": case.simulate.model_copy(update={"members": 16})}
     )
     alone = read_observations(case)
     both = replace(alone, table=pd.concat([alone.table, alone.table.assign(experiment="more")], ignore_index=True))

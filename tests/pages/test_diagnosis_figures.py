@@ -35,14 +35,7 @@ from vegglue.pages.ladder_figure import LINES, draw_errors, draw_ladder, save_la
 from vegglue.pages.style import COLOUR
 from vegglue.results.causes import Step
 from vegglue.results.diagnosis import Diagnosis, Predictions
-from vegglue.results.loop_results import (
-    ComparedModel,
-    HeldOut,
-    InSample,
-    ModelComparison,
-    ModelScore,
-    PredictiveScores,
-)
+from vegglue.results.loop_results import ComparedModel, HeldOut, InSample, ModelComparison, ModelScore, PredictiveScores
 from vegglue.wording.sentences import phrase, sentence
 
 pytestmark = pytest.mark.slow

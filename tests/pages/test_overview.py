@@ -67,10 +67,7 @@ def test_a_first_estimate_has_no_range(runs: list[Run], tmp_path: Path) -> None:
 
 
 def test_intervals_share_one_axis_and_their_ends_lie_on_it() -> None:
-    rows = {
-        "ours": DrawnInterval(1.0, 10.0, 100.0),
-        "theirs": DrawnInterval(30.0, 30.0, 30.0, others=True),
-    }
+    rows = {"ours": DrawnInterval(1.0, 10.0, 100.0), "theirs": DrawnInterval(30.0, 30.0, 30.0, others=True)}
     drawn = draw_interval_rows(rows, True, "k")
     assert drawn.count("<circle") == 1
     # 1 to 100 on a logarithmic axis: the dot lies in the middle of its bar.

@@ -72,13 +72,7 @@ def test_every_figure_is_labelled_captioned_and_on_file(d3a: tuple[Run, str]) ->
     assert page.tags.count("svg") == page.tags.count("figcaption") == figures
     assert len(list((run.folder / "figures").iterdir())) == figures
     expected = {"section-D3a-D3", "posterior-phi", "joint-n_b-k_s", "plant-drag", "reach-D3a", "channel-D3a"}
-    expected |= {
-        "verticals-D3a-D3",
-        "canopy-D3a-D3",
-        "residuals-velocity",
-        "quantiles-velocity",
-        "weights",
-    }
+    expected |= {"verticals-D3a-D3", "canopy-D3a-D3", "residuals-velocity", "quantiles-velocity", "weights"}
     assert expected <= set(page.ids)
 
 

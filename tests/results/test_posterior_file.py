@@ -11,12 +11,7 @@ from stored import HASH, no_space
 
 from vegglue.errors import InputError, StorageError
 from vegglue.results.layout import stored_fields
-from vegglue.results.posterior import (
-    CorrectedCanopy,
-    Posterior,
-    Refinement,
-    Transfer,
-)
+from vegglue.results.posterior import CorrectedCanopy, Posterior, Refinement, Transfer
 from vegglue.results.result_files import read_posterior, stored_hash, write_posterior
 
 

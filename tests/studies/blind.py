@@ -20,18 +20,7 @@ from typing import Any
 import numpy as np
 from blind_held_out import held_out
 from blind_page import write_page
-from blind_sets import (
-    EDITION,
-    INSTRUMENTS,
-    NULL_NOISE,
-    OBJECTS,
-    PAIRS,
-    DataSet,
-    Trial,
-    as_measured,
-    model_of,
-    told,
-)
+from blind_sets import EDITION, INSTRUMENTS, NULL_NOISE, OBJECTS, PAIRS, DataSet, Trial, as_measured, model_of, told
 
 from vegglue.calibration.candidates import candidates_of
 from vegglue.case.text_files import write_text

@@ -72,10 +72,7 @@ def wanted_of(line: Line) -> str:
 def _table(records: Sequence[Record], told: Sequence[Told]) -> str:
     """Every line that has data, the field campaign beside all."""
     campaign = [one for one in records if one["case"] == "campaign"]
-    rows = [
-        "| | target | data sets | share (95 % interval) | field campaign only |",
-        "|---|---|---:|---:|---:|",
-    ]
+    rows = ["| | target | data sets | share (95 % interval) | field campaign only |", "|---|---|---:|---:|---:|"]
     for line in LINES:
         good, size = counts(records, line)
         if not size:

@@ -52,10 +52,7 @@ class AlarmsDrawn:
                 f"alarm of laws, at {constants().law_alarm_rate:.0%}",
                 int(np.sum(self.laws < constants().law_alarm_rate)),
             ),
-            (
-                "alarm of laws where nothing listed sounds one",
-                int(np.sum(silent & (self.laws < rate))),
-            ),
+            ("alarm of laws where nothing listed sounds one", int(np.sum(silent & (self.laws < rate)))),
         ]
 
 

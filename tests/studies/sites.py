@@ -14,18 +14,7 @@ from typing import Any
 import numpy as np
 from second_channel import PAPER
 from second_solver import Flow
-from site_reach import (
-    BED_ERROR,
-    BED_LENGTHS,
-    EDDY_VISCOSITY,
-    FINE,
-    SETTINGS,
-    Truth,
-    at,
-    centres,
-    reach_of,
-    steady_flow,
-)
+from site_reach import BED_ERROR, BED_LENGTHS, EDDY_VISCOSITY, FINE, SETTINGS, Truth, at, centres, reach_of, steady_flow
 
 EXPERIMENTS = {"low": (1.4, 0.75), "mid": (2.66, 1.0), "high": (4.0, 1.25)}
 HOLDOUT = {"hold": (3.3, 1.12)}

@@ -29,10 +29,7 @@ STATED = {"n_b": 0.03, "k_s": 0.5, "phi": 2.0, "canopy_height": 0.7, "eddy_visco
 # the strength was 0.0168 (0.0143 to 0.0194) with HEC-RAS and 0.0164 (0.0128 to 0.0200) with TELEMAC: the same solver
 # has less of the effect there.
 CELLS = (0.5, 0.1875)
-WRITERS = {
-    "HEC-RAS": (write_hec_ras, "p01.hdf", {}),
-    "TELEMAC": (write_selafin, "slf", {"law": "manning"}),
-}
+WRITERS = {"HEC-RAS": (write_hec_ras, "p01.hdf", {}), "TELEMAC": (write_selafin, "slf", {"law": "manning"})}
 ORIGIN, ANGLE = (683000.0, 247000.0), 30.0
 
 

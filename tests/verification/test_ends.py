@@ -39,10 +39,7 @@ def errors(cells, rises):
     state = solved(problem)[..., 0]
     face = x + 0.5 * size
     velocity = FLUX / (level(face, rises) - bed(face, rises))
-    return (
-        np.abs(state[:, LEVEL] - level(x, rises)[:, None]).max(),
-        np.abs(state[:, ALONG] - velocity[:, None]).max(),
-    )
+    return (np.abs(state[:, LEVEL] - level(x, rises)[:, None]).max(), np.abs(state[:, ALONG] - velocity[:, None]).max())
 
 
 @pytest.mark.parametrize("rises", [True, False])

@@ -339,10 +339,7 @@ def _agree_on_effects(case: Case) -> None:
             elif not isinstance(value, str) and not low <= value <= high:
                 raise CaseError(at, f"expected a number from {low:g} to {high:g} {unit}, got {value:g}")
         if effect.amplitude.name not in entry.values:
-            raise CaseError(
-                (*place, "values"),
-                f"lacks `{effect.amplitude.name}`, without which {name} is off: add it",
-            )
+            raise CaseError((*place, "values"), f"lacks `{effect.amplitude.name}`, without which {name} is off: add it")
         if effect.stage != "sensor" and (entry.sections or entry.devices):
             raise CaseError(place, f"names sections or devices, but {name} acts on the flow: use `experiments`")
 
@@ -365,13 +362,11 @@ def _agree_on_values(case: Case) -> None:
     for name in case.parameters:
         if name in DIMENSIONS:
             raise CaseError(
-                ("parameters", name),
-                f"has one of the names {', '.join(DIMENSIONS)}, kept for results: rename it",
+                ("parameters", name), f"has one of the names {', '.join(DIMENSIONS)}, kept for results: rename it"
             )
         if name not in used and case.engine is None:  # a command may know what the built-in solver does not
             raise CaseError(
-                ("parameters", name),
-                "is declared but used nowhere: name it where its value belongs, or remove it",
+                ("parameters", name), "is declared but used nowhere: name it where its value belongs, or remove it"
             )
     ranges: list[tuple[KeyPath, Interval | None, Interval]] = [
         (("inflows", name, "range"), inflow.range, case.grid.y if inflow.side == "west" else case.grid.x)
@@ -391,10 +386,7 @@ def _agree_on_values(case: Case) -> None:
                 if not low <= value <= high:
                     raise CaseError((*at, axis), f"expected a place within {low:g} to {high:g} m, got {value:g}")
     if case.infer.behavioural is not None and case.infer.likelihood == "gaussian":
-        raise CaseError(
-            ("infer", "behavioural"),
-            "goes with an informal likelihood, not with gaussian: remove it",
-        )
+        raise CaseError(("infer", "behavioural"), "goes with an informal likelihood, not with gaussian: remove it")
     if (result := case.finished_result) is not None:
         known = {*case.experiments, *(case.validation.experiments if case.validation is not None else ())}
         for name in sorted(known - result.files.keys()):

@@ -91,10 +91,7 @@ def simulate_command(
 
 def infer_command(
     config: Config,
-    method: Annotated[
-        Literal["refine", "surrogate", "glue"] | None,
-        typer.Option(help=HELP["infer.method"]),
-    ] = None,
+    method: Annotated[Literal["refine", "surrogate", "glue"] | None, typer.Option(help=HELP["infer.method"])] = None,
     members: Members = None,
     jobs: Jobs = -1,
     cluster: Cluster = None,

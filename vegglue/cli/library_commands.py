@@ -142,10 +142,7 @@ def effect_json(effect: "Effect") -> dict[str, object]:
 def twin_command(
     config: Annotated[Path, typer.Argument(metavar="CONFIG", help=HELP["twin.config"], show_default=False)],
     to: Annotated[Path, typer.Option(metavar="FOLDER", help=HELP["twin.to"], show_default=False)],
-    hide: Annotated[
-        list[str] | None,
-        typer.Option(metavar="EFFECT", help=HELP["twin.hide"]),
-    ] = None,
+    hide: Annotated[list[str] | None, typer.Option(metavar="EFFECT", help=HELP["twin.hide"])] = None,
     snr: Annotated[float, typer.Option(min=0.1, metavar="NUMBER", help=HELP["twin.snr"])] = 6.0,
     noise: Annotated[str, typer.Option(metavar="KIND", help=HELP["twin.noise"])] = "white",
     seed: Annotated[int, typer.Option(min=0, metavar="N", help=HELP["twin.seed"])] = 1,

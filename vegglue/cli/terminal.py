@@ -40,17 +40,8 @@ def _some(jobs: int) -> int:
 
 Jobs = Annotated[int, typer.Option(min=-1, callback=_some, metavar="N", help=HELP["jobs"])]
 MemoryLimit = Annotated[float | None, typer.Option(min=0.1, metavar="GB", help=HELP["memory"])]
-Cluster = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS",
-        help=HELP["cluster"],
-    ),
-]
-Members = Annotated[
-    int | None,
-    typer.Option(min=1, metavar="N", help=HELP["members"]),
-]
+Cluster = Annotated[str | None, typer.Option(metavar="ADDRESS", help=HELP["cluster"])]
+Members = Annotated[int | None, typer.Option(min=1, metavar="N", help=HELP["members"])]
 Json = Annotated[bool, typer.Option("--json", metavar=FLAG, help=HELP["json"])]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", metavar=FLAG, help=HELP["quiet"])]
 Force = Annotated[bool, typer.Option("--force", metavar=FLAG, help=HELP["force"])]

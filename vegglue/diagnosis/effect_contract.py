@@ -43,9 +43,7 @@ LEVEL_OF_OUTLET = 0.7
 CHANNEL: dict[str, Any] = {
     "name": "contract",
     "grid": {"x": (0.0, 20.0), "y": (-4.0, 4.0), "cell": (0.5, 0.5)},
-    "bed": [
-        {"trapezoid": {"axis": 0.0, "bottom_width": 4.0, "bank_slope": 0.6, "bed_slope": 0.001, "level": 0.02}},
-    ],
+    "bed": [{"trapezoid": {"axis": 0.0, "bottom_width": 4.0, "bank_slope": 0.6, "bed_slope": 0.001, "level": 0.02}}],
     "friction": {
         "classes": {"floor": {"law": "manning", "n": 0.04}, "bank": {"law": "keulegan", "k_s": 0.5}},
         "default": "floor",

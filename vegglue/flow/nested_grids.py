@@ -14,14 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.flow.batch import (
-    SPLINE_MEMBERS,
-    STRIDE_TOLERANCE,
-    SolvedMembers,
-    blend,
-    none_solved,
-    solve_members,
-)
+from vegglue.flow.batch import SPLINE_MEMBERS, STRIDE_TOLERANCE, SolvedMembers, blend, none_solved, solve_members
 from vegglue.flow.chord import SIDE_BY_SIDE, ChordSolution, IterationLimits, stream
 from vegglue.flow.march import FallBack
 from vegglue.flow.newton import CLOSE

@@ -238,9 +238,7 @@ def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
     plants, boundaries = problem.plants, problem.boundaries
     inflows = tuple(
         replace(
-            one,
-            discharge=some(one.discharge),
-            spread=one.spread if one.spread.shape[-1] == 1 else some(one.spread),
+            one, discharge=some(one.discharge), spread=one.spread if one.spread.shape[-1] == 1 else some(one.spread)
         )
         for one in boundaries.inflows
     )
@@ -248,10 +246,7 @@ def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
         problem,
         friction=replace(problem.friction, coefficient=some(problem.friction.coefficient)),
         plants=replace(
-            plants,
-            phi=some(plants.phi),
-            canopy_height=some(plants.canopy_height),
-            bare_chezy=some(plants.bare_chezy),
+            plants, phi=some(plants.phi), canopy_height=some(plants.canopy_height), bare_chezy=some(plants.bare_chezy)
         ),
         viscosity=some(problem.viscosity),
         boundaries=replace(

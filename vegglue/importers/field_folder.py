@@ -41,15 +41,7 @@ from vegglue.importers.config_parts import (
 from vegglue.importers.measured_files import held_out_measurements, measured_files, record, texts_of_tables
 from vegglue.importers.measured_rows import Placement
 from vegglue.importers.result_site import SiteOfResult, ground_of_result, site_of
-from vegglue.importers.site_file import (
-    Channel,
-    FieldSite,
-    FileOfSite,
-    MeasuredFlow,
-    PlantedPatch,
-    SiteGrid,
-    site_file,
-)
+from vegglue.importers.site_file import Channel, FieldSite, FileOfSite, MeasuredFlow, PlantedPatch, SiteGrid, site_file
 from vegglue.importers.terrain import (
     BANK,
     BANK_CLASS,
@@ -59,12 +51,7 @@ from vegglue.importers.terrain import (
     surveyed_ground,
     with_banks,
 )
-from vegglue.importers.vector_files import (
-    drawn_placement,
-    planted_polygons,
-    refuse_crossing,
-    summary_of_plants,
-)
+from vegglue.importers.vector_files import drawn_placement, planted_polygons, refuse_crossing, summary_of_plants
 from vegglue.measurements.plausibility import DEEPEST_CHANNEL, STANDING_WATER
 from vegglue.wording.sentences import phrase
 

@@ -16,13 +16,7 @@ import numpy as np
 from vegglue.arrays import Array
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.import_notes import ImportNote, Noted
-from vegglue.importers.model_result import (
-    ModelResult,
-    bed_level_depth,
-    lacking_fields,
-    model_result,
-    without_marks,
-)
+from vegglue.importers.model_result import ModelResult, bed_level_depth, lacking_fields, model_result, without_marks
 
 # Names of variables, English and French, without their units.
 SELAFIN_NAMES = {

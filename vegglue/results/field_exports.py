@@ -156,11 +156,7 @@ def _mesh(grid: Grid, frame: Frame | None) -> dict[str, Any]:
         "time": (
             "time",
             np.zeros(1),
-            {
-                "standard_name": "time",
-                "units": "hours since 2000-01-01 00:00:00",
-                "long_name": phrase("any_time"),
-            },
+            {"standard_name": "time", "units": "hours since 2000-01-01 00:00:00", "long_name": phrase("any_time")},
         ),
         "mesh": ((), np.int32(0), topology),
         "map": ((), np.int32(0), _system(frame)),

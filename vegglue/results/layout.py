@@ -90,10 +90,7 @@ def fitting(group: ReadGroup, stored: Mapping[str, Stored], sizes: Mapping[str, 
     return group
 
 
-_STATED: dict[type, tuple[tuple[type, ...], str]] = {
-    str: ((str,), "text"),
-    bool: ((bool, np.bool_), "yes or no"),
-}
+_STATED: dict[type, tuple[tuple[type, ...], str]] = {str: ((str,), "text"), bool: ((bool, np.bool_), "yes or no")}
 
 
 def stated_as(kind: type, stated: Mapping[str, Any], name: str) -> Any:

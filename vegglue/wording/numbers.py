@@ -230,6 +230,5 @@ def sized(value: float, low: float, high: float, unit: str = "-") -> Written:
     middle, least, most = (fixed(one, places) for one in (value, low, high))
     plain, page = ("", "") if unit in ("", "-") else (f" {unit}", f"{NARROW}{unit_html(unit)}")
     return Written(
-        f"{middle}{plain}, 95 % {least} to {most}".replace(MINUS, "-"),
-        f"{middle}{page}, 95{FIRM}% {least} to {most}",
+        f"{middle}{plain}, 95 % {least} to {most}".replace(MINUS, "-"), f"{middle}{page}, 95{FIRM}% {least} to {most}"
     )

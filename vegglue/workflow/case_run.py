@@ -141,12 +141,7 @@ class CaseRun:
         return unseen_with_command(unseen, self.model, self.folder, self.watch)
 
     def with_settings(
-        self,
-        runs: Path | str,
-        jobs: int = -1,
-        watch: Watch = silent,
-        force: bool = False,
-        memory: float | None = None,
+        self, runs: Path | str, jobs: int = -1, watch: Watch = silent, force: bool = False, memory: float | None = None
     ) -> "CaseRun":
         """The same case in another folder of runs, or with other settings, and what was read of it."""
         return CaseRun(self.case, Path(runs), jobs, watch, force, memory, beside=self)

@@ -125,12 +125,7 @@ class StepwiseExtension:
 
 @one_thread()
 def extend_stepwise(
-    case: Case | CaseRun,
-    *,
-    runs: Path | str = "runs",
-    jobs: int = -1,
-    watch: Watch = silent,
-    force: bool = False,
+    case: Case | CaseRun, *, runs: Path | str = "runs", jobs: int = -1, watch: Watch = silent, force: bool = False
 ) -> StepwiseExtension:
     """Add the effects and places that the diagnosis found while held-out errors and the misfit fall.
 
