@@ -149,8 +149,8 @@ class Discovery:
     p, tried
         Chance that errors alone make laws stand out as much [-], and the number of laws that had something to act on.
     laws, others
-        The laws, best first, and the names of other causes with their chances, that hold 95 % together; none where nothing
-        is found.
+        The laws, best first, and the names of other causes with their chances, that hold 95 % together; none where
+        nothing is found.
     compared
         ln evidence of all that was calibrated, by name [-].
     likeliest
