@@ -24,7 +24,13 @@ known_first_odds. Which of the places is taken need not be sure: they say the sa
 strong_odds is taken as it is: nothing is followed beside it.
 
 An alarm names nothing by itself: it is sounded at its rate by errors alone. Only where all hypotheses together lead
-nothing by missing_odds is any taken.
+nothing by missing_odds is any taken, and that under errors as large as what the best of them leaves:
+
+    E'_j = E_j - (1 - 1/w) L_j,   w = max(1, chi2 / n)
+
+L is the part of E that is likelihood, and w the square of Birge's ratio, 1 unless errors alone would not leave as much.
+Effects that leave the same trace compete by E', too: their misfits differ by less than the model errs, and what is left
+then decides is how likely each is beforehand, at the size it needs.
 
 What cannot be has no evidence: a bed that would move by more than the water is deep, water that would enter by more
 than flows (`possible_change`), and a listed effect beyond implausible_size that these data could not show at a
@@ -47,10 +53,10 @@ from vegglue.calibration import score_test
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Instrument, InstrumentKind, place_candidate, start_with, with_effect
 from vegglue.calibration.fingerprints import Places, digits_of_place, places_around
-from vegglue.calibration.fit import interval95
+from vegglue.calibration.fit import chance_of_misfit, chi2, interval95
 from vegglue.calibration.model_error import EFFECT_AT_PLACE
 from vegglue.calibration.residual_screening import Screening, conditional_screenings, refit_start
-from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors
+from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors, prior_shrinkage
 from vegglue.case.case_effects import effect_named, effect_of, value_of
 from vegglue.case.channel_geometry import channel_geometry, patches_present, site_scales
 from vegglue.case.gridded_site import cells_at
@@ -481,9 +487,9 @@ def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
     return tempered_probabilities(np.array([one.log_evidence for one in hypotheses]))
 
 
-def odds_against_nothing(hypotheses: Sequence[Hypothesis]) -> float:
+def odds_against_nothing(evidence: Array) -> float:
     """sum of e^E_j: the odds that one of them is missing, and not nothing, both as likely before [-]."""
-    return float(np.exp(min(logsumexp([one.log_evidence for one in hypotheses]), LARGEST_LOG_ODDS)))
+    return float(np.exp(min(logsumexp(evidence), LARGEST_LOG_ODDS)))
 
 
 def worth_refitting(evidence: Array, best: float) -> list[int]:
@@ -522,6 +528,44 @@ MOST_FOLLOWED = 3
 What = Literal["effect", "place", "instrument"]
 # Kinds of hypotheses that are in a list.
 KNOWN = ("effect", *get_args(InstrumentKind))
+
+
+def under_larger_errors(evidence: Array, explained: Array, before: float, readings: int) -> Array:
+    """E' = E - (1 - 1/w) L, see the head of this file.
+
+    Parameters
+    ----------
+    evidence, explained : ndarray (k,)
+        E of each hypothesis, and its part L that is likelihood, half of the chi2 that it explains [-].
+    before : float
+        chi2 without any [-].
+    readings : int
+        How many there are, n.
+
+    Returns
+    -------
+    ndarray (k,)
+        E itself where errors alone leave as large a chi2 as the best does, by poor_fit_chance.
+    """
+    least = before - 2.0 * float(explained.max())
+    if chance_of_misfit(least, readings) >= constants().poor_fit_chance:
+        return evidence
+    return np.asarray(evidence - (1.0 - readings / least) * explained)
+
+
+def evidence_under_larger_errors(screening: Screening, hypotheses: Sequence[Hypothesis]) -> Array:
+    """E' of each hypothesis (k,), see `under_larger_errors`."""
+    before = chi2(screening.search.noise, screening.search.point)
+
+    def explained_by(one: Hypothesis) -> float:
+        if isinstance(one.what, Refit):
+            return 0.5 * (before - one.what.fitted.chi2)
+        kind = kind_named(screening.kinds, one.kind)
+        return 0.5 * float(kind.scores[one.column] ** 2 * prior_shrinkage(kind.size[one.column]))
+
+    explained = np.array([explained_by(one) for one in hypotheses])
+    evidence = np.array([one.log_evidence for one in hypotheses])
+    return under_larger_errors(evidence, explained, before, screening.base.noise.rows.size)
 
 
 def nearly_as_likely(hypotheses: Sequence[Hypothesis]) -> list[int]:

@@ -30,10 +30,12 @@ from vegglue.diagnosis.competition import (
     chance_of_a_place,
     chances_of,
     chosen_hypothesis,
+    evidence_under_larger_errors,
     hypotheses_of,
     nearly_as_likely,
     odds_against_nothing,
     tempered_probabilities,
+    under_larger_errors,
 )
 from vegglue.diagnosis.conclusion import NEIGHBOURS_WITHIN, assemble_diagnosis, single_readings
 from vegglue.diagnosis.refits import calibrated_with, pruned
@@ -190,18 +192,21 @@ def _best_branch(
     def screened(one: SearchBranch) -> SearchBranch:
         return replace(one, screening=screen(one.base, one.found.flagged))
 
-    def prospect(one: SearchBranch) -> float:
-        """ln evidence of a model and of the best that could come next, to first order, less that of the prior so far;
-        of a place as it competed, without the error of its shape, which is there for what is found beside it.
-        """
+    def further(one: SearchBranch) -> float:
+        """ln evidence of the best that could come next, to first order."""
         assert one.screening is not None
-        further = 0.0
-        if _with_alarm(one.screening, one.found).alarmed:
-            further = max(0.0, *(kind.total for kind in one.screening.kinds))
-        before = found.log_prior + found.of_shape
-        return log_evidence(one.base) + one.found.log_prior + one.found.of_shape - before + further
+        if not _with_alarm(one.screening, one.found).alarmed:
+            return 0.0
+        return max(0.0, *(kind.total for kind in one.screening.kinds))
 
-    if odds_against_nothing(hypotheses) < constants().missing_odds:
+    def prospect(one: SearchBranch) -> float:
+        """ln evidence of a model and of what could come next, less that of the prior so far; of a place as it competed,
+        without the error of its shape, which is there for what is found beside it.
+        """
+        before = found.log_prior + found.of_shape
+        return log_evidence(one.base) + one.found.log_prior + one.found.of_shape - before + further(one)
+
+    if odds_against_nothing(evidence_under_larger_errors(screening, hypotheses)) < constants().missing_odds:
         return Undecided(tuple(hypotheses), tuple(chances_of(hypotheses)))
     rivals = nearly_as_likely(hypotheses)
     branches = in_threads(branch_with, [(screening, hypotheses, j, found, watch) for j in rivals])
@@ -216,6 +221,11 @@ def _best_branch(
     best = chosen_hypothesis([one.what for one in ends], evidence, chance_of_a_place(hypotheses, undecided.chances))
     if best is None:
         return undecided
+    if ends[best].what == "effect":  # of one trace the likelier size leads
+        group = next(one for one in ends[best].found.steps[-1].groups if names[best] in one)
+        alike, readings = [j for j, name in enumerate(names) if name in group], screening.base.noise.rows.size
+        left = np.array([chi2(one.base.noise, one.base.fitted.point) - 2.0 * further(one) for one in ends])
+        best = alike[int(np.argmax(under_larger_errors(evidence[alike], -0.5 * left[alike], 0.0, readings)))]
     taken = ends[best].found
     if ends[best].what == "effect":  # with the chances of all that was followed
         *earlier, step = taken.steps

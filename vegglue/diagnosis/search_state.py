@@ -17,7 +17,13 @@ from vegglue.calibration.fit import chi2
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.calibration.score_test import kind_named, prior_shrinkage
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import Hypothesis, chances_of, hypotheses_of, tempered_odds
+from vegglue.diagnosis.competition import (
+    Hypothesis,
+    chances_of,
+    evidence_under_larger_errors,
+    hypotheses_of,
+    tempered_odds,
+)
 from vegglue.diagnosis.refits import Refit, calibrated_with, without_effect
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues
@@ -141,11 +147,7 @@ def step_found(
 ) -> Step:
     """One hypothesis, a listed effect, as a step; further: the model with it; p: of the alarm."""
     chance = chances_of(hypotheses)
-    listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
-    names = [hypotheses[j].name for j in listed]
-    columns = [hypotheses[j].column for j in listed]
-    cosine = score_test.cosines(screening.projected)[np.ix_(columns, columns)]
-    found, groups = rivals_among(names, chance[listed], cosine)
+    found, groups = groups_of_rivals(screening, hypotheses)
     base, least = screening.base, constants().rival_share * chance.max()
     # Of other kinds what is not negligible against the best.
     others = {
@@ -170,6 +172,18 @@ def step_found(
     )
     # What is accepted on trial may lie outside the set of the likeliest.
     return with_chances(step, step.accepted, found | others | {step.accepted: float(chance[accepted])})
+
+
+def groups_of_rivals(
+    screening: Screening, hypotheses: Sequence[Hypothesis]
+) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
+    """`rivals_among` the listed effects of the hypotheses."""
+    chance = chances_of(hypotheses)
+    listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
+    names = [hypotheses[j].name for j in listed]
+    columns = [hypotheses[j].column for j in listed]
+    cosine = score_test.cosines(screening.projected)[np.ix_(columns, columns)]
+    return rivals_among(names, chance[listed], cosine)
 
 
 def shared_anew(told: Mapping[str, float], followed: Sequence[str], chance: Array) -> dict[str, float]:
@@ -333,7 +347,8 @@ def with_rivals_again(
         listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
         if step.accepted not in [hypotheses[j].name for j in listed] or np.isinf(hypotheses[listed[0]].log_evidence):
             continue
-        best = hypotheses[listed[0]].what
+        lead = leading_refit(screening, hypotheses)
+        best = hypotheses[lead].what
         assert isinstance(best, Refit)
         one = best.candidate
         # At other values of its shapes than those in the case an effect is another.
@@ -342,10 +357,19 @@ def with_rivals_again(
             if further is None:
                 continue
             base = further
-        again = step_found(screening, hypotheses, listed[0], base, step.p_family)
+        again = step_found(screening, hypotheses, lead, base, step.p_family)
         kept[-1] = replace(again, chi2_before=step.chi2_before, chi2_after=step.chi2_after)
         known |= refitted(hypotheses, known)
     return base, tuple(kept), known
+
+
+def leading_refit(screening: Screening, hypotheses: Sequence[Hypothesis]) -> int:
+    """The listed effect that leads those of the trace of the most likely one, which come in this order."""
+    first = next(one.name for one in hypotheses if one.kind == "effect")
+    _, groups = groups_of_rivals(screening, hypotheses)
+    group = next((one for one in groups if first in one), (first,))
+    alike = [j for j, one in enumerate(hypotheses) if one.kind == "effect" and one.name in group]
+    return alike[int(np.argmax(evidence_under_larger_errors(screening, [hypotheses[j] for j in alike])))]
 
 
 def refitted(hypotheses: Sequence[Hypothesis], effects: Mapping[str, CandidateEffect]) -> dict[str, CandidateEffect]:
