@@ -1,4 +1,4 @@
-"""Plants that are not on the map are found as a patch, and an object stays a spot."""
+"""Plants that are not on the map are found as a patch, an object stays a spot, and beside them water has its extent."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from coarse_twin import CASE, coarse_twin
 from vegglue.calibration.baseline import Baseline, search_model
 from vegglue.calibration.candidates import Candidate, place_candidate, start_with, with_effect
 from vegglue.calibration.fit import fit
+from vegglue.calibration.model_error import EFFECT_AT_PLACE
 from vegglue.calibration.noise import noise_of
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.calibration.score_test import kind_named
@@ -18,9 +19,13 @@ from vegglue.diagnosis.competition import Hypothesis, drag_of_patches, with_patc
 from vegglue.diagnosis.refits import RefitTrial, refits_of
 from vegglue.diagnosis.search_state import anomaly_found
 from vegglue.engine.interface import linearise_from
+from vegglue.flow.local_changes import Term
 
 # Twice as dense as the patches of the map, in open water downstream of them.
 REEDS = {"x": 26.0, "y": -0.6, "length": 2.5, "width": 0.5, "angle": 0.0, "height": 0.7, "proportional": 0.0}
+# A ditch of 5 m, narrower than the spots of the screening, 0.45 m.
+DITCH = {"x": 24.0, "y": -0.6, "length": 2.5, "width": 0.25}
+ENTERING = 0.12
 TREE = {"x": 26.0, "y": -0.6, "length": 0.5, "width": 0.45}
 
 
@@ -37,16 +42,22 @@ def measured_with(candidate: Candidate, amplitude: float) -> Screening:
     return screen(Baseline(model, noise, fit(model, noise, point), None, None))
 
 
-def hypotheses_at(screening: Screening) -> list[Hypothesis]:
-    """The best spot of drag, refitted, and plants in place of it if they explain clearly more."""
-    search, kind = search_model(screening.base), kind_named(screening.kinds, "drag")
-    places = next(one for one in screening.fingerprints.places if one.term == "drag")
-    candidate = place_candidate(effect_named(CASE, "unlisted_object"), places.shapes(kind.best), places.plausible)
+def best_spot(screening: Screening, term: Term) -> Hypothesis:
+    """The best spot of a term, refitted."""
+    search, kind = search_model(screening.base), kind_named(screening.kinds, term)
+    places = next(one for one in screening.fingerprints.places if one.term == term)
+    effect = effect_named(CASE, EFFECT_AT_PLACE[term])
+    candidate = place_candidate(effect, places.shapes(kind.best), places.plausible)
     start = start_with(candidate, search.point.z, float(kind.gain[kind.best]))
     (refit,) = refits_of(search, [RefitTrial(candidate, dict(candidate.fixed), (start,))])
     assert refit is not None
     evidence = refit.log_factor + float(kind.log_prior[kind.best])
-    return with_patch(screening, [Hypothesis("drag", candidate.name, evidence, kind.best, refit)])
+    return Hypothesis(term, candidate.name, evidence, kind.best, refit)
+
+
+def hypotheses_at(screening: Screening) -> list[Hypothesis]:
+    """The best spot of drag, refitted, and plants in place of it if they explain clearly more."""
+    return with_patch(screening, [best_spot(screening, "drag")])
 
 
 @pytest.mark.slow
@@ -70,3 +81,17 @@ def test_an_object_stays_a_spot() -> None:
     tree = place_candidate(effect_named(CASE, "unlisted_object"), TREE)
     (found,) = hypotheses_at(measured_with(tree, 1.0))
     assert found.outline is None
+
+
+@pytest.mark.slow
+def test_beside_plants_with_an_outline_water_has_its_extent_fitted() -> None:
+    """Else a rectangle of plants, whose sizes are free, explains what enters along a ditch better than a round spot."""
+    screening = measured_with(place_candidate(effect_named(CASE, "unlisted_inflow"), DITCH), ENTERING)
+    plants, spot = best_spot(screening, "drag"), best_spot(screening, "inflow")
+    found = {one.kind: one for one in with_patch(screening, [plants, spot])}
+    water = found["inflow"]
+    assert found["drag"].outline is not None
+    assert water.log_evidence > spot.log_evidence + 10.0
+    assert water.what.shapes["width"] < spot.what.shapes["width"] < water.what.shapes["length"]
+    assert abs(water.what.shapes["y"] - DITCH["y"]) < 0.1
+    assert water.what.interval95[0] < ENTERING < water.what.interval95[1]

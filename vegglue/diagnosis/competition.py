@@ -41,7 +41,7 @@ Smooth fields of a term (`field_scan`) are so free that they explain much of wha
 with a single cause, but with all that was accepted in the end.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -213,6 +213,9 @@ def cannot_be(interval: tuple[float, float], possible: tuple[float, float]) -> b
 # beyond which a side of a patch lies off. Chosen before any patch was fitted, and not changed since.
 LOG_SIZE, TURNED, LARGEST_TURN, MOST_COVERED = 0.7, 15.0, 60.0, 0.5
 PATCH = "unlisted_patch"
+# Half length and half width in cells above which a fitted spot is not lost between their centres: its sum over the
+# cells is then right to 2 exp(-pi^2 0.7^2) = 2 %.
+LEAST_EXTENT = 0.7
 
 
 def drag_of_patches(search: SearchModel, height: float) -> dict[str, float]:
@@ -228,6 +231,71 @@ def drag_of_patches(search: SearchModel, height: float) -> dict[str, float]:
         for index in patches_present(model.case, experiment):
             sums[:, index] += own[patch == index].sum(), model.site.cover[patch == index].sum()
     return {name: float(of / cells) for name, of, cells in zip(names, *sums, strict=True) if cells > 0.0 < of}
+
+
+def within_places(values: Array, start: float) -> tuple[float, Parameter]:
+    """A coordinate to start from, off the ends of all places, and its prior, uniform over them [m]."""
+    low, high = float(values.min()), float(values.max())
+    margin = 0.01 * (high - low)
+    prior = Parameter(distribution="uniform", low=low, high=high, unit="m")
+    return float(np.clip(start, low + margin, high - margin)), prior
+
+
+def fitted_extent(search: SearchModel, refit: Refit) -> tuple[dict[str, float], dict[str, float]]:
+    """Shapes of something whose place and sizes were fitted, rounded, and the standard errors of what was fitted."""
+    model, names = (
+        replace(search.model, case=with_effect(search.model.case, refit.candidate, refit.shapes)),
+        refit.candidate.free,
+    )
+    ends = {name: interval95(model, refit.fitted, parameter) for name, parameter in names.items()}
+    digits = digits_of_place(ends["width"][0])
+    shapes = {**refit.shapes} | {name: round(middle, digits) for name, (middle, _, _) in ends.items()}
+    return shapes, {name: (high - low) / (2.0 * NORMAL95) for name, (_, low, high) in ends.items()}
+
+
+def found_extent(
+    search: SearchModel, places: Places, kind: HypothesisKind, spot: Refit, outline: Mapping[str, float]
+) -> FoundPlace | None:
+    """A spot whose middle, length and width are fitted with all else, from its own and from those of an outline.
+
+        ln E = ln B + ln prior,   x, y uniform over the places, ln l and ln w normal around those of the spots
+
+    B is Laplace's of all five (`refits`), so that each is charged, and the prior that of all spots of the term.
+
+    Returns
+    -------
+    FoundPlace or None
+        None if no flow is found, it falls between the centres of cells, or it would take the place of what acts there.
+    """
+    effect, above_off = spot.candidate.effect, spot.candidate.above_off
+    ends = float(places.length.min()), float(places.length.max())
+    length = Parameter(
+        distribution="lognormal", median=float(np.sqrt(ends[0] * ends[1])), log_sd=0.5 * np.log(ends[1] / ends[0]),
+        unit="m",
+    )  # fmt: skip
+    width = Parameter(distribution="lognormal", median=float(places.width.min()), log_sd=LOG_SIZE, unit="m")
+    trials = []
+    for start in (spot.shapes, outline):
+        (x, of_x), (y, of_y) = within_places(places.x, start["x"]), within_places(places.y, start["y"])
+        shapes = {"x": x, "y": y, "length": start["length"], "width": start["width"]}
+        candidate = place_candidate(effect, shapes, places.plausible, above_off)
+        candidate = replace(candidate, fitted=(("x", of_x), ("y", of_y), ("length", length), ("width", width)))
+        gain = float(candidate.amplitude.gain(spot.amplitude))
+        trials.append(RefitTrial(candidate, shapes, (start_with(candidate, spot.fitted.point.z[:-1], gain),)))
+    ended = [one for one in refits_of(search, trials) if one is not None]
+    if not ended:
+        return None
+    best = max(ended, key=lambda one: one.log_factor)
+    shapes, errors = fitted_extent(search, best)
+    candidate, grid = place_candidate(effect, shapes, places.plausible, above_off), search.model.site.grid
+    narrow = shapes["length"] < LEAST_EXTENT * grid.dx or shapes["width"] < LEAST_EXTENT * grid.dy
+    if narrow or candidate.key in search.model.case.effects:
+        return None
+    (fixed,) = refits_of(search, [RefitTrial(candidate, shapes, (best.fitted.point.z[: -len(errors)],))])
+    if fixed is None:
+        return None
+    evidence, error = best.log_factor + float(logsumexp(kind.log_prior)), (errors["x"], errors["y"])
+    return FoundPlace(replace(fixed, interval95=best.interval95), evidence, error, error)
 
 
 def found_patch(
@@ -263,15 +331,9 @@ def found_patch(
     like = max(told, key=told.__getitem__)
     effect, plausible = effect_named(case, PATCH), told[like]
 
-    def within(values: Array, start: float) -> tuple[float, Parameter]:
-        low, high = float(values.min()), float(values.max())
-        margin = 0.01 * (high - low)
-        prior = Parameter(distribution="uniform", low=low, high=high, unit="m")
-        return float(np.clip(start, low + margin, high - margin)), prior
-
     trials = []
     for start in starts:
-        (x, of_x), (y, of_y) = within(places.x, start[0]), within(places.y, start[1])
+        (x, of_x), (y, of_y) = within_places(places.x, start[0]), within_places(places.y, start[1])
         half = {"length": 0.5 * scales.patch_length, "width": 0.5 * scales.patch_width}
         shapes = {"x": x, "y": y, **half, "angle": 0.0, "height": scales.canopy}
         shapes["proportional"] = float(case.numerics.emergent == "proportional")
@@ -289,18 +351,14 @@ def found_patch(
     if not ended:
         return None
     best = max(ended, key=lambda one: one.log_factor)
-    model, names = replace(search.model, case=with_effect(case, best.candidate, best.shapes)), best.candidate.free
-    ends = {name: interval95(model, best.fitted, parameter) for name, parameter in names.items()}
-    errors = {name: (high - low) / (2.0 * NORMAL95) for name, (_, low, high) in ends.items()}
-    digits = digits_of_place(ends["width"][0])
-    shapes = {**best.shapes} | {name: round(middle, digits) for name, (middle, _, _) in ends.items()}
+    shapes, errors = fitted_extent(search, best)
     geometry = channel_geometry(case, search.model.site, next(iter(case.experiments)))
-    share = rectangle(geometry, **{name: np.array([shapes[name]]) for name in names})[..., 0]
+    share = rectangle(geometry, **{name: np.array([shapes[name]]) for name in errors})[..., 0]
     covered = float((share * search.model.site.cover).sum() / share.sum())
     candidate = place_candidate(effect, shapes, plausible)
     if shapes["length"] <= places.length.min() or covered > MOST_COVERED or candidate.key in case.effects:
         return None
-    (fixed,) = refits_of(search, [RefitTrial(candidate, shapes, (best.fitted.point.z[: -len(names)],))])
+    (fixed,) = refits_of(search, [RefitTrial(candidate, shapes, (best.fitted.point.z[: -len(errors)],))])
     if fixed is None:
         return None
     of_sizes = {f"{name}_error": errors[name] for name in ("length", "width", "angle")}
@@ -453,7 +511,8 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
 
 def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The hypotheses with plants that are not on the map in place of a spot of drag that they lead by strong_odds; they
-    are fitted from where most drag is promised, and from the place that has most evidence.
+    are fitted from where most drag is promised, and from the place that has most evidence. Beside them spots of other
+    terms have their extent fitted, too: else water that enters along a bank is plants, whose sizes are free.
     """
     places = next((one for one in screening.fingerprints.places if one.term == "drag"), None)
     at_places = [one for one in found if isinstance(one.what, Refit) and one.kind != "effect"]
@@ -472,14 +531,28 @@ def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypoth
         return list(found)
     shapes = patch.refit.shapes
     nearest = int(np.argmin(np.hypot(places.x - shapes["x"], places.y - shapes["y"])))
-    others = [one for one in found if one.kind != "drag"]
-    name = patch.refit.candidate.name
-    return [
-        *others,
-        Hypothesis(
-            "drag", name, patch.log_evidence, nearest, patch.refit, patch.errors, outline=patch.outline
-        ),
-    ]  # fmt: skip
+    plants = Hypothesis(
+        "drag", patch.refit.candidate.name, patch.log_evidence, nearest, patch.refit, patch.errors,
+        outline=patch.outline,
+    )  # fmt: skip
+    return [*(with_extent(screening, one, shapes) for one in found if one.kind != "drag"), plants]
+
+
+def with_extent(screening: Screening, one: Hypothesis, outline: Mapping[str, float]) -> Hypothesis:
+    """A spot with its extent fitted, where that has more evidence and can be; all else as it is."""
+    places = next((places for places in screening.fingerprints.places if places.term == one.kind), None)
+    if places is None or not isinstance(one.what, Refit):
+        return one
+    search = screening.search
+    there = found_extent(search, places, kind_named(screening.kinds, one.kind), one.what, outline)
+    if there is None or there.log_evidence < one.log_evidence:
+        return one
+    refit = there.refit
+    possible = possible_change(search.model, search.point, places.term, refit.shapes["x"], refit.shapes["y"])
+    if cannot_be(refit.interval95, possible):
+        return one
+    name, errors, spread = refit.candidate.name, there.errors, there.spread
+    return replace(one, name=name, log_evidence=there.log_evidence, what=refit, errors=errors, spread=spread)
 
 
 def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
