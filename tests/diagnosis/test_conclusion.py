@@ -33,10 +33,12 @@ from vegglue.diagnosis.conclusion import (
     measured_stretch,
     misfit_of,
     named_places,
+    shear_layers,
     significant_effects,
 )
 from vegglue.diagnosis.search_state import SearchState, Undecided
 from vegglue.effects.definition import Amplitude
+from vegglue.engine.interface import flow_at_centres
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.progress import silent
 from vegglue.results.causes import Rival
@@ -198,6 +200,22 @@ def test_cells_with_a_larger_error_than_the_readings_are_a_note() -> None:
     assert found.grid_error == pytest.approx(2.0 * found.data_error)
     # An error of the cells in levels alone is none in velocities.
     assert list(cells_too_coarse(replace(noise, grid_error=np.where(velocity, 0.0, 1.0)), model.station)) == []
+
+
+def test_more_mixing_where_deep_and_shallow_water_meet_is_a_shear_layer() -> None:
+    """At the toe of a bank, not in the middle of the floor, and no other term nor less mixing."""
+    model, point = coarse_twin()
+    depth = np.asarray(flow_at_centres(model, point, next(iter(point.flows))).depth)
+    grid, column = model.site.grid, depth.shape[0] // 2
+    x, edge, middle = float(grid.x[column]), float(grid.y[1]), float(grid.y[grid.y.size // 2])
+    reach = 2.0 * grid.dy
+    expected = depth[column, np.abs(grid.y - edge) <= reach]
+    mixing = an_anomaly(x=x, y=edge, width=reach, term="viscosity", amplitude=0.02)
+    there = (mixing, replace(mixing, amplitude=-0.02), replace(mixing, term="drag"), replace(mixing, y=middle))
+    (found,) = shear_layers(model, point, there)
+    assert (found.x, found.y) == (x, edge)
+    assert found.deep >= 2.0 * found.shallow
+    assert found.deep >= expected.max()
 
 
 def test_a_fault_of_the_probes_near_the_inflow_may_be_an_inflow_that_develops() -> None:

@@ -151,6 +151,7 @@ from vegglue.results.verdict import (
     NoneLeads,
     ParameterFarFromPrior,
     ResultCompared,
+    ShearLayer,
     StatedErrorsTooSmall,
     TooManyGroups,
     TooShallow,
@@ -253,6 +254,7 @@ VELOCITY = kind_of("velocity")
 NOTES = (
     EstimateAtBound("n_b", 0.0051, "s m^(-1/3)", 0.005, 0.05, True),
     InflowDevelops("probe_gain[x2.2]", 2.2, 14.9, 76.0), CellsTooCoarse(0.027, 0.015),
+    ShearLayer(13.0, 0.95, 0.031, 0.147),
     BeyondHandbook("n_b", 0.062, "s m^(-1/3)", 0.01, 0.06, "chow-major"),
     EstimateOffPrior("eddy_viscosity", 0.002, "m2/s", 2.9),
     MisfitTooSmall(61.5, 150), ImplausibleAmplitude("wind", 3.4), EffectsNotExcluded(("wind", "waves"), beside=True),

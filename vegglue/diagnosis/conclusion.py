@@ -35,7 +35,7 @@ from vegglue.diagnosis.search_state import SearchState, rivals_in
 from vegglue.diagnosis.verdict_rules import VerdictInputs, make_verdict
 from vegglue.effects.definition import Stage
 from vegglue.effects.identity import EffectIdentity
-from vegglue.engine.interface import Model, Point
+from vegglue.engine.interface import Model, Point, flow_at_centres
 from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import STREAMWISE, kind_of, velocity_rows
 from vegglue.measurements.section_discharge import mismatched_discharges
@@ -62,6 +62,7 @@ from vegglue.results.verdict import (
     NameHangsOnSection,
     Note,
     PlacesOnMap,
+    ShearLayer,
     TooShallow,
     Verdict,
 )
@@ -137,6 +138,8 @@ ALONG_THE_CHANNEL: tuple[Stage, ...] = ("plants", "resistance", "exchange", "for
 # Length over which a turbulent profile over the depth develops behind an inflow [depths]: 76 - 1e-4 Re/Fr, Kirkgoz and
 # Ardiclioglu (1997), doi:10.1061/(ASCE)0733-9429(1997)123:12(1099); not checked against it.
 DEVELOPMENT = 76.0
+# Depth over that beside it [-] from which water of two speeds meets, as over a floodplain beside its channel. Chosen.
+TWO_DEPTHS = 2.0
 # Shares of the allowed model error of which the likelihood is computed [-].
 ERROR_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0)
 
@@ -291,6 +294,7 @@ def _verdict(
     surroundings += parameter_doubts(base)
     surroundings += inflow_develops(model, found.effects)
     surroundings += cells_too_coarse(base.noise, model.station)
+    surroundings += shear_layers(model, base.fitted.point, found.places)
     if not any(one.x.size for one in last.fingerprints.places):
         surroundings.append(TooShallow(least_depth(model)))
     return make_verdict(
@@ -427,6 +431,18 @@ def cells_too_coarse(noise: Noise, station: pd.DataFrame) -> Iterator[CellsTooCo
     of_cells, of_readings = (root_mean_square(one[velocity]) for one in (noise.grid_error, noise.data_error))
     if of_cells > of_readings:
         yield CellsTooCoarse(of_cells, of_readings)
+
+
+def shear_layers(model: Model, point: Point, places: Sequence[LocalAnomaly]) -> Iterator[ShearLayer]:
+    """Places of more mixing across which the depth changes by a factor of TWO_DEPTHS, in the deepest flow there."""
+    y = model.site.grid.y
+    for one in (each for each in places if each.term == "viscosity" and each.amplitude > 0.0):
+        column = cells_at(model.site, np.array([one.x]), np.array([one.y]))[0][0]
+        beside = np.abs(y - one.y) <= max(one.width, model.site.grid.dy)
+        depths = [flow_at_centres(model, point, name).depth[column, beside] for name in point.flows]
+        deepest = max(depths, key=lambda depth: float(depth.max()))
+        if deepest.max() >= TWO_DEPTHS * deepest.min():
+            yield ShearLayer(one.x, one.y, float(deepest.min()), float(deepest.max()))
 
 
 def significant_effects(last: Screening, found: SearchState, slack: float = 0.0) -> dict[str, float]:

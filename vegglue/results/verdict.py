@@ -406,6 +406,16 @@ class CellsTooCoarse:
 
 
 @dataclass(frozen=True)
+class ShearLayer:
+    """More mixing at x, y [m] where the water is shallow on one side and deep on the other [m]."""
+
+    x: float
+    y: float
+    shallow: float
+    deep: float
+
+
+@dataclass(frozen=True)
 class EstimateOffPrior:
     """A calibrated parameter some standard deviations from the middle of its prior, at `value` [unit]."""
 
@@ -643,6 +653,7 @@ Note = (
     | BeyondHandbook
     | InflowDevelops
     | CellsTooCoarse
+    | ShearLayer
     | EstimateOffPrior
     | EffectsNotExcluded
     | EffectsExcluded
