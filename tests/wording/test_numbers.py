@@ -40,7 +40,7 @@ from vegglue.wording.numbers import (
 from vegglue.workflow.compare import Comparison
 from vegglue.workflow.extend import StepwiseExtension
 
-MOST_LINES, MOST_LETTERS = 12, 600
+MOST_LETTERS = 600
 
 
 def test_building_blocks() -> None:
