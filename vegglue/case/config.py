@@ -107,9 +107,8 @@ def load_case(path: Path | str, trust: bool = False) -> Case:
             "the files it runs, and add --trust if you trust them."
         )
     try:
-        _agree_on_names(case)
-        _agree_on_effects(case)
-        _agree_on_values(case)
+        for agree in (_names_agree, _effects_agree, _parameters_agree, _places_agree, _other_models_agree):
+            agree(case)
     except CaseError as refusal:
         raise _input_error(layers, refusal) from None
     return case
@@ -253,7 +252,7 @@ def _declared(place: KeyPath, word: str, known: Iterable[str], what: str) -> Non
         raise CaseError(place, f"names the {what} `{word}`, which is not declared: {nearest(word, names)}")
 
 
-def _agree_on_names(case: Case) -> None:
+def _names_agree(case: Case) -> None:
     """Every name is declared, and every file is there and not too large."""
     classes, stands = case.friction.classes, case.plants.stands
     _declared(("friction", "default"), case.friction.default, classes, "friction class")
@@ -305,7 +304,7 @@ def _agree_on_names(case: Case) -> None:
             raise CaseError(place, f"expected a file of at most {LARGEST_DATA:,} bytes, got more: make it smaller")
 
 
-def _agree_on_effects(case: Case) -> None:
+def _effects_agree(case: Case) -> None:
     """Effects and their parameters by name; none without its amplitude, and no number outside what it may be."""
     if not case.effects and not case.exclude and case.effect_file is None:
         return
@@ -344,10 +343,8 @@ def _agree_on_effects(case: Case) -> None:
             raise CaseError(place, f"names sections or devices, but {name} acts on the flow: use `experiments`")
 
 
-def _agree_on_values(case: Case) -> None:
-    """Quantities are positive if they must be, every parameter is used, ranges lie in the grid, and a command has its
-    files and keeps no fields.
-    """
+def _parameters_agree(case: Case) -> None:
+    """Quantities are positive if they must be, and every parameter is used."""
     for place, value, positive in values(case):
         if isinstance(value, str):
             _declared(place, value, case.parameters, "parameter")
@@ -368,6 +365,10 @@ def _agree_on_values(case: Case) -> None:
             raise CaseError(
                 ("parameters", name), "is declared but used nowhere: name it where its value belongs, or remove it"
             )
+
+
+def _places_agree(case: Case) -> None:
+    """Ranges and planned measurements lie in the grid."""
     ranges: list[tuple[KeyPath, Interval | None, Interval]] = [
         (("inflows", name, "range"), inflow.range, case.grid.y if inflow.side == "west" else case.grid.x)
         for name, inflow in case.inflows.items()
@@ -385,6 +386,10 @@ def _agree_on_values(case: Case) -> None:
             for value in given if isinstance(given, tuple) else () if given is None else (given,):
                 if not low <= value <= high:
                     raise CaseError((*at, axis), f"expected a place within {low:g} to {high:g} m, got {value:g}")
+
+
+def _other_models_agree(case: Case) -> None:
+    """A threshold has its likelihood, a finished result the flows of the case, and a command its files and no fields."""
     if case.infer.behavioural is not None and case.infer.likelihood == "gaussian":
         raise CaseError(("infer", "behavioural"), "goes with an informal likelihood, not with gaussian: remove it")
     if (result := case.finished_result) is not None:
