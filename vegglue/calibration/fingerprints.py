@@ -98,11 +98,23 @@ class Places:
 
 @dataclass(frozen=True)
 class Fingerprints:
-    """values (station, c): d prediction / d gain of candidates, [m/s or m] per unit of gain, one column per setting.
+    """S = d prediction / d gain of candidates, one column for each setting of their shapes.
 
-    columns: for each candidate, its columns; settings, amplitudes, causes: of each column (c,); of_lines (station,
-    lines): what a measurement exceeds its prediction by for each m that a surveyed line is too high [unit of the
-    station per m].
+    Attributes
+    ----------
+    point, candidates
+        Where it is taken, and of what.
+    columns
+        Of each candidate.
+    settings, amplitudes, causes
+        Of each column (c,).
+    values
+        S (station, c) [m/s or m per unit of gain].
+    places
+        The spots of each term.
+    lines, of_lines
+        Surveyed lines, and what a measurement exceeds its prediction by for each m that a line is too high (station, lines)
+        [unit of the station per m].
     """
 
     point: Point

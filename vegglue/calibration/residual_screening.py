@@ -69,11 +69,26 @@ OFF, MOST_CONDITIONAL = 0.25, 2
 class Screening:
     """Score tests of the residual of a calibrated model against all that could be missing, or wrong with the data.
 
-    base: with the noise as estimated here, at the place of its fit; search: its model that is fitted again and again;
-    flagged: readings of instruments found to be off, indices among the used ones. whitened_slopes (n, p): W df/dz;
-    whitened_fingerprints (n, c): of candidates; projected: these with the slopes projected out. effects: score tests of
-    candidates. kinds: evidence of all kinds, that of listed effects first, then of places by term, then of
-    `instruments`; errors (draws, n): whitened errors alone.
+    Attributes
+    ----------
+    base
+        The model, with the noise as estimated here, at the place of its fit.
+    search
+        Its model that is fitted again and again.
+    flagged
+        Readings of instruments found to be off, indices among the used ones.
+    fingerprints, whitened_fingerprints
+        S of candidates, and W S (n, c).
+    whitened_slopes
+        W df/dz (n, p).
+    projected
+        W S with W df/dz projected out.
+    effects
+        Score tests of candidates.
+    kinds
+        Evidence of all kinds: of listed effects, of places by term, and of `instruments`, in this order.
+    errors
+        Whitened errors alone (draws, n).
     """
 
     base: Baseline

@@ -389,7 +389,7 @@ def _places_agree(case: Case) -> None:
 
 
 def _other_models_agree(case: Case) -> None:
-    """A threshold has its likelihood, a finished result the flows of the case, and a command its files and no fields."""
+    """A threshold has its likelihood, a finished result all flows of the case, and a command its files."""
     if case.infer.behavioural is not None and case.infer.likelihood == "gaussian":
         raise CaseError(("infer", "behavioural"), "goes with an informal likelihood, not with gaussian: remove it")
     if (result := case.finished_result) is not None:

@@ -68,10 +68,24 @@ def rivals_in(undecided: Undecided) -> tuple[Rival, ...]:
 
 @dataclass(frozen=True)
 class SearchState:
-    """prior_weights: of all that is held. flagged: excluded readings, indices among the used stations. of_shape:
-    ln evidence of places as they competed, less that in the model, whose covariance holds the error of their shape. p:
-    of the last alarm, and the rate below which it is sounded. undecided: what competed last and led to nothing.
-    implausible: values that no flow of the case can have.
+    """What a search has accepted so far.
+
+    Attributes
+    ----------
+    steps, places, instruments
+        Accepted effects, places and faulty instruments.
+    prior_weights
+        Of all that is held.
+    flagged
+        Excluded readings, indices among the used stations.
+    of_shape
+        ln evidence of places as they competed, less that in the model, whose covariance holds the error of their shape.
+    p, rate
+        Of the last alarm, and the rate below which it is sounded.
+    undecided
+        What competed last and led to nothing.
+    implausible
+        Values that no flow of the case can have.
     """
 
     steps: tuple[Step, ...] = ()

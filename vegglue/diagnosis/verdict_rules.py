@@ -57,14 +57,41 @@ AT_BOUND = 0.01
 class VerdictInputs:
     """What a verdict rests on.
 
-    candidates: every tested effect, the strongest first; implausible: values that no flow can have; held_out: errors at
-    held-out measurements over the expected ones [-], NaN without any, infinite without a flow; by_chance: what of that
-    errors alone exceed in 5 % of cases; neighbours: whether readings side by side are excluded; strained: the
-    parameter furthest off its prior, and how far [standard deviations]; between: errors between the sections over those
-    of the data [-]; carried: sections that clearly carry another discharge than stated; remainder: whether all
-    significant effects may be a remainder of what was accepted; surroundings: notes on the map, the measured stretch,
-    the depth and the parameters; excluded: effects that cannot act at the site, with the reason of each; hangs_on: the
-    section without which another name leads; bed: where it differs from the surveyed one, the clearest first.
+    Attributes
+    ----------
+    candidates
+        Every tested effect, the strongest first.
+    errors, misfit
+        As estimated, and of the model with all that was accepted.
+    steps, places, instruments, field, laws, model_error
+        What was accepted, or found beside it.
+    undecided
+        Hypotheses of which none leads.
+    implausible
+        Values that no flow can have.
+    not_excluded
+        Groups of effects among which one that is there undetected is.
+    held_out, by_chance
+        Errors at held-out measurements over the expected ones [-], NaN without any, infinite without a flow; and what of
+        that errors alone exceed in 5 % of cases.
+    neighbours
+        Whether readings side by side are excluded.
+    strained
+        The parameter furthest off its prior, and how far [standard deviations].
+    between
+        Errors between the sections over those of the data [-].
+    carried
+        Sections that clearly carry another discharge than stated.
+    significant_effects, remainder
+        Those that were not accepted, with p [-], and whether all of them may be a remainder of what was.
+    surroundings
+        Notes on the map, the measured stretch, the depth and the parameters.
+    excluded
+        Effects that cannot act at the site, with the reason of each.
+    hangs_on
+        The section without which another name leads.
+    bed
+        Where it differs from the surveyed one, the clearest first.
     """
 
     candidates: tuple[CandidateEffect, ...]
