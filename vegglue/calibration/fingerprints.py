@@ -113,8 +113,8 @@ class Fingerprints:
     places
         The spots of each term.
     lines, of_lines
-        Surveyed lines, and what a measurement exceeds its prediction by for each m that a line is too high (station, lines)
-        [unit of the station per m].
+        Surveyed lines, and what a measurement exceeds its prediction by for each m that a line is too high,
+        (station, lines) [unit of the station per m].
     """
 
     point: Point

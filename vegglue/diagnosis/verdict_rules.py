@@ -72,8 +72,8 @@ class VerdictInputs:
     not_excluded
         Groups of effects among which one that is there undetected is.
     held_out, by_chance
-        Errors at held-out measurements over the expected ones [-], NaN without any, infinite without a flow; and what of
-        that errors alone exceed in 5 % of cases.
+        Errors at held-out measurements over the expected ones [-], NaN without any, infinite without a flow; and what
+        of that errors alone exceed in 5 % of cases.
     neighbours
         Whether readings side by side are excluded.
     strained
