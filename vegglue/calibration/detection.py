@@ -13,8 +13,8 @@ of the parameters, U the columns of all shared errors (covariance D + U U') and 
 
     A = sum over pieces of X' X,   |S_perp|^2 = A_SS - A_SN (1 + A_NN)^-1 A_NS,   N = [J, U],
 
-since parameters and shared errors have standard normal priors (Woodbury's identity). With L L' = 1 + A_NN all other
-measurements are as if N were N L^-T and S were S - N (1 + A_NN)^-1 A_NS: given what is measured, n of them more add
+since parameters and shared errors have standard normal priors (Woodbury's identity). All other measurements are as if N
+were N (1 + A_NN)^(-1/2) and S were S - N (1 + A_NN)^-1 A_NS: given what is measured, n of them more add
 
     S' (1 + N N')^-1 S
 
@@ -25,7 +25,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from scipy.special import ndtr
 
 from vegglue.arrays import Array, Mask
@@ -182,13 +181,16 @@ class PossibleMeasurements:
         return np.asarray(np.sqrt(np.maximum(self.squares, 0.0)))
 
     def made(self, rows: np.ndarray) -> "PossibleMeasurements":
-        """With some of them made."""
-        of_errors, of_traces = self.nuisances[rows], self.traces[rows]
-        lower = np.linalg.cholesky(np.eye(of_errors.shape[1]) + of_errors.T @ of_errors)
-        mixed = scipy.linalg.solve_triangular(lower, of_errors.T @ of_traces, lower=True)
-        nuisances = scipy.linalg.solve_triangular(lower, self.nuisances.T, lower=True).T
-        squares = self.squares + (of_traces**2).sum(axis=0) - (mixed**2).sum(axis=0)
-        return PossibleMeasurements(squares, nuisances, self.traces - nuisances @ mixed)
+        """With some of them made, by the singular values of their nuisances: a product for each of them."""
+        left, strength, right = np.linalg.svd(self.nuisances[rows], full_matrices=False)
+        of_traces, shrunk = self.traces[rows], 1.0 / (1.0 + strength**2)
+        mixed, along = left.T @ of_traces, self.nuisances @ right.T
+        squares = (of_traces**2).sum(axis=0) - (strength**2 * shrunk) @ mixed**2
+        return PossibleMeasurements(
+            self.squares + squares,
+            self.nuisances - (along * (1.0 - np.sqrt(shrunk))) @ right,
+            self.traces - along @ ((strength * shrunk)[:, None] * mixed),
+        )
 
     def with_each(self, pieces: np.ndarray) -> Array:
         """Squares of |S_perp| with one of some pieces made, each of as many measurements: rows (m, n); (m, c)."""

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import logsumexp
 
 from vegglue.arrays import Array, Mask, Single
 from vegglue.calibration.detection import (
@@ -25,9 +24,10 @@ from vegglue.calibration.detection import (
 from vegglue.calibration.residual_screening import GROUPS
 from vegglue.calibration.score_test import HypothesisKind, Projected, prior_shrinkage, with_more_rows
 from vegglue.case.schema import Planned
+from vegglue.compilation import compiled
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import tempering
-from vegglue.diagnosis.plan_model import PlanDraw, PlanModel, bending_of, errors_at, place_along, ratios_of_lengths
+from vegglue.diagnosis.plan_model import PlanDraw, PlanModel, bending_of, place_along, ratios_of_lengths
 from vegglue.effects.definition import Amplitude
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.measurements.observations import section_places
@@ -38,6 +38,8 @@ from vegglue.results.plan import EffectsInGeneral, OneEffect, PlanQuestion, Prop
 NAMED_AT = np.array([0.0, 2.0, 3.0, 4.0, 4.75, 5.5, 6.5, 8.0, 11.0, 16.0, 24.0])
 # Draws of errors alone for each: a chance of 90 % is known to 2 %.
 NAMED_DRAWS = 192
+# Draws that are worked on together [-]: what is computed of them then fits the cache.
+DRAWS_AT_ONCE = 24
 # |cosine| with a trace below which a spot or an instrument keeps the evidence that it has under errors alone [-].
 UNLIKE = 0.3
 
@@ -54,7 +56,7 @@ class FirstCompetition:
     alike: Mask
     level: float
     owner: np.ndarray
-    only_sign: np.ndarray
+    only_sign: Single
     constant: Single
     factor: Single
     units: Single
@@ -66,42 +68,47 @@ class FirstCompetition:
         cosine = self.units.T @ truths.units.astype(np.float32)
         truth = draw % cosine.shape[1]
         own = self.only_sign[self.owner == effect]
-        sign = float(own[0]) if own.any() else np.where((draw // cosine.shape[1]) % 2 == 0, 1.0, -1.0)
+        both = np.where((draw // cosine.shape[1]) % 2 == 0, 1.0, -1.0)
+        sign = np.where(own.any(), own[0], both).astype(np.float32)
         near = (self.owner < self.effects) | (np.abs(cosine).max(axis=1) > UNLIKE)
-        quiet = np.exp(self._evidence(self.scores[:, ~near], ~near))
-        of_quiet = np.zeros((draw.size, self.effects + self.places.size))
-        _add_by_owner(of_quiet, quiet, self.owner[~near])
-        scores, shift = self.scores[:, near], (cosine[near][:, truth] * sign).T.astype(np.float32)
-        chances = [0.0]
-        for length in NAMED_AT[1:]:
-            evidence = self._evidence(scores + np.float32(length) * shift, near)
-            most = evidence.max(axis=1)[:, None]
-            evidence -= most
-            found = of_quiet * np.exp(-most.astype(float))
-            _add_by_owner(found, np.exp(evidence, out=evidence), self.owner[near])
-            chances.append(self._named(np.log(np.maximum(found, 1e-300)) + most, effect))
-        return np.array(chances)
+        scores, only_sign, factor, constant = (
+            part[..., near] for part in (self.scores, self.only_sign, self.factor, self.constant)
+        )
+        shift = np.ascontiguousarray(cosine[near].T)
+        owner, first = np.unique(self.owner[near], return_index=True)
+        evidence = np.empty((NAMED_AT.size - 1, draw.size, self.effects + self.places.size))
+        others = _sums_of_others(self.at_rest, near, self.owner, np.zeros(evidence.shape[1:]))
+        for beginning in range(0, draw.size, DRAWS_AT_ONCE):
+            rows = slice(beginning, beginning + DRAWS_AT_ONCE)
+            turned = shift[truth[rows]] * sign[rows, None]
+            for k, length in enumerate(NAMED_AT[1:].astype(np.float32)):
+                of_each = _shifted_evidence(length, scores[rows], turned, only_sign, factor, constant)
+                most = of_each.max(axis=1)[:, None]
+                of_each -= most
+                sums = others[rows] * np.exp(-most.astype(float))
+                sums[:, owner] += np.add.reduceat(np.exp(of_each, out=of_each), first, axis=1)
+                evidence[k, rows] = np.log(np.maximum(sums, 1e-300)) + most
+        return np.array([0.0, *(self._named(one, effect) for one in evidence)])
 
-    def _evidence(self, scores: Single, columns: Mask) -> Single:
-        """ln evidence of some columns (draws, k), in the memory of their scores."""
-        sign = self.only_sign[columns]
-        scores[:, sign > 0] = np.maximum(scores[:, sign > 0], 0.0)
-        scores[:, sign < 0] = np.minimum(scores[:, sign < 0], 0.0)
-        scores *= scores
-        scores *= self.factor[columns]
-        scores += self.constant[columns]
-        return scores
+    @cached_property
+    def at_rest(self) -> Single:
+        """Evidence of each column under errors alone (draws, k)."""
+        nothing = np.zeros_like(self.scores)
+        parts = self.only_sign, self.factor, self.constant
+        return np.asarray(np.exp(_shifted_evidence(np.float32(0.0), self.scores, nothing, *parts)))
 
     def _named(self, evidence: Array, effect: int) -> float:
         """Share of the draws in which an effect is named, of ln evidence (draws, hypotheses)."""
-        chance = np.exp((evidence - evidence.max(axis=1)[:, None]) / tempering(evidence))
+        most = evidence.max(axis=1)[:, None]
+        of_any = most[:, 0] + np.log(np.exp(evidence - most).sum(axis=1))
+        chance = np.exp((evidence - most) / tempering(evidence))
         chance /= chance.sum(axis=1)[:, None]
         listed, others = chance[:, : self.effects], evidence[:, self.effects :]
         best = evidence[:, : self.effects].max(axis=1)
         of_places = others[:, self.places].max(axis=1, initial=-np.inf)
         of_instruments = others[:, ~self.places].max(axis=1, initial=-np.inf)
         taken = (of_places - best) / tempering(of_places) < np.log(constants().known_first_odds)
-        taken &= (best >= of_instruments) & (logsumexp(evidence, axis=1) >= self.level)
+        taken &= (best >= of_instruments) & (of_any >= self.level)
         # The groups that are likelier than its own hold less than set_chance.
         groups = listed @ self.alike
         likelier = (groups > groups[:, effect][:, None]) & ~self.alike[effect]
@@ -110,11 +117,28 @@ class FirstCompetition:
         return float(np.mean(taken & inside))
 
 
-def _add_by_owner(sums: Array, values: Single, owner: np.ndarray) -> None:
-    """Add columns of values (draws, k) to the sums of their owners (draws, hypotheses); owners are in order."""
-    if owner.size:
-        some, first = np.unique(owner, return_index=True)
-        sums[:, some] += np.add.reduceat(values, first, axis=1)
+@compiled
+def _shifted_evidence(
+    length: np.float32, scores: Single, shift: Single, only_sign: Single, factor: Single, constant: Single
+) -> Single:
+    """ln evidence (draws, k) of scores shifted by a length times `shift`, with the only sign that they count with."""
+    found = np.empty_like(scores)
+    for draw in range(scores.shape[0]):
+        for k in range(scores.shape[1]):
+            score = scores[draw, k] + length * shift[draw, k]
+            score = np.float32(0.0) if only_sign[k] * score < np.float32(0.0) else score
+            found[draw, k] = constant[k] + factor[k] * score * score
+    return found
+
+
+@compiled
+def _sums_of_others(values: Single, left_out: Mask, owner: np.ndarray, sums: Array) -> Array:
+    """Sums of values (draws, k) by owner (draws, hypotheses), without some columns, added to `sums`."""
+    for draw in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            if not left_out[k]:
+                sums[draw, owner[k]] += values[draw, k]
+    return sums
 
 
 def first_competition(
@@ -160,7 +184,7 @@ def first_competition(
         alike=likeness[np.ix_(first, first)],
         level=level,
         owner=np.repeat(np.arange(effects + len(of_others)), [*(one.size for one in columns), *of_others]),
-        only_sign=np.concatenate([one.only_sign for one in kinds]),
+        only_sign=np.concatenate([one.only_sign for one in kinds]).astype(np.float32),
         constant=np.concatenate([one.of_scores(np.zeros(one.size.size)) for one in kinds]).astype(np.float32),
         factor=(0.5 * prior_shrinkage(size)).astype(np.float32),
         units=units,
@@ -440,11 +464,10 @@ def plan_search(
     measured = np.concatenate([wide.known, wide.surveyed])
 
     def at(draw: PlanDraw) -> PossibleMeasurements:
-        variance, nuisances = errors_at(wide, draw, np.arange(wide.error.size))
         traces = draw.values[:, kept] * gains
         if isinstance(question, TwoEffects):
             traces = np.column_stack([traces, traces.sum(axis=1)])
-        return possible_measurements(variance, nuisances, traces).made(measured)
+        return possible_measurements(*draw.errors, traces).made(measured)
 
     return PlanSearch(
         wide=wide,
