@@ -25,6 +25,7 @@ from vegglue.decision_constants import constants
 from vegglue.diagnosis.next_measurement import AS_MEASURED, with_other_discharges
 from vegglue.engine.interface import Cause, Model, Point, linearise, linearise_from, responses
 from vegglue.engine.model import coarser
+from vegglue.engine.newton import on_half_as_many_cells
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import KINDS, STREAMWISE
 from vegglue.measurements.observations import section_places, station_table
@@ -56,9 +57,9 @@ TWELFTHS, MOST_ADDED_PLACES, MOST_PATCHES = 12, 20, 8
 
 @dataclass(frozen=True)
 class PlanDraw:
-    """A place of the prior on some cells: the slopes (N, p), fingerprints of one setting of each candidate (N, k) and
-    shared errors (N, q) of all rows: stations of the plan and of what could be added, and behind them the bed levels of
-    lines that could be surveyed.
+    """A place of the prior on some cells: the slopes (N, p), fingerprints of one setting of each candidate (N, k),
+    shared errors (N, q), and errors as `errors_of` gives them of all rows: stations of the plan and of what could be
+    added, and behind them the bed levels of lines that could be surveyed.
     """
 
     model: Model
@@ -66,6 +67,7 @@ class PlanDraw:
     slope: Array
     values: Array
     shared: Array
+    errors: tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -330,7 +332,9 @@ def _plan_model(
             across = whole[piece.place].y
             rows.append(first[piece.place] + np.array([across.index(y) for y in piece.y] or [0]))
     on_coarse = coarser(here)
-    search = on_coarse if on_coarse is not None and cells_across(on_coarse.site) >= FEWEST_CELLS_ACROSS else here
+    # A diagnosis knows no error of the grid where cells of just twice the size do not fit.
+    half = on_coarse or on_half_as_many_cells(here)
+    search = half if half is not None and cells_across(half.site) >= FEWEST_CELLS_ACROSS else here
     other = here if search is on_coarse else on_coarse
     candidates = candidates_of(model.case, stations)
 
@@ -357,6 +361,7 @@ def _plan_model(
                 difference[(kind == name) & ~np.isfinite(difference)] = usual
     of_stations = here.station["standard_error"].to_numpy(float)
     error = np.concatenate([of_stations, np.full(len(places), planned.errors.survey)])
+    grid_error = constants().grid_error_share * np.concatenate([difference, np.zeros(len(places))])
     settings = [(one, shapes) for one in candidates for shapes in one.settings()]
     shaped = [j for j, one in enumerate(candidates) if len(one.settings()) > 1]
     seeds = [(j, k) for j in shaped for k in range(SETTINGS_BETWEEN)]
@@ -366,12 +371,13 @@ def _plan_model(
     one_each = np.array([columns[columns.size // 2] for columns in setting_columns(candidates)], dtype=int)
 
     def draw(of: Model, point: Point, values: Array | None = None) -> PlanDraw:
-        shared = model_error_columns(of, point, of.case.model_error)
+        of_model = model_error_columns(of, point, of.case.model_error)
         if values is None:
             values = _with_rows(responses(of, point, _causes(of, [settings[j] for j in one_each])), len(places))
-        levels = _bed_levels(of, np.reshape(places, (-1, 2)), shared.shape[1])
+        levels = _bed_levels(of, np.reshape(places, (-1, 2)), of_model.shape[1])
         slope = _with_rows(np.nan_to_num(point.slope), len(places))
-        return PlanDraw(of, point, slope, values, np.vstack([shared, levels]))
+        shared = np.vstack([of_model, levels])
+        return PlanDraw(of, point, slope, values, shared, errors_of(error, grid_error, slope, shared))
 
     def drawn(z: Array) -> PlanDraw | None:
         point = below if z is middle else linearise_from(coarsest, z, below)
@@ -387,7 +393,7 @@ def _plan_model(
         pieces=tuple(possible),
         rows=tuple(rows),
         error=error,
-        grid_error=constants().grid_error_share * np.concatenate([difference, np.zeros(len(places))]),
+        grid_error=grid_error,
         candidates=tuple(candidates),
         values=every[:, : len(settings)],
         between=every[:, len(settings) :],
@@ -397,14 +403,19 @@ def _plan_model(
     )
 
 
-def errors_at(wide: PlanModel, draw: PlanDraw, rows: np.ndarray) -> tuple[Array, Array]:
-    """Own variances (n,) of some rows at a draw, and what calibration and shared errors, those of the grid among them,
-    can do there (n, q).
+def errors_of(error: Array, grid_error: Array, slope: Array, shared: Array) -> tuple[Array, Array]:
+    """Own variances (n,) of some rows, and what calibration and shared errors, those of the grid among them, can do
+    there (n, q); of standard errors and errors of the grid (n,), slopes (n, p) and shared errors (n, k).
     """
-    of_grid, correlation = wide.grid_error[rows], constants().grid_error_correlation
-    shared = np.column_stack([np.sqrt(correlation) * of_grid, draw.shared[rows]])
-    variance, patterns = own_and_shared(wide.error[rows] ** 2 + (1.0 - correlation) * of_grid**2, shared)
-    return variance, np.hstack([draw.slope[rows], patterns])
+    correlation = constants().grid_error_correlation
+    together = np.column_stack([np.sqrt(correlation) * grid_error, shared])
+    variance, patterns = own_and_shared(error**2 + (1.0 - correlation) * grid_error**2, together)
+    return variance, np.hstack([slope, patterns])
+
+
+def errors_at(wide: PlanModel, draw: PlanDraw, rows: np.ndarray) -> tuple[Array, Array]:
+    """`errors_of` some rows at a draw."""
+    return errors_of(wide.error[rows], wide.grid_error[rows], draw.slope[rows], draw.shared[rows])
 
 
 def relative_lengths(wide: PlanModel) -> Array:
