@@ -43,10 +43,10 @@ from vegglue.flow.jacobian import (
 from vegglue.flow.local_changes import Term, with_changed_term
 from vegglue.flow.march import fall_back, march_to_rest
 from vegglue.flow.newton import CLOSE
-from vegglue.flow.problem import EMPTY, Problem, crop
+from vegglue.flow.problem import EMPTY, Problem, crop, take
 from vegglue.flow.problem_setup import build_problem, with_effects_of
 from vegglue.flow.reference_member import settled
-from vegglue.flow.sensor import predictions_at_sensors, reading_weights
+from vegglue.flow.sensor import predictions_at_sensors, predictions_under_effects, reading_weights
 from vegglue.flow.starts import backwater, between_cells, on_grid
 from vegglue.flow.status import FAILED
 from vegglue.flow.tangent import CAUSE_SLOTS, adjoints, tangents
@@ -80,6 +80,8 @@ SMALL_CHANGE: dict[Term, float] = {
     "friction": 1e-3, "drag": 1e-5, "bed": 1e-4, "inflow": 1e-6, "viscosity": 1e-4, "mixing": 1e-2,
     "advection": 1e-3,
 }  # fmt: skip
+# Stages of effects that move a flow and nothing else that a reading without effects on instruments depends on.
+UNSEEN_BY_SENSORS = {"plants", "resistance", "exchange", "force"}
 # Sites on half as many cells each way, by the site on its own.
 _ON_COARSER_CELLS: WeakKeyDictionary[Site, Site | None] = WeakKeyDictionary()
 
@@ -313,12 +315,12 @@ def responses_by_tangents(model: Model, point: Point, causes: Sequence[Cause]) -
 def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[Cause]) -> Array:
     """Responses in one experiment, (stations of it, causes), to causes that act in it."""
     flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), model.rows[experiment]
-    found = np.zeros((rows.size, len(causes)))
     whole = problem_at(model, experiment, point.z)
     base = crop(whole, *flow.band)
     without_cause = residual(base, flow.state)
     built, changes = [], np.zeros((*flow.state.shape[:3], len(causes)))
-    moving = [column for column, cause in enumerate(causes) if stages_of(cause.case, cause.parameter) != {"sensor"}]
+    stages = [stages_of(cause.case, cause.parameter) for cause in causes]
+    moving = [column for column, some in enumerate(stages) if some != {"sensor"}]
     for column, cause in enumerate(causes):
         amplitude = cause.amplitude
         gain, value = amplitude.gain(amplitude.off + amplitude.small), np.array([amplitude.off + amplitude.small])
@@ -326,12 +328,23 @@ def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[
         if column in moving:
             changes[..., column] = ((residual(crop(problem, *flow.band), flow.state) - without_cause) / gain)[..., 0]
         built.append((problem, gain))
-    changes[..., moving] = tangents(base, flow.state, flow.factors, changes[..., moving], TANGENT_TOLERANCE)
-    for column, (problem, gain) in enumerate(built):
-        state = flow.state + gain * changes[..., column : column + 1]
-        now = _read(model, experiment, problem, state, flow.band)[0]
-        found[:, column] = (now - point.prediction[rows]) / gain
-    return found
+    gains = np.array([gain for _, gain in built])
+    if moving:
+        changes[..., moving] = tangents(base, flow.state, flow.factors, changes[..., moving], TANGENT_TOLERANCE)
+    untouched = not any(active.effect.stage == "sensor" for active in whole.effects)
+    alike = [column for column in moving if untouched and stages[column] <= UNSEEN_BY_SENSORS]  # read at once
+    states, now = flow.state + gains * changes, np.empty((len(causes), rows.size))
+    if alike:
+        now[alike] = _read(
+            model, experiment, take(whole, np.zeros(len(alike), dtype=np.int64)), states[..., alike], flow.band
+        )
+    for column in set(moving) - set(alike):
+        now[column] = _read(model, experiment, built[column][0], states[..., [column]], flow.band)[0]
+    if at_rest := [column for column in range(len(causes)) if column not in moving]:
+        state, of_each = widen(flow.state, flow.rows, flow.band), [built[column][0].effects for column in at_rest]
+        station = model.stations[experiment]
+        now[at_rest] = predictions_under_effects(whole, state, model.site.grid, station, of_each)
+    return np.asarray((now - point.prediction[rows]).T / gains)
 
 
 def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:

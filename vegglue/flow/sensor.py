@@ -3,7 +3,7 @@
 `READERS` has one entry for each kind of `measurements/kinds.py`.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.grid import Grid
-from vegglue.effects.active_effect import applied
+from vegglue.effects.active_effect import ActiveEffect, applied
 from vegglue.effects.physical_constants import FILM_ON_LAND
 from vegglue.effects.surroundings import Reading, across
 from vegglue.flow.closures import bent_plants, closures
@@ -255,13 +255,31 @@ def predictions_at_sensors(problem: Problem, state: Array, grid: Grid, station: 
     return _predictions(GriddedFlow(problem, state, grid), station)
 
 
+def predictions_under_effects(
+    problem: Problem, state: Array, grid: Grid, station: pd.DataFrame, effects: Sequence[tuple[ActiveEffect, ...]]
+) -> Array:
+    """`predictions_at_sensors` of one flow (nx, 3, ny, 1) under each set of effects, which differ on instruments alone:
+    (set, station).
+    """
+    flow = GriddedFlow(problem, state, grid)
+    value = _without_effects(flow, station)
+    around = _around_stations(flow, value, station)
+    return np.array([_after_effects(one, value, around, station)[:, 0] for one in effects])
+
+
 def _predictions(flow: GriddedFlow, station: pd.DataFrame) -> Array:
-    prediction = np.empty((len(station), flow.problem.members))
+    value, effects = _without_effects(flow, station), flow.problem.effects
+    if any(active.effect.stage == "sensor" for active in effects):
+        value = _after_effects(effects, value, _around_stations(flow, value, station), station)
+    return value.T
+
+
+def _without_effects(flow: GriddedFlow, station: pd.DataFrame) -> Array:
+    """Readings (station, m) of instruments without effects."""
+    value = np.empty((len(station), flow.problem.members))
     for kind, rows, x, y in _by_kind(station):
-        prediction[rows] = READERS[kind.name].read(flow, x, y)
-    if any(active.effect.stage == "sensor" for active in flow.problem.effects):
-        prediction = _after_effects(flow, prediction, station)
-    return prediction.T
+        value[rows] = READERS[kind.name].read(flow, x, y)
+    return value
 
 
 def read_sensors(
@@ -314,8 +332,8 @@ def _by_kind(station: pd.DataFrame) -> Iterator[tuple[Kind, NDArray[np.intp], Ar
         yield kind_of(str(name)), rows, x[rows], y[rows]
 
 
-def _after_effects(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Array:
-    """Readings (station, m) after the effects of the stage sensor, each where it acts."""
+def _around_stations(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> dict[str, Array]:
+    """What an effect on instruments sees at each station beside its reading: the rest of a `Reading`."""
     problem, now = flow.problem, flow.at_faces
     plants, among = problem.plants, np.zeros_like(now.cell)
     depth = now.cell[plants.column, plants.row]
@@ -333,14 +351,20 @@ def _after_effects(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> Ar
             velocity[rows], component[rows] = 1.0, value[rows]
             component_y[rows] = READERS[kind.name].slope_across(flow, of_x, of_y)
     there |= {"velocity": velocity, "level": level, "component": component, "component_y": component_y}
-    there |= {"x": x[:, None], "y": y[:, None]}
-    for active in problem.effects:
+    return there | {"x": x[:, None], "y": y[:, None]}
+
+
+def _after_effects(
+    effects: Sequence[ActiveEffect], value: Array, around: Mapping[str, Array], station: pd.DataFrame
+) -> Array:
+    """Readings (station, m) after the effects of the stage sensor, each where it acts."""
+    for active in effects:
         at = np.ones(len(station), dtype=bool)
         if active.sections:
             at &= station["section"].isin(active.sections).to_numpy()
         if active.devices:
             at &= station["device"].isin(active.devices).to_numpy()
-        reading = Reading(value=value, **there)
+        reading = Reading(value=value, **around)
         value = np.where(at[:, None], applied((active,), "sensor", reading, {"value": value})["value"], value)
     return value
 
