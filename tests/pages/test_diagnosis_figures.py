@@ -32,7 +32,7 @@ from vegglue.pages.diagnosis_figures import (
 from vegglue.pages.flow_maps import Outline
 from vegglue.pages.headline import Headline, candidate_rows, candidate_status, diagnosis_section, rms_residual
 from vegglue.pages.ladder_figure import LINES, draw_errors, draw_ladder, save_ladder_figure
-from vegglue.pages.style import COLOUR
+from vegglue.pages.svg import COLOUR
 from vegglue.results.causes import Step
 from vegglue.results.diagnosis import Diagnosis, Predictions
 from vegglue.results.loop_results import ComparedModel, HeldOut, InSample, ModelComparison, ModelScore, PredictiveScores

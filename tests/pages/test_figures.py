@@ -24,7 +24,8 @@ from vegglue.pages.posterior_figures import (
     draw_marginal,
     draw_weights,
 )
-from vegglue.pages.style import COLOUR, PALETTE, inline, publish, publish_text
+from vegglue.pages.style import publish, publish_text
+from vegglue.pages.svg import COLOUR, PALETTE, inline
 from vegglue.wording.numbers import (
     as_given,
     fixed,

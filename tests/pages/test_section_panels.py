@@ -10,7 +10,7 @@ import pytest
 from vegglue.pages.flow_maps import first_crossing
 from vegglue.pages.page import DrawnInterval, draw_interval_rows
 from vegglue.pages.sections import PanelGround, SectionPanel, draw_panel, value_range
-from vegglue.pages.style import COLOUR, area_between, line_through, round_ticks, svg_words, tick_labels, within_width
+from vegglue.pages.svg import COLOUR, area_between, line_through, round_ticks, svg_words, tick_labels, within_width
 
 SVG = "{http://www.w3.org/2000/svg}"
 GROUND = PanelGround(np.arange(-3.0, 3.5, 0.5), np.abs(np.arange(-3.0, 3.5, 0.5)), np.arange(13) > 6)

@@ -8,7 +8,8 @@ from blind_lines import Told, interval
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from vegglue.pages.style import COLOUR, SMALL, WIDTH, styled
+from vegglue.pages.style import SMALL, WIDTH, styled
+from vegglue.pages.svg import COLOUR
 
 # By truth: its label and its colour.
 TRUTHS = {"second": ("second solver", COLOUR["measured"]), "own": ("own equations", COLOUR["model"])}

@@ -19,7 +19,8 @@ from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of
 from vegglue.measurements.observations import Observations
-from vegglue.pages.style import COLOUR, SMALL, canvas, label, save, styled
+from vegglue.pages.style import SMALL, canvas, label, save, styled
+from vegglue.pages.svg import COLOUR
 from vegglue.wording.sentences import phrase
 
 # Half of the width of a letter, of a line and of a point in a plan 9.4 inches wide, over the axes [-].

@@ -22,7 +22,8 @@ from vegglue.pages.flow_maps import Outline
 from vegglue.pages.headline import Headline, candidate_rows, rms_residual
 from vegglue.pages.place_maps import bed_picture, field_picture, outlines, paint_places, place_picture, plan_marks
 from vegglue.pages.run import Run, accepted_causes, published_picture
-from vegglue.pages.style import COLOUR, HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, save, styled
+from vegglue.pages.style import HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, save, styled
+from vegglue.pages.svg import COLOUR
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.wording.numbers import fixed, section_in_words, unit_math
 from vegglue.wording.sentences import phrase, sentence

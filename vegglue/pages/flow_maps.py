@@ -17,10 +17,9 @@ from vegglue.flow.sensor import FlowFields
 from vegglue.measurements.kinds import WATER_LEVEL
 from vegglue.normal_range import NORMAL95
 from vegglue.pages.run import SYNTHETIC, Run, file_name, is_synthetic, planted_cells, published_picture
-from vegglue.pages.style import (
+from vegglue.pages.style import EDGE_COLOUR, Picture
+from vegglue.pages.svg import (
     COLOUR,
-    EDGE_COLOUR,
-    Picture,
     Scale,
     area_between,
     line_through,

@@ -13,7 +13,8 @@ from matplotlib.ticker import LogFormatter
 from vegglue.arrays import Array
 from vegglue.diagnosis.comparison import held_out_rmse, improvement
 from vegglue.inference.homogeneity import differing
-from vegglue.pages.style import COLOUR, SMALL, WIDTH, canvas, label, save, styled
+from vegglue.pages.style import SMALL, WIDTH, canvas, label, save, styled
+from vegglue.pages.svg import COLOUR
 from vegglue.results.loop_results import ModelComparison, ModelScore
 from vegglue.wording.numbers import fixed, short
 from vegglue.wording.sentences import phrase

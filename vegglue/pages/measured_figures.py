@@ -17,7 +17,8 @@ from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.observations import fitted_curve
 from vegglue.normal_range import NORMAL95
 from vegglue.pages.run import Run, published_picture, station_zones
-from vegglue.pages.style import COLOUR, HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, styled
+from vegglue.pages.style import HEIGHT, SMALL, WIDTH, Picture, canvas, formula_labels, label, styled
+from vegglue.pages.svg import COLOUR
 from vegglue.wording.numbers import as_given, plus_minus, unit_math
 from vegglue.wording.sentences import phrase
 

@@ -29,14 +29,13 @@ from vegglue.pages.parameters import (
 )
 from vegglue.pages.posterior_figures import pictures
 from vegglue.pages.run import Run, file_name, is_synthetic
-from vegglue.pages.style import (
+from vegglue.pages.style import Picture, publish_text
+from vegglue.pages.svg import (
     COLOUR,
     FEWEST_TICKS,
-    Picture,
     axis_below,
     linear_scale,
     palette_css,
-    publish_text,
     round_ticks,
     svg_document,
     svg_element,

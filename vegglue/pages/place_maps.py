@@ -17,7 +17,8 @@ from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of
 from vegglue.pages.flow_maps import Outline
 from vegglue.pages.run import Run, published_picture
-from vegglue.pages.style import COLOUR, EDGE_COLOUR, SMALL, WIDTH, Picture, canvas, label, styled
+from vegglue.pages.style import EDGE_COLOUR, SMALL, WIDTH, Picture, canvas, label, styled
+from vegglue.pages.svg import COLOUR
 from vegglue.results.causes import UNIT_OF_FIELD
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.wording.sentences import phrase

@@ -11,7 +11,7 @@ from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import Interval
 from vegglue.case.zones import corners_of
-from vegglue.pages.style import (
+from vegglue.pages.svg import (
     COLOUR,
     Scale,
     inline,

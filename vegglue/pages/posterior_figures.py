@@ -20,18 +20,8 @@ from vegglue.pages.flow_maps import plans
 from vegglue.pages.measured_figures import canopy_profiles, discharges, residuals, verticals
 from vegglue.pages.parameters import ParameterRow, as_power, parameter_rows, plant_parameter, study_value, symbols_of
 from vegglue.pages.run import Run, published_picture
-from vegglue.pages.style import (
-    COLOUR,
-    FEWEST_TICKS,
-    HEIGHT,
-    WIDTH,
-    Picture,
-    canvas,
-    formula_labels,
-    label,
-    round_ticks,
-    styled,
-)
+from vegglue.pages.style import HEIGHT, WIDTH, Picture, canvas, formula_labels, label, styled
+from vegglue.pages.svg import COLOUR, FEWEST_TICKS, round_ticks
 from vegglue.wording.numbers import no_formula, symbol_math, unit_math
 from vegglue.wording.sentences import phrase
 

@@ -15,9 +15,9 @@ from vegglue.case.text_files import unused
 from vegglue.measurements.kinds import STREAMWISE, Kind, kind_of, velocity_rows
 from vegglue.normal_range import NORMAL95
 from vegglue.pages.run import SYNTHETIC, Run, accepted_causes, file_name, is_synthetic, planted_cells, published_picture
-from vegglue.pages.style import (
+from vegglue.pages.style import Picture
+from vegglue.pages.svg import (
     COLOUR,
-    Picture,
     area_between,
     line_through,
     linear_scale,
