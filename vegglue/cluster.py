@@ -96,10 +96,10 @@ def on_cluster(where: str | None) -> Iterator[None]:
             address = stack.enter_context(here)
         try:
             client = Client(address, timeout=LONGEST_WAIT, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:
+        except (OSError, ValueError, TypeError):
             raise InputError(
-                f"--cluster: expected a Dask scheduler that answers within {LONGEST_WAIT} s at {where}, got "
-                f"{_first_line(error)}; start one with `dask scheduler`, correct the address, or use local:N."
+                f"--cluster: expected a Dask scheduler that answers within {LONGEST_WAIT} s at {where}, got none; "
+                "start one with `dask scheduler`, correct the address, or use local:N."
             ) from None
         stack.enter_context(client)
         refuse_other_versions(client)

@@ -72,6 +72,32 @@ def test_the_version_is_one_word(
     assert capsys.readouterr().out == f"{VERSION}\n"
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (("simulate", "x.yaml", "--members", "-1"), ("--members", "at least 1", "'-1'")),
+        (("simulate", "x.yaml", "--jobs", "two"), ("--jobs", "a whole number", "'two'")),
+        (("new", "x", "--length", "wide"), ("--length", "a number", "'wide'")),
+        (("export", "x.yaml", "--to", "spoty"), ("--to", "'spoty'", "'spotpy'")),
+        (("check", "x.yaml", "--job", "2"), ("--job",)),
+        (("check",), ("CONFIG",)),
+    ],
+    ids=lambda part: part[-1],
+)
+def test_what_an_option_does_not_take_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    """In words of ours: none of the library that reads values."""
+    monkeypatch.setattr(sys, "argv", ["vegglue", *line])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert all(word in said for word in words)
+    assert "Input should" not in said
+    assert "Value error" not in said
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("user")

@@ -297,7 +297,7 @@ def test_import_reports_which_measurements_lack_errors(
     folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv="x;y;Vx (cm/s)\n8;0;21\n")
     code, printed = said_to(monkeypatch, capsys, "import", "brook", "--quiet")
     assert code == 0
-    for word in ("`infer`", "1 of velocity", "x = 8, y = 0 m", "`u_se`", "0.015 m/s"):
+    for word in ("`infer`", "1 value of velocity", "x = 8, y = 0 m", "`u_se`", "0.015 m/s"):
         assert word in printed
 
 

@@ -294,6 +294,21 @@ def test_a_record_in_beams_or_without_its_rate_is_refused(tmp_path: Path, headin
         read_nortek(path, PROBE)
 
 
+@pytest.mark.parametrize(
+    ("line", "kind", "got"), [("1 0.4 0.1", "ragged_record", 3), ("x" + " 1" * 18, "no_number", "x")]
+)
+def test_a_row_of_a_record_that_is_no_row_of_numbers_is_named(
+    tmp_path: Path, line: str, kind: str, got: int | str
+) -> None:
+    record = vectrino((0.4, 0.0, 0.0), 0.01, 100, bad=0).splitlines()
+    width = len(record[0].split())
+    path = written(tmp_path / "p.dat", "\n".join([record[0], " ".join(line.split()[:width]), *record[2:]]))
+    written(tmp_path / "p.hdr", VECTRINO_HEADING)
+    with pytest.raises(InputError) as caught:
+        read_nortek(path, PROBE)
+    assert (caught.value.kind, caught.value.values["row"], caught.value.values["got"]) == (kind, 2, got)
+
+
 @pytest.mark.parametrize("unit", ["m", "ft"])
 def test_a_transect_of_a_riversurveyor_becomes_stations(tmp_path: Path, unit: str) -> None:
     riversurveyor_mat(tmp_path / "t.mat", unit)

@@ -173,7 +173,7 @@ def test_files_without_turbulence_and_duration_still_get_errors(tmp_path):
     ("line", "words"),
     [
         ("D3a,p,102,4.0,-3.5,fast,0.1,100", "u, .*'fast'"),
-        ("D3a,p,102,4.0,-3.5,,0.1,100", "u, .*''"),
+        ("D3a,p,102,4.0,-3.5,,0.1,100", "u, .*nothing"),
         ("D3a,p,102,4.0,-3.5,NaN,0.1,100", "u, .*'NaN'"),
         ("D3a,p,102,4.0,-3.5,inf,0.1,100", "u, .*'inf'"),
         ("D3a,p,102,4.0,-3.6,0.4,0.1,100", "case, x, y, z .* row 2"),
@@ -194,9 +194,9 @@ def test_a_wrong_row_is_refused_by_file_and_row(tmp_path, line, words):
 def test_wrong_files_are_refused(tmp_path):
     row = "D3a,p,102,4.0,-3.6,0.3,0.1,100\n"
     for text, words in (
-        (POINTS.replace("z", "altitude") + row, r"row 1: .* without z"),
+        (POINTS.replace("z", "altitude") + row, r"row 1: .*z is missing"),
         (POINTS, r"measured\.csv"),
-        ("", r"row 1: .*without case"),
+        ("", r"case, .*an empty file"),
         (POINTS + row.replace("D3a", "D9"), "'D3a', .* D9"),
     ):
         with pytest.raises(InputError, match=words):
@@ -259,7 +259,7 @@ def test_the_case_names_or_chooses_the_rows_of_a_file(tmp_path):
         ("experiment,section,x,y,u\nD9,S1,1,2,0.3\n", "row 2: .*D3a"),
         ("experiment,section,x,y,u,u_se\nD3a,S1,1,2,0.3,-1\n", "row 2: .*u_se"),
         ("experiment,section,x,y,u\nD3a,S1,1,2,0.3\nD3a,S1,1,2,0.4\n", "row 3: .*experiment, section, x, y"),
-        ("experiment,section,x,y,v\nD3a,S1,1,2,0.3\n", "row 1: .*without u"),
+        ("experiment,section,x,y,v\nD3a,S1,1,2,0.3\n", "row 1: .*u is missing"),
         ("experiment,section,x,y,u,u_se\nD3a,A,402,5,0.5,1e-300\n", r"row 2: .*u_se .*1e-09 to 1e\+09"),
         ("experiment,section,x,y,u,u_se\nD3a,A,402,5,0.5,1e300\n", r"row 2: .*u_se .*1e-09 to 1e\+09"),
         ("experiment,section,x,y,u,u_se\nD3a,A,402,5,1e160,0.1\n", r"row 2: .* u .*1e\+09"),

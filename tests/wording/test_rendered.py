@@ -445,21 +445,44 @@ REFUSED = [
     InputError("file_too_large", file=CSV, most=1_000_000, got=2_000_000, result=False),
     InputError("file_too_large", file=Path("map.nc"), most=1_000_000, got=2_000_000, result=True),
     InputError("library_missing", file=Path("a.xlsx"), library="openpyxl", extra="field", instead="CSV"),
-    InputError("unreadable_as", file=Path("a.xlsx"), kind="workbook", why="File is not a zip file"),
+    *(
+        InputError("option_value", option=option, expected=expected, choice=choice, got=got)
+        for option, expected, choice, got in (
+            ("--jobs", "a whole number", "", "two"), ("--to", "", "'spoty' is not one of 'pest', 'spotpy'.", "spoty")
+        )
+    ),
+    *(
+        InputError("invalid_json", file=Path("site.json"), line=2, column=14, why=why)
+        for why in ("Expecting property name enclosed in double quotes", "Extra data", "of another version of Python")
+    ),
+    InputError("no_geojson", file=Path("p.geojson"), what="polygons"),
+    *(
+        InputError("missing_columns", file=CSV, wanted=("x", "y", "u"), got=got, missing=missing)
+        for got, missing in ((["x", "y", "v"], ["u"]), (["x"], ["y", "u"]), ([], ["x", "y", "u"]))
+    ),
+    InputError("ragged_record", file=Path("a.dat"), row=2, fields=18, got=17),
+    *(
+        InputError("option_of_records", file=Path(name), option="position", records="records of a probe", dat=dat)
+        for name, dat in (("a.dat", True), ("a.csv", False))
+    ),
+    *(
+        InputError("unreadable_as", file=Path(name), kind=kind, why="File is not a zip file")
+        for name, kind in (("a.xlsx", "workbook"), ("map.nc", "result"))
+    ),
     InputError("other_structures", file=Path("a.mat"), kind="QRev", why="no transects"),
     InputError("binary_record", file=Path("a.vec"), nortek=True, ending=".vec"),
     InputError("binary_record", file=Path("a.r00"), nortek=False, ending=".r00"),
     InputError("no_table", file=CSV), InputError("no_sheet", file=Path("a.xlsx"), sheet="May", got=["April", "June"]),
     InputError("no_number", **AT_ROW, column="u", got="x", why="no number"),
     InputError("no_number", **AT_ROW, column="u", got="0,5", why="point"),
-    InputError("no_number", **AT_ROW, column="u", got="u", why=""),
+    *(InputError("no_number", **AT_ROW, column="u", got=got, why="") for got in ("u", "")),
     InputError("no_name", **AT_ROW, column="case", got=""),
     InputError("unprintable_name", **AT_ROW, column="case", got="\x1b"),
     InputError("unknown_name", **AT_ROW, column="experiment", known=["low", "high"], got="mid"),
     InputError("out_of_bounds", **AT_ROW, column="u_std", got=0.0, above=0.0),
     InputError("out_of_bounds", **AT_ROW, column="u_se", got=-0.1, least=0.0),
     InputError("out_of_bounds", **AT_ROW, column="u", got=1e12, most=1e9),
-    InputError("odd_error", **AT_ROW, column="u_se", got=1e-12, least=1e-9, most=1e9),
+    *(InputError("odd_error", **AT_ROW, column="u_se", got=got, least=1e-9, most=1e9) for got in (1e-12, -0.01)),
     InputError("other_x", **AT_ROW, column="x", case="low/S1", first=2.0, got=2.5),
     InputError("other_width", **AT_ROW, fields=4, got=5, headed=True, commas=True),
     InputError("other_width", **AT_ROW, fields=4, got=5, headed=False, commas=False),

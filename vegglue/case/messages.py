@@ -65,10 +65,18 @@ def expected_in_words(problem: Mapping[str, Any]) -> str:
         return phrase("expected_at_most", problem["ctx"]["max_length"])
     if problem["type"] == "missing":
         return "a value"
+    if problem["type"] in ("int_parsing", "int_from_float"):
+        return "a whole number"
+    if problem["type"] == "float_parsing":
+        return "a number"
     expected = problem["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if problem["type"] not in ("value_error", "literal_error"):
-        for short, whole in (("greater", "a number greater"), ("less", "a number less"), ("valid number", "number")):
-            expected = expected.replace(short, whole)
+        for theirs, ours in (
+            ("greater than or equal to", "a number of at least"), ("greater than", "a number above"),
+            ("less than or equal to", "a number of at most"), ("less than", "a number below"),
+            ("valid number", "number"),
+        ):  # fmt: skip
+            expected = expected.replace(theirs, ours)
     return re.sub(r"a valid dictionary( or instance of \w+)?", "keys and values", expected)
 
 

@@ -44,14 +44,14 @@ class CommandEngine(Part):
     files: dict[str, Path] = Field(default_factory=dict, description="files and folders that the command needs")
     # An hour: a steady flow of a reach takes minutes with the codes this is made for.
     timeout: Positive = Field(default=3600.0, description="time after which a run is stopped and has failed [s]")
-    keep: Literal["failed", "all"] = Field(default="failed", description="whose folders stay after a run")
+    keep: Literal["failed", "all"] = Field(default="failed", description="which folders are kept after a run")
     # A tenth of a standard deviation. Predictions rounded to 1 mm/s then give slopes to 2 % where a standard deviation
     # moves them by 0.1 m/s, and central differences leave a thousandth of the curvature of the third order.
     step: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.1, description="step of differences [standard deviations of the prior]"
     )
     most_runs: Annotated[int, Field(strict=True, gt=0)] = Field(
-        default=100, description="runs at most for a posterior by `method: surrogate`"
+        default=100, description="largest number of runs for a posterior by `method: surrogate`"
     )
 
     @model_validator(mode="after")
@@ -152,8 +152,8 @@ class Parameter(Part):
     median: Positive | None = Field(default=None, description="median of a lognormal prior")
     log_sd: Positive | None = Field(default=None, description="standard deviation of the natural logarithm")
     unit: str = Field(description="SI unit, or -")
-    symbol: str = Field(default="", description="how it is written in the report")
-    meaning: str = Field(default="", description="what it is, in words")
+    symbol: str = Field(default="", description="symbol in the report")
+    meaning: str = Field(default="", description="description")
 
     @model_validator(mode="after")
     def _complete_and_in_order(self) -> Self:
@@ -175,7 +175,7 @@ class EffectEntry(Part):
     """An effect at work in a case; its key names it, and the effect too unless `effect` does."""
 
     effect: str | None = Field(default=None, description="name of the effect in the library, if the key is another")
-    values: dict[str, Value] = Field(description="its amplitude and, as far as they are not left alone, its shapes")
+    values: dict[str, Value] = Field(description="its amplitude, and shapes other than their defaults")
     experiments: tuple[str, ...] | None = Field(default=None, description="where it acts, everywhere when left out")
     sections: tuple[str, ...] = Field(default=(), description="sensor effects: sections it is limited to")
     devices: tuple[str, ...] = Field(default=(), description="sensor effects: devices it is limited to")
@@ -285,20 +285,20 @@ class Simulate(Part):
         default=1, description="seed of the Sobol' sequence"
     )
     fields: KeptFields | None = Field(default=None, description="where level, u and v of all members are kept")
-    field_budget: Positive = Field(default=200.0, description="most they may take before compression [MB]")
+    field_budget: Positive = Field(default=200.0, description="largest size before compression [MB]")
 
 
 class Infer(Part):
     """How the posterior is found, and how measurements weigh in it."""
 
     method: Literal["refine", "surrogate", "glue"] = Field(
-        default="refine", description="draws around the best members, the same of a surrogate of `engine`, or members"
+        default="refine", description="how the posterior is computed"
     )
     likelihood: Literal["gaussian", "nse", "inverse-variance"] = Field(
-        default="gaussian", description="how residuals weigh"
+        default="gaussian", description="how residuals are weighted"
     )
     sigma: Literal["best-member", "known"] = Field(
-        default="best-member", description="errors estimated from what the best leaves, or known"
+        default="best-member", description="standard errors: stated with the data, or estimated from the best member"
     )
     behavioural: Number | None = Field(default=None, description="threshold of an informal likelihood [-]")
 
@@ -317,8 +317,8 @@ class ModelError(Part):
 class Validation(Part):
     """Measurements that no calibration sees: for judging a finished model only."""
 
-    experiments: dict[str, Experiment] = Field(min_length=1, description="flows that nothing is calibrated to")
-    observations: tuple[Observation, ...] = Field(min_length=1, description="what was measured in them")
+    experiments: dict[str, Experiment] = Field(min_length=1, description="flows that no calibration uses")
+    observations: tuple[Observation, ...] = Field(min_length=1, description="measurements in them")
 
 
 class Reference(Part):
@@ -393,7 +393,7 @@ class PlannedHours(Part):
 class Planned(Part):
     """Measurements that are planned, for `vegglue plan`; `next` uses its errors and hours."""
 
-    hours: Positive = Field(default=16.0, description="field work that is to be had, for what is proposed [h]")
+    hours: Positive = Field(default=16.0, description="hours of field work for a proposal [h]")
     transects: tuple[PlannedTransect, ...] = Field(default=(), description="lines of verticals across the channel")
     points: tuple[PlannedPoint, ...] = Field(default=(), description="single verticals")
     gauges: tuple[PlannedGauge, ...] = Field(default=(), description="water levels")
@@ -413,7 +413,9 @@ class Case(Part):
     name: str = Field(pattern=r"^[a-z0-9_-]+$", description="lower-case letters a to z, digits, _ and -")
     title: str = Field(default="", description="title of the report")
     grid: GridExtent = Field(description="regular grid of the model")
-    bed: tuple[BedLayer, ...] = Field(min_length=1, description="layers, later ones win where they have data")
+    bed: tuple[BedLayer, ...] = Field(
+        min_length=1, description="layers; a later one replaces earlier ones where it has data"
+    )
     friction: Friction = Field(description="resistance laws and where they hold")
     plants: Plants = Field(default_factory=Plants, description="stands and patches")
     inflows: dict[str, Inflow] = Field(min_length=1, description="where water enters")
@@ -429,16 +431,16 @@ class Case(Part):
     finished_result: FinishedResult | None = Field(default=None, description="a finished run of another model")
     parameters: dict[str, Parameter] = Field(default_factory=dict, description="unknowns and their priors")
     observations: tuple[Observation, ...] = Field(default=(), description="measurements")
-    planned: Planned | None = Field(default=None, description="measurements that `plan` judges and adds to")
+    planned: Planned | None = Field(default=None, description="measurements that `plan` evaluates and extends")
     frame: Frame | None = Field(default=None, description="where the grid lies on the map")
     imported: tuple[ImportedFile, ...] | None = Field(default=None, description="files that `import` made it from")
     survey: Survey | None = Field(default=None, description="plant survey")
     numerics: Numerics = Field(default_factory=Numerics, description="choices of the solver")
     simulate: Simulate = Field(default_factory=Simulate, description="size and seed of the ensemble")
     infer: Infer = Field(default_factory=Infer, description="likelihood")
-    model_error: ModelError = Field(default_factory=ModelError, description="by how much the model itself is wrong")
-    validation: Validation | None = Field(default=None, description="measurements to judge a finished model by")
-    reference: Reference | None = Field(default=None, description="values of others, printed beside ours")
+    model_error: ModelError = Field(default_factory=ModelError, description="errors of the model and its site")
+    validation: Validation | None = Field(default=None, description="flows and measurements that no calibration uses")
+    reference: Reference | None = Field(default=None, description="published values, shown in the report")
     canopy_correction: CanopyCorrection | None = Field(default=None, description="phi for another canopy height")
 
     @model_validator(mode="before")

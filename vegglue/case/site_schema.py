@@ -179,11 +179,11 @@ class GridExtent(Part):
     def _whole_cells(self) -> Self:
         columns, rows = ((high - low) / size for (low, high), size in zip((self.x, self.y), self.cell, strict=True))
         if not columns * rows <= MOST_CELLS:
-            raise ValueError(f"at most {MOST_CELLS:,} cells, where these make {columns * rows:.3g}")
+            raise ValueError(f"at most {MOST_CELLS:,} cells instead of {columns * rows:.3g}")
         for axis, (low, high), size in (("x", self.x, self.cell[0]), ("y", self.y, self.cell[1])):
             count = (high - low) / size
             if abs(count - round(count)) > 1e-6 or count < 3:
-                raise ValueError(f"a whole number of at least 3 cells along {axis}, where these make {count:g}")
+                raise ValueError(f"a whole number of at least 3 cells along {axis} instead of {count:g}")
         return self
 
 
@@ -271,7 +271,7 @@ COEFFICIENT_OF = {"manning": "n", "keulegan": "k_s", "chezy": "c"}
 class FrictionClass(Part):
     """C of a bed [m^1/2/s]: h^(1/6) / n, 18 log10(12 h / k_s), or a value."""
 
-    law: Literal["manning", "keulegan", "chezy"] = Field(description="C = h^(1/6)/n, 18 log10(12 h/k_s), or given")
+    law: Literal["manning", "keulegan", "chezy"] = Field(description="resistance law of the bed")
     n: Value | None = Field(default=None, description="Manning coefficient [s m^-1/3]")
     k_s: Value | None = Field(default=None, description="Nikuradse roughness height [m]")
     c: Value | None = Field(default=None, description="Chézy coefficient [m^1/2/s]")
@@ -317,7 +317,7 @@ class Friction(Part):
 
     classes: dict[str, FrictionClass] = Field(min_length=1, description="resistance laws by name")
     default: str = Field(description="friction class where no zone applies")
-    zones: tuple[Zone, ...] = Field(default=(), description="rules in order, later ones win")
+    zones: tuple[Zone, ...] = Field(default=(), description="in order; a later one replaces earlier ones")
     walls: FrictionClass | None = Field(
         default=None,
         description="vertical walls along the south and north side of the grid, and on steps of the bed that are "
@@ -366,13 +366,13 @@ class Plants(Part):
     """All plants of the site."""
 
     stands: dict[str, VegetationType] = Field(default_factory=dict, description="kinds of plants by name")
-    patches: tuple[Patch, ...] = Field(default=(), description="where they stand, later ones win")
+    patches: tuple[Patch, ...] = Field(default=(), description="patches; a later one replaces earlier ones")
 
 
 class Inflow(Part):
     """Where water enters."""
 
-    side: Literal["west", "south", "north"] = Field(description="side of the grid the water enters by")
+    side: Literal["west", "south", "north"] = Field(description="side of the grid through which water enters")
     range: Interval | None = Field(default=None, description="part of that side, all of it when left out [m]")
     spread: Literal["conveyance", "uniform"] = Field(default="conveyance", description="by h^(5/3), or evenly")
     angle: Annotated[Number, Field(gt=0, lt=180)] | None = Field(

@@ -6,7 +6,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -159,9 +159,33 @@ for _group, _commands in COMMANDS.items():
         app.command(name=_name, rich_help_panel=_group)(_command)
 
 
+# What typer raises for a command line that it cannot read; its own copy of click's, or that of click.
+UsageError = cast("type[typer.BadParameter]", typer.BadParameter.__bases__[0])
+
+
+def run_app() -> None:
+    """Run the command of the shell; a value that an option does not take is one sentence as any other mistake."""
+    try:
+        code = app(standalone_mode=False)
+    except UsageError as error:
+        problems: list[dict[str, Any]] = getattr(
+            error.__cause__, "errors", list
+        )()  # newer ones read values by pydantic
+        if problems and error.param is not None:
+            from vegglue.case.messages import expected_in_words
+
+            choice, got = problems[0].get("ctx", {}).get("error", ""), problems[0]["input"]
+            expected = "" if choice else expected_in_words(problems[0])
+            option = error.param.opts[-1]
+            raise InputError("option_value", option=option, expected=expected, choice=str(choice), got=got) from None
+        error.show()
+        code = error.exit_code
+    sys.exit(code)
+
+
 def main() -> None:
     """Entry point."""
-    ending_well(app)
+    ending_well(run_app)
 
 
 if __name__ == "__main__":

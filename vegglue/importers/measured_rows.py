@@ -178,10 +178,8 @@ def read_rows(path: Path, options: FileOptions) -> MeasuredRows:
     """What a file of columns holds, in SI. InputError, which names file, row and column, and for options of others."""
     idle = next((key for key in OF_RECORDS if getattr(options, key) not in (None, 0.0)), None)
     if idle is not None:
-        raise InputError(
-            f"{shown_path(path)}: expected no `{idle}` in its entry of `files`, which is for {OF_RECORDS[idle]}, got a "
-            "table with places and directions of its own; take it out."
-        )
+        records, dat = OF_RECORDS[idle], path.suffix.lower() == ".dat"
+        raise InputError("option_of_records", file=path, option=idle, records=records, dat=dat)
     table = parse_table(path, options.sheet)
     table = without_copies(without_flagged(path, table, columns_of_table(path, table, options)))
     taken = rows_of_table(path, table, options)

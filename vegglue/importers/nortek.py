@@ -85,12 +85,15 @@ def read_nortek(path: Path, options: FileOptions) -> MeasuredRows:
     _refuse_without_position(path, options)
     lines = [line.split() for line in readable_text(path).splitlines() if line.strip()]
     layout = next((one for one in _LAYOUTS if lines and len(lines[0]) >= one.columns), None)
-    try:
-        rows = np.array([[float(word) for word in line] for line in lines])
-    except ValueError as error:
-        raise InputError(
-            f"{shown_path(path)}: expected rows of numbers of a Nortek export, got {error}; export it anew."
-        ) from None
+    for row, line in enumerate(lines, 1):
+        if len(line) != len(lines[0]):
+            raise InputError("ragged_record", file=path, row=row, fields=len(lines[0]), got=len(line))
+        for column, word in enumerate(line, 1):
+            try:
+                float(word)
+            except ValueError:
+                raise InputError("no_number", file=path, row=row, column=column, got=word) from None
+    rows = np.array(lines, dtype=np.float64)
     if layout is None or rows.ndim != 2:
         raise InputError(
             f"{shown_path(path)}: expected the columns of a Vectrino or Vector, got others; export it anew."

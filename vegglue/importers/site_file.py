@@ -306,10 +306,10 @@ def read_site(path: Path, completed: Any = None) -> FieldSite:
     completed: its keys and values with those of a finished result.
     """
     if completed is None and not path.exists():
-        what = "none in it" if path.parent.is_dir() else "a file" if path.parent.exists() else "no such folder"
+        what = "no site file" if path.parent.is_dir() else "a file" if path.parent.exists() else "no such folder"
         raise InputError(
             f"{shown_path(path.parent)}: expected a folder with site.yaml, or site.json, and tables of measurements, "
-            f"got {what}; `vegglue new NAME` makes one to begin with."
+            f"got {what}; `vegglue new NAME` makes an example."
         )
     given = read_keys(path) if completed is None else completed
     for place, key, missing in _unknown_keys(given):  # the first that is all but a known one which is not given
@@ -388,15 +388,19 @@ def read_keys(path: Path) -> Any:
     def each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         for number, (key, _) in enumerate(pairs):
             if key in dict(pairs[:number]):  # json keeps the last one and says nothing
-                raise ValueError(f"the key `{key}` stands twice")
+                raise InputError(f"{shown_path(path)}: the key `{key}` stands twice; take one of the two out.")
         return dict(pairs)
 
     try:
         return json.loads(text, object_pairs_hook=each_once)
     except RecursionError:
         raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
-    except ValueError as error:
-        raise InputError(f"{shown_path(path)} is not valid JSON: {error}; correct it there.") from None
+    except json.JSONDecodeError as error:
+        raise InputError("invalid_json", file=path, line=error.lineno, column=error.colno, why=error.msg) from None
+    except InputError:
+        raise
+    except ValueError:  # of Python's limit of digits
+        raise InputError(f"{shown_path(path)}: expected numbers, got one of thousands of digits; correct it.") from None
 
 
 def _unknown_keys(given: Any) -> Iterator[tuple[str, str, list[str]]]:

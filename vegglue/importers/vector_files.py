@@ -308,10 +308,8 @@ def geojson_features(path: Path, what: str, frame: Frame | None = None) -> Itera
         yield tree["features"] if tree["type"] == "FeatureCollection" else [tree]
     except InputError:  # a ValueError, too
         raise
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
-        raise InputError(
-            f"{shown_path(path)}: expected GeoJSON with {what}, got another file ({error}); save it as GeoJSON."
-        ) from None
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
+        raise InputError("no_geojson", file=path, what=what) from None
 
 
 @contextmanager

@@ -48,8 +48,7 @@ def read_table(
     missing = [column for column in (*names, *numbers) if column not in raw.columns]
     if missing:
         raise InputError(
-            f"{shown}, row 1: expected the columns {', '.join((*names, *numbers))}, got "
-            f"{', '.join(raw.columns) or 'nothing,'} without {', '.join(missing)}; rename or add what is missing."
+            "missing_columns", file=path, wanted=(*names, *numbers), got=list(raw.columns), missing=missing
         )
     for column in (*names, *numbers, *optional, *labels):
         if list(raw.columns).count(column) > 1:
