@@ -85,7 +85,7 @@ def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs
             pool = Parallel(
                 n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1, initializer=_serve
             )
-            found = pool(delayed(_alone)(work, task) for task in tasks)
+            found = pool(delayed(_on_one_thread)(work, task) for task in tasks)
         try:
             yield from (one for one in found)  # closing these closes the generator only, not the pool
         finally:
@@ -258,7 +258,7 @@ def no_ctrl_c_for_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _alone(work: Callable[..., Any], task: tuple[Any, ...]) -> Any:
+def _on_one_thread(work: Callable[..., Any], task: tuple[Any, ...]) -> Any:
     with one_thread():  # one task a core: threads of linear algebra would only compete for it
         return work(*task)
 

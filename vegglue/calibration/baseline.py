@@ -100,7 +100,7 @@ def baseline(model: Model, known: Array | None = None, noise: Noise | None = Non
     noise, coarse = noise or noise_of(model.station), coarser(model)
     if coarse is None:
         start = _best_from_prior(model, noise) if known is None else linearise(model, known)
-        return with_own_error(Baseline(model, noise, fit(model, noise, _found(model, start)), None, None))
+        return with_own_error(Baseline(model, noise, fit(model, noise, _with_steady_flow(model, start)), None, None))
     near: Point | None
     if known is not None:
         near = linearise(coarse, known)
@@ -117,11 +117,11 @@ def baseline(model: Model, known: Array | None = None, noise: Noise | None = Non
         near = near if known is not None else fit(coarse, noise, near).point
     z = known if near is None else near.z
     start = None if z is None else linearise_from(model, z, near)
-    base = under_error_of_grid(Baseline(model, noise, at_point(noise, _found(model, start)), coarse, near))
+    base = under_error_of_grid(Baseline(model, noise, at_point(noise, _with_steady_flow(model, start)), coarse, near))
     return with_own_error(base) if near is None else with_own_error_again(base, near.z)
 
 
-def _found(model: Model, start: Point | None) -> Point:
+def _with_steady_flow(model: Model, start: Point | None) -> Point:
     if start is None:
         raise InputError(f"{model.case.name}: the model finds no steady flow at its best point; widen the priors.")
     return start
@@ -357,7 +357,7 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
             step = step / 2.0
         return None
 
-    z, correction = _start(model, lambda z, slopes: correction_there(z, in_phase(AT_PLACE, 1), slopes))
+    z, correction = _first_place(model, lambda z, slopes: correction_there(z, in_phase(AT_PLACE, 1), slopes))
     here = model_at(correction)
     base = baseline(here)
     for places in range(1, MOST_PLACES + 1):
@@ -375,7 +375,7 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
     return found(False)
 
 
-def _start(model: Model, correction_there: Callable[[Array, bool], Correction]) -> tuple[Array, Correction]:
+def _first_place(model: Model, correction_there: Callable[[Array, bool], Correction]) -> tuple[Array, Correction]:
     """The middle of the prior or, if the command fails there, the next of its Sobol' points."""
     refused = InputError("no_start", case=model.case.name)
     for z in places_of_prior(len(model.names)):

@@ -366,7 +366,7 @@ def _with_laws(listed: Fingerprints, laws: list[LawInCase], search: SearchModel)
     )
 
 
-def _part(projected: Projected, columns: slice) -> Projected:
+def _columns_of(projected: Projected, columns: slice) -> Projected:
     return replace(
         projected,
         fingerprints=projected.fingerprints[:, columns],
@@ -387,12 +387,12 @@ def _kind_of_laws(
     prior, forms = np.empty(plausible.size), Counter(one.law.subject for one in laws)
     for one, of_law in zip(laws, columns, strict=True):
         prior[of_law] = 1.0 / (less * len(forms) * forms[one.law.subject] * of_law.size)
-    return kind_of_hypotheses("law", _part(full.projected, part), plausible, prior)
+    return kind_of_hypotheses("law", _columns_of(full.projected, part), plausible, prior)
 
 
 def _of_listed(full: Screening, listed: Fingerprints) -> Screening:
     """The screening of the listed effects alone, with the noise that was estimated with laws."""
-    count, projected = len(listed.settings), _part(full.projected, slice(len(listed.settings)))
+    count, projected = len(listed.settings), _columns_of(full.projected, slice(len(listed.settings)))
     return replace(
         full,
         fingerprints=listed,

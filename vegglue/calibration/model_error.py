@@ -325,13 +325,13 @@ def _sides(model: Model, cells: CellResponses) -> Array:
     sides = [(axis, step) for axis in (0, 1) for step in (-1, 1)]
     for index, (axis, outwards) in ((int(index), side) for index in np.unique(patch[patch >= 0]) for side in sides):
         inside, width = patch == index, (site.grid.dx, site.grid.dy)[axis]
-        within, found = inside & ~_next(inside, axis, outwards), np.zeros((len(model.station), 2))
+        within, found = inside & ~_next_cell(inside, axis, outwards), np.zeros((len(model.station), 2))
         # Cells that are covered in part differ by that part of what plants and bed differ by.
-        width = width * np.maximum(site.cover - _next(site.cover, axis, outwards), 0.5)
+        width = width * np.maximum(site.cover - _next_cell(site.cover, axis, outwards), 0.5)
         for experiment, rows in model.rows.items():
             if index in patches_present(model.case, experiment):
-                excess = within * (rate[experiment] - _next(rate[experiment], axis, outwards)) / width
-                beside = ~inside * _next(excess, axis, -outwards)
+                excess = within * (rate[experiment] - _next_cell(rate[experiment], axis, outwards)) / width
+                beside = ~inside * _next_cell(excess, axis, -outwards)
                 answers = cells.of["drag"][rows].reshape(rows.size, inside.size)
                 inwards, beyond = answers @ excess.ravel(), answers @ beside.ravel()
                 found[rows] = np.stack([0.5 * (inwards + beyond), inwards], axis=1)
@@ -339,7 +339,7 @@ def _sides(model: Model, cells: CellResponses) -> Array:
     return np.hstack(parts) / np.sqrt(2.0)
 
 
-def _next(field: NDArray[Any], axis: int, step: int) -> NDArray[Any]:
+def _next_cell(field: NDArray[Any], axis: int, step: int) -> NDArray[Any]:
     """What the next cell along an axis has, (nx, ny); at the end of the grid the cell itself."""
     count = field.shape[axis]
     return np.take(field, np.clip(np.arange(count) + step, 0, count - 1), axis)

@@ -217,14 +217,14 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
     key = tuple(map(id, parts))
     if kept := _kept.get(key):
         return kept[1]
-    found = _scales(case, build_site(case) if site is None else site)
+    found = _scales_of_site(case, build_site(case) if site is None else site)
     _kept[key] = (parts, found)  # with the parts, whose identities are theirs as long as they are kept
     while len(_kept) > SCALES_KEPT:
         _kept.popitem(last=False)
     return found
 
 
-def _scales(case: Case, site: Site) -> SiteScales:
+def _scales_of_site(case: Case, site: Site) -> SiteScales:
     depths, means, speeds, discharges = [], [], [], []
     banks = beyond_floor(site)
     for name, experiment in case.experiments.items():

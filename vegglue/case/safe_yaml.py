@@ -91,7 +91,7 @@ def _refused(problem: str, at: Any) -> ConstructorError:
     return ConstructorError(None, None, problem, at.start_mark)
 
 
-def _whole(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
+def _whole_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
     digits = node.value.lstrip("+-")
     if len(digits) > 1 and digits.startswith("0"):
         raise _refused(f"`{node.value}` may mean two numbers: write it without the 0 in front, or text in quotes", node)
@@ -100,7 +100,7 @@ def _whole(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
     return int(node.value)
 
 
-def _words(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> str:
+def _printable_text(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> str:
     if (sign := unprintable(node.value)) is not None:
         raise _refused(f"a text holds the sign {sign!a}, which is no letter", node)
     return str(node.value)
@@ -112,9 +112,9 @@ _Loader.yaml_implicit_resolvers = {
     for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
 _CONSTRUCTORS: dict[str, Callable[..., Any]] = {
-    "int": _whole,
+    "int": _whole_number,
     "float": lambda loader, node: float(node.value.lower().replace(".inf", "inf").replace(".nan", "nan")),
-    "str": _words,
+    "str": _printable_text,
 }
 for _kind, _construct in _CONSTRUCTORS.items():
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _construct)

@@ -46,15 +46,15 @@ def object_of(case: Case, runs: Path, result: Any) -> Object:
             counts = {"members": len(result.status), "marched": marched, "failed": failed}
             return counts | {"largest_mass_error": mass, "file": folder / "ensemble.h5"}
         case Posterior():
-            return _posterior(case, result) | {"file": folder / "posterior.h5"}
+            return _posterior_object(case, result) | {"file": folder / "posterior.h5"}
         case Diagnosis():
             return diagnosis_json(result)
         case DiscoveredCase():
             found = result.found
             return {
                 "sentence": sentence(found.sentence), "p": found.p, "laws_tried": found.tried,
-                "laws": [_law(one) for one in found.laws],
-                "product": None if found.product is None else _law(found.product.found), "others": found.others,
+                "laws": [_law_object(one) for one in found.laws],
+                "product": None if found.product is None else _law_object(found.product.found), "others": found.others,
                 "left_out": sentence(result.aside) or None, "effect_file": result.effect_file,
                 "config": None if result.child is None else result.child.source,
             }  # fmt: skip
@@ -62,9 +62,9 @@ def object_of(case: Case, runs: Path, result: Any) -> Object:
             told = {"configs": [one.source for one in result.cases], "cases": [one.name for one in result.cases]}
             told |= {"sentence": sentence(result.sentence), "reason": sentence(result.reason)}
             told |= {"unclear": result.unclear}
-            return told | _comparison(result.comparison)
+            return told | _comparison_object(result.comparison)
         case Comparison():
-            return _comparison(result)
+            return _comparison_object(result)
         case FieldPlan():
             return plan_json(result) | {"page": (folder / "plan" / "plan.html").resolve()}
         case list():
@@ -111,7 +111,7 @@ def run_object(runs: Path, results: Sequence[tuple[Case, Any]]) -> Object:
     return told
 
 
-def _law(one: LawFound) -> Object:
+def _law_object(one: LawFound) -> Object:
     return {
         "name": one.name, "title": one.law.title, "equation": one.equation, "same_as": one.same_as or None,
         "reference": one.reference, "strength": one.strength, "interval95": one.interval95, "chance": one.chance,
@@ -119,7 +119,7 @@ def _law(one: LawFound) -> Object:
     }  # fmt: skip
 
 
-def _posterior(case: Case, found: Posterior) -> Object:
+def _posterior_object(case: Case, found: Posterior) -> Object:
     refined, marginals, learned = found.refinement, found.marginals, found.surrogate
     misfit = None if refined is None or refined.error_model.errors == "estimated" else refined.misfit
     parameters = {
@@ -146,7 +146,7 @@ def _posterior(case: Case, found: Posterior) -> Object:
     }  # fmt: skip
 
 
-def _comparison(found: Comparison) -> Object:
+def _comparison_object(found: Comparison) -> Object:
     return {
         "rungs": [model_score_json(one) for one in found.model_scores],
         "left_out": found.left_out.to_dict("records"),

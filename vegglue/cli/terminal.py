@@ -32,13 +32,13 @@ Runs = Annotated[Path, typer.Option(metavar="FOLDER", help=HELP["runs"])]
 RUNS = Path("runs")
 
 
-def _some(jobs: int) -> int:
+def _number_of_jobs(jobs: int) -> int:
     if jobs == 0:
         raise InputError("--jobs: expected the number of processes, or -1 for one on every core, got 0.")
     return jobs
 
 
-Jobs = Annotated[int, typer.Option(min=-1, callback=_some, metavar="N", help=HELP["jobs"])]
+Jobs = Annotated[int, typer.Option(min=-1, callback=_number_of_jobs, metavar="N", help=HELP["jobs"])]
 MemoryLimit = Annotated[float | None, typer.Option(min=0.1, metavar="GB", help=HELP["memory"])]
 Cluster = Annotated[str | None, typer.Option(metavar="ADDRESS", help=HELP["cluster"])]
 Members = Annotated[int | None, typer.Option(min=1, metavar="N", help=HELP["members"])]

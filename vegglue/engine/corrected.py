@@ -126,11 +126,11 @@ def corrected(correction: Correction, runs: CommandRuns, watch: Watch) -> Engine
     def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
         """Runs of the command, and what the effects of the case change in the built-in engine."""
         bare = without_effects(model)
-        z_own = _own(model, z, bare.names)
-        found, _ = _run(runs, model, bare, z_own, watch)
+        z_own = _own_parameters(model, z, bare.names)
+        found, _ = _run_command(runs, model, bare, z_own, watch)
         if not model.case.effects:
             return found
-        near = [linearise(bare, _own(model, point.z[None], bare.names)[0]) for point in points]
+        near = [linearise(bare, _own_parameters(model, point.z[None], bare.names)[0]) for point in points]
         known = [point for point in near if point is not None]
         if not known:
             return np.full_like(found, np.nan)
@@ -162,10 +162,10 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slope
     """
     bare, name = without_effects(model), model.case.name
     names = bare.names
-    here, q = _own(model, z[None], names)[0], len(names)
+    here, q = _own_parameters(model, z[None], names)[0], len(names)
     steps = runs.settings.step * np.eye(q)  # the place itself, then a step ahead and behind in each parameter
     points = np.clip(np.vstack([here[None], here + steps, here - steps]), -FURTHEST, FURTHEST) if slopes else here[None]
-    found, reasons = _run(runs, model, bare, points, watch)
+    found, reasons = _run_command(runs, model, bare, points, watch)
     own = linearise(bare, here)
     if own is None:
         raise InputError(
@@ -210,12 +210,12 @@ def without_effects(model: Model) -> Model:
     return replace(model, case=model.case.model_copy(update={"effects": {}, "parameters": parameters}), engine=NEWTON)
 
 
-def _own(model: Model, z: Array, names: Sequence[str]) -> Array:
+def _own_parameters(model: Model, z: Array, names: Sequence[str]) -> Array:
     """The columns of z (m, p) that are parameters of the command."""
     return z[:, [model.names.index(name) for name in names]]
 
 
-def _run(runs: CommandRuns, model: Model, bare: Model, z: Array, watch: Watch) -> tuple[Array, list[str]]:
+def _run_command(runs: CommandRuns, model: Model, bare: Model, z: Array, watch: Watch) -> tuple[Array, list[str]]:
     """Runs of the command at z (m, q)."""
     theta = theta_at(bare.case, z)
     thetas = [{name: float(values[member]) for name, values in theta.items()} for member in range(len(z))]

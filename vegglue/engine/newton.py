@@ -120,7 +120,7 @@ def problem_at(model: Model, experiment: str, z: Array) -> Problem:
     return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
 
 
-def _read(model: Model, experiment: str, problem: Problem, state: Array, band: tuple[int, int]) -> Array:
+def _read_stations(model: Model, experiment: str, problem: Problem, state: Array, band: tuple[int, int]) -> Array:
     """Predictions (m, stations of the experiment) of states in a band."""
     wide = widen(state, model.site.grid.y.size, band)
     return predictions_at_sensors(problem, wide, model.site.grid, model.stations[experiment])
@@ -188,7 +188,7 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
             part, state = crop(problem, *band), rows_inside(marched.state, band)
             solution, own = replace(solution, state=state), factors(part, state)
         flow = SteadyFlow(solution.state, band, problem.shape[1], own, EMPTY, 0.0)
-    return flow, _read(model, experiment, problem, flow.state, flow.band)[0]
+    return flow, _read_stations(model, experiment, problem, flow.state, flow.band)[0]
 
 
 def _from_coarser_cells(model: Model, experiment: str, z: Array, problem: Problem) -> Array | None:
@@ -240,7 +240,7 @@ def _with_slopes(model: Model, experiment: str, z: Array, flow: SteadyFlow) -> t
     slopes = tangents(base, flow.state, flow.factors, causes, TANGENT_TOLERANCE)
     moved = DIFFERENCE_STEP * slopes
     states = np.concatenate([flow.state + moved, flow.state - moved], axis=3)
-    read = _read(model, experiment, ends, states, flow.band)
+    read = _read_stations(model, experiment, ends, states, flow.band)
     return replace(flow, slopes=slopes), (read[:p] - read[p:]).T / (2.0 * DIFFERENCE_STEP)
 
 
@@ -279,7 +279,7 @@ def predict_near(model: Model, point: Point, z: Array) -> Array:
             problem = problem_at(model, experiment, z[some])
             start = flow.state + flow.slopes @ (z[some] - point.z).T
             solution = chord_in_band(problem, start, flow.factors, flow.band, model.case.numerics.tolerance)
-            part[:, model.rows[experiment]] = _read(model, experiment, problem, solution.state, flow.band)
+            part[:, model.rows[experiment]] = _read_stations(model, experiment, problem, solution.state, flow.band)
             part[~solution.converged] = np.nan
     return found
 
@@ -335,11 +335,11 @@ def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[
     alike = [column for column in moving if untouched and stages[column] <= UNSEEN_BY_SENSORS]  # read at once
     states, now = flow.state + gains * changes, np.empty((len(causes), rows.size))
     if alike:
-        now[alike] = _read(
+        now[alike] = _read_stations(
             model, experiment, take(whole, np.zeros(len(alike), dtype=np.int64)), states[..., alike], flow.band
         )
     for column in set(moving) - set(alike):
-        now[column] = _read(model, experiment, built[column][0], states[..., [column]], flow.band)[0]
+        now[column] = _read_stations(model, experiment, built[column][0], states[..., [column]], flow.band)[0]
     if at_rest := [column for column in range(len(causes)) if column not in moving]:
         state, of_each = widen(flow.state, flow.rows, flow.band), [built[column][0].effects for column in at_rest]
         station = model.stations[experiment]

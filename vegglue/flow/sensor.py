@@ -102,7 +102,9 @@ def nearest_face(grid: Grid, x: float) -> int:
     return int(np.argmin(np.abs(edges - x)))
 
 
-def _corners(grid: Grid, x: Array, y: Array) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Array]]:
+def _surrounding_centres(
+    grid: Grid, x: Array, y: Array
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Array]]:
     """The four cell centres around each point: column, row and weight of each (points,)."""
     i, along = between(x, grid.x[0], grid.dx, grid.x.size)
     j, beside = between(y, grid.y[0], grid.dy, grid.y.size)
@@ -117,7 +119,7 @@ def _no_weights(flow: GriddedFlow, stations: int) -> Array:
 
 def level_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     weights = _no_weights(flow, x.size)
-    for column, row, share in _corners(flow.grid, x, y):
+    for column, row, share in _surrounding_centres(flow.grid, x, y):
         weights[column, LEVEL, row, np.arange(x.size)] += share
     return weights
 
@@ -125,7 +127,7 @@ def level_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
 def u_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     """The face in the west, at which the inflow sets u, counts as given."""
     weights = _no_weights(flow, x.size)
-    for column, row, share in _corners(flow.grid, x, y):
+    for column, row, share in _surrounding_centres(flow.grid, x, y):
         for face, inside in ((column, column >= 0), (np.maximum(column - 1, 0), column > 0)):
             weights[face, ALONG, row, np.arange(x.size)] += np.where(inside, 0.5 * share, 0.0)
     return weights
@@ -134,7 +136,7 @@ def u_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
 def v_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     """The faces on the sides of the grid, at which walls and inflows set v, count as given."""
     weights, last = _no_weights(flow, x.size), flow.grid.y.size - 1
-    for column, row, share in _corners(flow.grid, x, y):
+    for column, row, share in _surrounding_centres(flow.grid, x, y):
         for face, inside in ((row, row > 0), (np.minimum(row + 1, last), row < last)):
             weights[column, ACROSS, face, np.arange(x.size)] += np.where(inside, 0.5 * share, 0.0)
     return weights

@@ -222,7 +222,7 @@ def role_of(heading: str) -> tuple[str, str | None] | None:
 
 def known_name(heading: str) -> tuple[str, str | None] | None:
     """Under which name of its role a column is known, and the unit its heading states: `('u mean', 'm/s')`."""
-    bare, unit = _apart(heading)
+    bare, unit = _name_and_brackets(heading)
     if (found := _ROLE_OF.get(words_of(bare))) is not None:
         quantity = ROLES[found].quantity
         return words_of(bare), unit_named(unit, quantity) if unit and quantity else None
@@ -237,7 +237,7 @@ def unit_stated(heading: str, quantity: str) -> str | None:
     """The unit of a quantity that a heading states, whatever its name is: `cm/s` for `Geschw. (cm/s)`, `V, cm/s` and
     `V_cm_s`, also among other words, `(m above datum)` and `(US survey feet)`; None where it states none.
     """
-    bare, unit = _apart(heading)
+    bare, unit = _name_and_brackets(heading)
     among = [word for word in re.findall(r"[^\s,;]+", unit) if word != "in"]
     words = [unit, *among, *(word for _, word in _suffixed(bare))]
     return next((said for word in words if (said := unit_named(word, quantity))), None)
@@ -245,17 +245,17 @@ def unit_stated(heading: str, quantity: str) -> str | None:
 
 def bracketed_unit(heading: str) -> str:
     """What stands in brackets or behind a comma at the end of a heading, in round ones only if it is like a unit."""
-    unit = _apart(heading)[1].strip()
+    unit = _name_and_brackets(heading)[1].strip()
     return unit if heading.rstrip().endswith("]") or is_like_unit(unit) else ""
 
 
 def names_without_unit(heading: str) -> set[str]:
     """`snelheid` of `snelheid [cm/s]`, `snelheid, cm/s` and `snelheid_cm_s`; none where it has no unit."""
-    bare, unit = _apart(heading)
+    bare, unit = _name_and_brackets(heading)
     return {bare} if unit else {name for name, word in _suffixed(heading) if name and is_like_unit(word)}
 
 
-def _apart(heading: str) -> tuple[str, str]:
+def _name_and_brackets(heading: str) -> tuple[str, str]:
     """The name and what stands in brackets or after a comma at its end."""
     found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", heading)
     if found:

@@ -104,7 +104,7 @@ def case_from_confluence(folder: Path, target: Path) -> Tree:
     # Where the bed is not known there is no depth to average over; and the tributary itself is not modelled.
     vertical = vertical[(vertical[:, 4] == 0) & (vertical[:, 1] > 0.0) & (vertical[:, 1] < width)]
     sections = np.unique(vertical[:, 0])
-    blocks = _blocks(level, grid, width)
+    blocks = _block_means(level, grid, width)
     into = target.with_name(f"{target.stem}-data")
     carried = []  # to the walls: the outermost level of each cross-section
     for x in np.unique(bed[:, 0]):
@@ -205,7 +205,7 @@ def _grid(bed: Array, vertical: Array, width: float) -> Tree:
     }
 
 
-def _blocks(level: Array, grid: Tree, width: float) -> Array:
+def _block_means(level: Array, grid: Tree, width: float) -> Array:
     """Means of the water level in squares, with their standard error: (block, 4) of x, y, level, error."""
     size = width / BLOCKS
     low, high = grid["x"]
@@ -254,14 +254,16 @@ def tables_of_mat(source: Path, into: Path) -> Path:
     InputError for a file that is none of the set; StorageError.
     """
     maps = load_matlab(source / MAPS_OF_THE_SET, OF_THE_SET, ("Xtopo", "Ytopo", "Ztopo", "Xwl", "Ywl", "Zwl"))
-    bed, level = (_points([maps[f"{axis}{name}"] for axis in "XYZ"]) for name in ("topo", "wl"))
+    bed, level = (_points_of_map([maps[f"{axis}{name}"] for axis in "XYZ"]) for name in ("topo", "wl"))
     files = sorted(source.glob("section_uvw_x*.mat"))
     sections = [load_matlab(path, OF_THE_SET, ("X", "Y", "Z", "U", "V")) for path in files]
     if not sections:
         raise InputError(f"{shown_path(source)}: expected files section_uvw_x*.mat, got none; add them.")
     verticals = np.vstack([_verticals(section, bed, level) for section in sections])
     verticals = verticals[np.lexsort((verticals[:, 1], verticals[:, 0]))]
-    thinned = {name: _points([maps[f"{axis}{name}"][::2, ::THINNED] for axis in "XYZ"]) for name in ("topo", "wl")}
+    thinned = {
+        name: _points_of_map([maps[f"{axis}{name}"][::2, ::THINNED] for axis in "XYZ"]) for name in ("topo", "wl")
+    }
     heading = "x_m,y_m,h_m,U_depthavg_ms,V_depthavg_ms,bed_extrapolated"
     for name, columns, rows in (
         ("bed.csv", "x_m,y_m,z_bed_m", thinned["topo"]),
@@ -273,7 +275,7 @@ def tables_of_mat(source: Path, into: Path) -> Path:
     return into
 
 
-def _points(axes: Sequence[Array]) -> Array:
+def _points_of_map(axes: Sequence[Array]) -> Array:
     known = ~np.isnan(axes[2])
     return np.column_stack([axis[known] for axis in axes])
 

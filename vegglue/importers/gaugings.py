@@ -83,7 +83,7 @@ def read_flowtracker2(path: Path, options: FileOptions) -> MeasuredRows:
     if not isinstance(stations, list) or not stations:
         raise InputError(f"{shown_path(path)}: expected a list of Stations in DataFile.json, got none; check the file.")
     with reading_structures(path, "FlowTracker2"):
-        rows = [_station(path, station) for station in stations]
+        rows = [_measured_vertical(path, station) for station in stations]
     tape, depth, u, own, measured = np.array(rows, dtype=np.float64).reshape(-1, 5).T
     columns = {"tape": "Location", "depth": "Depth", "u": "MeanVelocityInVertical.X", "u_se": "VelocityStandardError.X"}
     units = {"tape": "m", "depth": "m", "u": "m/s", "u_se": "m/s"}
@@ -91,7 +91,7 @@ def read_flowtracker2(path: Path, options: FileOptions) -> MeasuredRows:
     return on_the_tape(path, _wet_verticals(taken, np.isfinite(tape) & (measured > 0.0)), options)
 
 
-def _station(path: Path, station: Mapping[str, Any]) -> list[float]:
+def _measured_vertical(path: Path, station: Mapping[str, Any]) -> list[float]:
     """Location, depth [m], mean velocity and its error [m/s], and 1 if the vertical was measured, else 0.
 
     A correction factor belongs to the velocity: -1 for flow that runs against the probe. Discharge over area, which

@@ -61,7 +61,7 @@ def read_hec_ras(path: Path) -> ModelResult:
         system, projection = text_of(file.attrs.get("Units System")), text_of(file.attrs.get("Projection"))
         customary = system != "" and "SI" not in system.upper()
         horizontal = 1.0 if not customary else US_SURVEY_FOOT if "FOOT_US" in projection.upper() else FOOT
-        parts = [_area(geometry[name], results[name], FOOT if customary else 1.0, horizontal) for name in names]
+        parts = [_flow_of_area(geometry[name], results[name], FOOT if customary else 1.0, horizontal) for name in names]
         stamps = file.get(f"{SERIES}/Time Date Stamp")
         time = text_of(stamps[-1]) if stamps is not None and len(stamps) else ""
         notes = [ImportNote(Noted.WITHOUT_BED, sum(part["ghosts"] for part in parts))]
@@ -74,7 +74,7 @@ def read_hec_ras(path: Path) -> ModelResult:
         )  # fmt: skip
 
 
-def _area(geometry: Any, results: Any, vertical: float, horizontal: float) -> dict[str, Any]:
+def _flow_of_area(geometry: Any, results: Any, vertical: float, horizontal: float) -> dict[str, Any]:
     """Places, bed, level, depth, velocities and roughness of one area [SI], and how many ghost cells it has."""
     bed = without_marks(np.asarray(geometry["Cells Minimum Elevation"], dtype=np.float64)) * vertical
     count, real = bed.size, np.isfinite(bed)
@@ -88,13 +88,13 @@ def _area(geometry: Any, results: Any, vertical: float, horizontal: float) -> di
     at = np.where(inside, cells, 0)
     sides = np.where(inside & wet[at], level[at], -np.inf)  # of a dry side, or a ghost cell, the other one counts
     area, n_face = _of_faces(geometry, sides.max(axis=1), vertical, normal[:, 2] * horizontal)
-    u, v = _vectors(cells, inside, normal[:, :2], velocity, area, count)
+    u, v = _cell_velocities(cells, inside, normal[:, :2], velocity, area, count)
     if "Cells Center Manning's n" in geometry:
         rough = np.asarray(geometry["Cells Center Manning's n"], dtype=np.float64)
     else:
         stated = inside & (n_face > 0.0)[:, None]
-        faces = _sums(np.ones(len(cells)), cells, stated, count)
-        rough = np.where(faces > 0, _sums(n_face, cells, stated, count) / np.maximum(faces, 1), np.nan)
+        faces = _sums_over_cells(np.ones(len(cells)), cells, stated, count)
+        rough = np.where(faces > 0, _sums_over_cells(n_face, cells, stated, count) / np.maximum(faces, 1), np.nan)
     centre = np.asarray(geometry["Cells Center Coordinate"], dtype=np.float64) * horizontal
     return {
         "x": centre[real, 0], "y": centre[real, 1], "bed": bed[real], "level": level[real], "depth": depth[real],
@@ -127,7 +127,7 @@ def _of_faces(geometry: Any, level: Array, vertical: float, length: Array) -> tu
     return area, rough
 
 
-def _sums(values: Array, cells: np.ndarray[Any, Any], used: np.ndarray[Any, Any], count: int) -> Array:
+def _sums_over_cells(values: Array, cells: np.ndarray[Any, Any], used: np.ndarray[Any, Any], count: int) -> Array:
     """Sums of values of faces (faces,) over the cells (faces, 2) at their sides that are used (faces, 2): (count,)."""
     sums = np.zeros(count)
     for side, here in enumerate(used.T):
@@ -135,7 +135,7 @@ def _sums(values: Array, cells: np.ndarray[Any, Any], used: np.ndarray[Any, Any]
     return sums
 
 
-def _vectors(
+def _cell_velocities(
     cells: np.ndarray[Any, Any], inside: np.ndarray[Any, Any], normal: Array, speed: Array, weight: Array, count: int
 ) -> tuple[Array, Array]:
     """min sum_f A_f (n_f . u - v_f)^2 of each cell: u and v (count,), along the only normal if all are parallel; NaN if
@@ -146,7 +146,7 @@ def _vectors(
         "x": normal[:, 0] * speed, "y": normal[:, 1] * speed,
     }  # fmt: skip
     used = inside & (weight > 0.0)[:, None] & np.isfinite(speed)[:, None]
-    sums = {key: _sums(weight * value, cells, used, count) for key, value in of_face.items()}
+    sums = {key: _sums_over_cells(weight * value, cells, used, count) for key, value in of_face.items()}
     matrix = np.stack([np.stack([sums["xx"], sums["xy"]], -1), np.stack([sums["xy"], sums["yy"]], -1)], -2)
     inverse = np.linalg.pinv(matrix, rcond=ONE_HEADING, hermitian=True)
     found = (inverse @ np.stack([sums["x"], sums["y"]], -1)[..., None])[..., 0]

@@ -73,9 +73,9 @@ def measured_files(
     used: files that the site file names elsewhere, such as that of the bed; bed: its level, for measured depths.
     InputError if there are none, or one cannot be read.
     """
-    options = _options(folder, site)
+    options = _stated_options(folder, site)
     known = KnownExperiments(tuple(site.experiments), site_file(folder).name, EXPERIMENTS, tuple(site.holdout))
-    found = _read(_candidates(folder, options, used), options, target, place, known, bed)
+    found = _read_group(_files_to_read(folder, options, used), options, target, place, known, bed)
     if not found.observations:
         raise _nothing_measured(found, shown_path(folder))
     return found
@@ -90,7 +90,7 @@ def held_out_measurements(
     """
     paths = held_out_files(folder)[:1] if site.holdout else []
     known = KnownExperiments(tuple(site.holdout), site_file(folder).name, HELD_OUT, tuple(site.experiments))
-    found = _read(paths, _options(folder, site), target, place, known, bed)
+    found = _read_group(paths, _stated_options(folder, site), target, place, known, bed)
     if paths and not found.observations:
         raise _nothing_measured(found, f"{shown_path(folder)}, held out")
     return found
@@ -128,7 +128,7 @@ def record(path: Path, taken: MeasuredRows | None, summary: str) -> Tree:
     return tree
 
 
-def _options(folder: Path, site: FieldSite) -> dict[Path, FileOptions]:
+def _stated_options(folder: Path, site: FieldSite) -> dict[Path, FileOptions]:
     """What the site file states about single files, by their paths, which may lead into folders of the folder."""
     found = {}
     for name, given in site.files.items():
@@ -142,7 +142,7 @@ def _options(folder: Path, site: FieldSite) -> dict[Path, FileOptions]:
     return found
 
 
-def _candidates(folder: Path, options: Mapping[Path, FileOptions], used: Sequence[str]) -> list[Path]:
+def _files_to_read(folder: Path, options: Mapping[Path, FileOptions], used: Sequence[str]) -> list[Path]:
     """Files of every kind in their order, then others by name; no raw record whose export lies beside it.
 
     Of folders within the folder only those files that have options of their own.
@@ -168,7 +168,7 @@ def _candidates(folder: Path, options: Mapping[Path, FileOptions], used: Sequenc
     return sorted(paths, key=lambda path: (order.get(path.name, len(order)), path.name)) + sorted(within)
 
 
-def _read(
+def _read_group(
     paths: Sequence[Path],
     options: Mapping[Path, FileOptions],
     target: Path,

@@ -32,11 +32,11 @@ def stations_of_qrev(path: Path, parts: dict[str, Any], options: FileOptions) ->
     """Stations of all transects together that QRev used for the discharge. InputError."""
     with reading_structures(path, "QRev"):
         used = [one for one in np.atleast_1d(parts[QREV_VARIABLE].transects) if bool(one.checked)]
-        profiles = [profile for one in used for profile in _profiles(path, one, str(used[0].startEdge))]
+        profiles = [profile for one in used for profile in _profiles_of_transect(path, one, str(used[0].startEdge))]
     return stations_of_transect(path, options, profiles, "QRev", ImportNote(Noted.TRANSECTS, len(used)))
 
 
-def _profiles(path: Path, transect: Any, first_bank: str) -> list[BoatProfile]:
+def _profiles_of_transect(path: Path, transect: Any, first_bank: str) -> list[BoatProfile]:
     """One profile for each ensemble within a transect.
 
     x_i = x_(i-1) + u_i dt_i east and north [m], as QRev sums it up, lost steps like their neighbours; places count from

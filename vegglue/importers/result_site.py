@@ -108,7 +108,7 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
         raise site_refusal(path, error, "result") from None
     if not (paths := _result_files(folder, given, stated)):
         return read_site(path)
-    results = {name: _read(one, one.stat().st_mtime_ns) for name, one in paths.items()}
+    results = {name: _read_once(one, one.stat().st_mtime_ns) for name, one in paths.items()}
     completed = dict(given)
     if "frame" not in given and not (given.get("grid") or {}).get("centreline"):
         completed |= _frame_of(next(iter(results.values())))
@@ -123,13 +123,13 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
         path, completed | {"experiments": tried, "holdout": {name: filler | one for name, one in held.items()}}
     )
     _, place = drawn_placement(folder, site)
-    placed = {name: _placed(paths[name], one, place, stated) for name, one in results.items()}
-    terrain = _terrain(next(iter(placed.values())))
+    placed = {name: _along_channel(paths[name], one, place, stated) for name, one in results.items()}
+    terrain = _bed_of_result(next(iter(placed.values())))
     tree = grid_of_terrain(next(iter(paths.values())), terrain, site.grid, place)
     of_grid = grid_of_keys(tree, place)
     for flows in (experiments, held):
         for name, one in flows.items():
-            discharge, level = _boundary(paths[name], placed[name].flow, of_grid, place.line is None)
+            discharge, level = _boundary_values(paths[name], placed[name].flow, of_grid, place.line is None)
             if not {"discharge", "discharge_m3_s"} & one.keys():
                 one["discharge"] = discharge
             if not {"level", "downstream_level_m"} & one.keys():
@@ -141,7 +141,7 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
 def ground_of_result(target: Path, found: SiteOfResult) -> GroundOfResult:
     """Grid, bed and friction of the first result, and the flows of all, to be written beside the config."""
     name, placed = next(iter(found.placed.items()))
-    friction, parameters, values, texts, words = _friction(target, placed, found)
+    friction, parameters, values, texts, words = _friction_of_result(target, placed, found)
     imported: list[Tree] = []
     files: dict[str, str] = {}
     for experiment, one in found.placed.items():
@@ -198,7 +198,7 @@ def _result_files(folder: Path, given: Mapping[str, Any], stated: ResultEntry) -
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, changed: int) -> ModelResult:
+def _read_once(path: Path, changed: int) -> ModelResult:
     return read_result(path)
 
 
@@ -221,7 +221,7 @@ def _frame_of(result: ModelResult) -> Tree:
     return {"frame": frame | ({"crs": result.crs} if result.crs.upper().startswith("EPSG:") else {})}
 
 
-def _placed(path: Path, result: ModelResult, place: Placement, stated: ResultEntry) -> PlacedResult:
+def _along_channel(path: Path, result: ModelResult, place: Placement, stated: ResultEntry) -> PlacedResult:
     """The result along the channel. Raises InputError if nothing states the law of its friction."""
     along, across = place.to_channel(result.x, result.y)
     u, v = place.turned_to_channel(along, result.u, result.v)
@@ -236,7 +236,7 @@ def _placed(path: Path, result: ModelResult, place: Placement, stated: ResultEnt
     return PlacedResult(result, flow, corners[np.isfinite(corners).all(axis=1)], manning[there])
 
 
-def _terrain(placed: PlacedResult) -> Terrain:
+def _bed_of_result(placed: PlacedResult) -> Terrain:
     """The bed of a result, as far along as its mesh reaches, and across as far as its water and some land."""
     flow, corners = placed.flow, placed.corners
     surface = LinearNDInterpolator(np.column_stack([flow.x, flow.y]), flow.bed)
@@ -248,7 +248,7 @@ def _terrain(placed: PlacedResult) -> Terrain:
     return Terrain(lambda x, y: np.asarray(surface(x, y)), extent, f"bed of {placed.result.code}")
 
 
-def _boundary(path: Path, flow: TheirFlow, grid: Grid, straight: bool) -> tuple[float, float]:
+def _boundary_values(path: Path, flow: TheirFlow, grid: Grid, straight: bool) -> tuple[float, float]:
     """Discharge [m3/s], the median along the channel, and level [m], the mean at the outlet. Raises InputError for a
     flow that is not along the grid, or whose discharge changes along it.
     """
@@ -272,7 +272,7 @@ def _boundary(path: Path, flow: TheirFlow, grid: Grid, straight: bool) -> tuple[
     return round(float(np.median(along)), 5), round(float(np.nanmean(last)), 4)
 
 
-def _friction(
+def _friction_of_result(
     target: Path, placed: PlacedResult, found: SiteOfResult
 ) -> tuple[Tree, Tree, dict[str, float], dict[Path, str], str]:
     """Friction of the case, priors, values of the run, a raster of classes, and words: one class, or some by value."""

@@ -58,14 +58,14 @@ def read_selafin(path: Path) -> ModelResult:
         order = ">" if file.read(4) == struct.pack(">i", TITLE) else "<"
         file.seek(0)
         try:
-            return _result(path, file, order)
+            return _last_frame(path, file, order)
         except InputError:
             raise
         except (struct.error, ValueError, IndexError, OverflowError):
             raise InputError(f"{shown_path(path)}: expected a SELAFIN file, got a damaged one; copy it anew.") from None
 
 
-def _result(path: Path, file: BinaryIO, order: str) -> ModelResult:
+def _last_frame(path: Path, file: BinaryIO, order: str) -> ModelResult:
     size = path.stat().st_size
     _record(file, order, size)
     first, second = np.frombuffer(_record(file, order, size), f"{order}i4")

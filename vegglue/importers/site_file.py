@@ -48,7 +48,7 @@ def _with_unit(quantity: str) -> Callable[[Any], Any]:
     return converted
 
 
-def _only(wanted: str, is_right: Callable[[Any], bool]) -> AfterValidator:
+def _accepting(wanted: str, is_right: Callable[[Any], bool]) -> AfterValidator:
     """The check of a value that is right or not: what is wanted stands in the refusal."""
 
     def checked(value: Any) -> Any:
@@ -62,7 +62,7 @@ def _only(wanted: str, is_right: Callable[[Any], bool]) -> AfterValidator:
 # Bounds far beyond any stream; what lies outside is a slip of the pen or of the unit.
 PrintableName = Annotated[str, AfterValidator(_printable)]
 Length = Annotated[Number, Field(gt=0, le=1e6)]
-UNMARKED = _only("a measured value, not a mark for none", lambda value: not is_mark_anywhere(value))
+UNMARKED = _accepting("a measured value, not a mark for none", lambda value: not is_mark_anywhere(value))
 Level = Annotated[Number, Field(ge=-1e4, le=1e4), UNMARKED]
 MeasuredDischarge = Annotated[Number, Field(gt=0, le=1e6), UNMARKED]
 
@@ -99,7 +99,7 @@ class FlumeWalls(_SitePart):
     n: Annotated[Number, Field(ge=0.001, le=0.1)] = 0.011
 
 
-def _walled(given: Any) -> Any:
+def _walls(given: Any) -> Any:
     """`walls: true` as walls of a usual n, false as none, and a number as their coefficient."""
     if isinstance(given, bool):
         return {} if given else None
@@ -116,7 +116,7 @@ class PlantedPatch(_SitePart):
     name: PrintableName | None = None
     columns: Annotated[
         dict[str, str],
-        _only(
+        _accepting(
             "the headings of `stems` and `name`, such as `{stems: HEADING}`",
             lambda columns: columns.keys() <= {"stems", "name"},
         ),
@@ -157,7 +157,7 @@ class FileOfSite(_SitePart):
     file: PrintableName
 
 
-def _drawn(given: Any) -> Any:
+def _centreline(given: Any) -> Any:
     """A centreline in a file, as a list of points, or as a case describes one."""
     if isinstance(given, list):
         return CentrelineShape.model_validate({"points": given})
@@ -174,7 +174,7 @@ class SiteGrid(_SitePart):
     x: Interval | None = None
     y: Interval | None = None
     cell: tuple[Positive, Positive] | None = None
-    centreline: Annotated[FileOfSite | CentrelineShape | None, BeforeValidator(_drawn)] = None
+    centreline: Annotated[FileOfSite | CentrelineShape | None, BeforeValidator(_centreline)] = None
 
 
 class SiteFrame(_SitePart):
@@ -230,9 +230,9 @@ class FieldSite(_SitePart):
     frame: SiteFrame | None = None
     classes: FileOfSite | None = None
     result: ResultEntry | None = None
-    walls: Annotated[FlumeWalls | None, BeforeValidator(_walled)] = None
+    walls: Annotated[FlumeWalls | None, BeforeValidator(_walls)] = None
     files: dict[PrintableName, dict[str, Any] | None] = {}
-    experiments: Annotated[dict[PrintableName, MeasuredFlow], _only("one or more, those that were measured", bool)]
+    experiments: Annotated[dict[PrintableName, MeasuredFlow], _accepting("one or more, those that were measured", bool)]
     holdout: dict[PrintableName, MeasuredFlow] = {}
     patches: Annotated[
         tuple[PlantedPatch, ...], BeforeValidator(lambda given: [given] if isinstance(given, dict) else given)

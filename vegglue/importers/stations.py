@@ -121,7 +121,7 @@ def station_tables(
     unnamed = sum(not name for name in names)
     if 0 < unnamed < len(names):  # below a merged cell, say
         without_place = (*without_place, ImportNote(Noted.UNNAMED_SECTIONS, unnamed))
-    named = _named(taken, options, known.names, f"{file}:")
+    named = _with_experiment_and_section(taken, options, known.names, f"{file}:")
     taken, once = _once_in_a_section(named)
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else (ImportNote(Noted.ON_AXIS),)
@@ -135,11 +135,13 @@ def station_tables(
         beside = tuple(ImportNote(Noted.BESIDE_POINTS, names=(kind.words,)) for kind in kinds if not kind.velocity)
         _refuse_zeros(taken, options, file, vertical_role(taken))
         lacking_points = _lacking(taken, ["u", str(vertical_role(taken))], np.all)
-        return StationTables([_points(taken, stem, options)], (*on_axis, *without_place, *lacking_points, *beside))
+        return StationTables(
+            [_points_of_verticals(taken, stem, options)], (*on_axis, *without_place, *lacking_points, *beside)
+        )
     _refuse_zeros(taken, options, file, None)
     _refuse_lost_heights(taken, _places(taken), file)
     refuse_confounded_replicates(named, _places(named), file)
-    found = [_stations(taken, stem, options, kind, place) for kind in kinds]
+    found = [_stations_of_kind(taken, stem, options, kind, place) for kind in kinds]
     without_value = _lacking(taken, [kind.column for kind in kinds], np.any)
     role = vertical_role(taken)
     at_height: tuple[FileNote, ...] = ()
@@ -161,7 +163,9 @@ def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Ma
     return (ImportNote(Noted.LACKING, lacking, tuple(roles)),) if lacking else ()
 
 
-def _named(taken: MeasuredRows, options: FileOptions, experiments: Sequence[str], where: str) -> MeasuredRows:
+def _with_experiment_and_section(
+    taken: MeasuredRows, options: FileOptions, experiments: Sequence[str], where: str
+) -> MeasuredRows:
     """Every row with an experiment and a section, and with a place; rows without a place are left out."""
     place = [role for role in ("x", "y") if role in taken.numbers]
     # Headings that hold the name of an experiment: `12 mei`, `level low`, `12 mei [m+NAP]`.
@@ -396,7 +400,7 @@ def errors_of_rows(taken: MeasuredRows, kind: Kind, options: FileOptions) -> Arr
     return np.where(errors == 0.0, np.nan, errors)
 
 
-def _points(taken: MeasuredRows, stem: str, options: FileOptions) -> StationTable:
+def _points_of_verticals(taken: MeasuredRows, stem: str, options: FileOptions) -> StationTable:
     """Points in the vertical; a section is a case of the file, at the middle of its x, each height of a place once."""
     upward = str(vertical_role(taken))
     kept = taken.only(np.isfinite(taken.numbers["u"]) & np.isfinite(taken.numbers[upward]))
@@ -419,8 +423,8 @@ def _points(taken: MeasuredRows, stem: str, options: FileOptions) -> StationTabl
     }
     names = [f"{one}/{other}" for one, other in zip(kept.texts["experiment"], kept.texts["section"], strict=True)]
     devices = kept.texts.get("device", ["ADV"] * kept.size)
-    places = [map(_place, numbers[role]) for role in ("x", "y", upward)]
-    values = [map(_value, one) for one in (numbers["u"], *optional.values())]
+    places = [map(_written_place, numbers[role]) for role in ("x", "y", upward)]
+    values = [map(_written_value, one) for one in (numbers["u"], *optional.values())]
     rows = [
         [name, device or "ADV", *texts]
         for name, device, texts in zip(names, devices, zip(*places, *values, strict=True), strict=True)
@@ -439,7 +443,9 @@ def _points(taken: MeasuredRows, stem: str, options: FileOptions) -> StationTabl
     return StationTable(file, heading, rows, tuple(observations), ", ".join([points, *sentences(notes)]))
 
 
-def _stations(taken: MeasuredRows, stem: str, options: FileOptions, kind: Kind, channel: Placement) -> StationTable:
+def _stations_of_kind(
+    taken: MeasuredRows, stem: str, options: FileOptions, kind: Kind, channel: Placement
+) -> StationTable:
     """Stations of one kind; values at one place are averaged, and their scatter gives errors if none is stated.
 
     What was measured at a point stands on the map of its centreline, as a case reads it.
@@ -452,7 +458,7 @@ def _stations(taken: MeasuredRows, stem: str, options: FileOptions, kind: Kind, 
     x, y = np.array([place[2:] for place in gathered]).reshape(-1, 2).T
     x, y = channel.to_case(x, y) if kind.at_point else (x, y)
     rows = [
-        [*place[:2], *map(_place, at), *map(_value, mean)]
+        [*place[:2], *map(_written_place, at), *map(_written_value, mean)]
         for place, mean, *at in zip(gathered, means_of_repeats(gathered), x.tolist(), y.tolist(), strict=True)
     ]
     file = f"{stem}-{kind.name}.csv"
@@ -461,12 +467,12 @@ def _stations(taken: MeasuredRows, stem: str, options: FileOptions, kind: Kind, 
     return StationTable(file, heading, rows, (observed(kind.name, file),), made)
 
 
-def _place(length: float) -> str:
+def _written_place(length: float) -> str:
     """As in a table, to a thousandth of a millimetre."""
     return f"{round(float(length), 6):.12g}"
 
 
-def _value(value: float) -> str:
+def _written_value(value: float) -> str:
     """As in a table, to nine digits, as a flume's discharge may be in millilitres; nothing for none.
 
     Of a component that is none only the error of its rounding is left, which is written as 0.

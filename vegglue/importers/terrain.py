@@ -343,7 +343,7 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
             f"{shown_path(path)}: expected a table or a grid, got a geometry of HEC-RAS; write its cross-sections into "
             "a table with the columns section, x, y and z, x from upstream and y from the middle to the left."
         )
-    points, names, taken = _points(path, place, options)
+    points, names, taken = _surveyed_points(path, place, options)
     if sections:
         parts = _cross_sections(path, points, names)
         line = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
@@ -536,7 +536,7 @@ def floatpred_decode(data: Any, axis: int = -2, dist: int = 1, out: object = Non
     return np.moveaxis(levels.reshape(rows.shape), -1, axis)
 
 
-def _points(path: Path, place: Placement, options: FileOptions) -> tuple[Array, list[str], str]:
+def _surveyed_points(path: Path, place: Placement, options: FileOptions) -> tuple[Array, list[str], str]:
     """x, y, z (points, 3) [m], the section of each if a column names it, and what was taken.
 
     Three columns without a heading are x, y and z.

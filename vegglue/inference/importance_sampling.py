@@ -204,7 +204,7 @@ class Emulator:
 
     def predict(self, z: Array) -> Array:
         """Values (m, n) at z (m, p)."""
-        return np.asarray(_terms(_standard(z, self.centre, self.lower), self.powers) @ self.coefficient)
+        return np.asarray(_terms(_standardised(z, self.centre, self.lower), self.powers) @ self.coefficient)
 
 
 def emulator_of_density(
@@ -266,7 +266,7 @@ def fit_emulator(
         for d in range(degree + 1)
         for chosen in combinations_with_replacement(range(p), d)
     )
-    terms = _terms(_standard(z, centre, lower), powers)
+    terms = _terms(_standardised(z, centre, lower), powers)
     weight = _weights(log_density, p)
     size = np.sqrt((weight @ terms**2) / weight.sum())
     root = np.sqrt(weight)[:, None]
@@ -280,7 +280,7 @@ def _weights(log_density: Array, parameters: int) -> Array:
     return np.asarray(1.0 / (1.0 + (log_density.max() - log_density) / (HALF_WEIGHT_DROP * parameters)) ** 2)
 
 
-def _standard(z: Array, centre: Array, lower: Array) -> Array:
+def _standardised(z: Array, centre: Array, lower: Array) -> Array:
     return np.asarray(np.linalg.solve(lower, (z - centre).T).T, np.float64)
 
 

@@ -217,14 +217,14 @@ def log_posterior_under(noise: Noise, model: Model, difference: Difference, z: A
     """
     known = np.isfinite(prediction[:, noise.rows]).all(axis=1)
     left = noise.whiten((noise.value - prediction[np.ix_(known, noise.rows)]).T)
-    along, error = _along(difference, difference.places(model, z[known]), left)
+    along, error = _residuals_along(difference, difference.places(model, z[known]), left)
     misfit = np.sum(left**2, axis=0) - np.sum(along**2 * error / (1.0 + error) - np.log1p(error), axis=0)
     logs = np.full(len(z), -np.inf)
     logs[known] = -0.5 * misfit - 0.5 * np.sum(z[known] ** 2, axis=1)
     return logs
 
 
-def _along(difference: Difference, u: Array, left: Array) -> tuple[Array, Array]:
+def _residuals_along(difference: Difference, u: Array, left: Array) -> tuple[Array, Array]:
     """Whitened residuals (used, k) along the directions of S (r, k), and v times the size of S there (r, k)."""
     return difference.directions @ left, np.outer(difference.size, difference.variance(u))
 
@@ -303,10 +303,10 @@ def learn(command: CommandToLearn, base: ModesAndErrors, start: Mixture, watch: 
             values, weights = drawn.values, drawn.weights
             built_in = values - difference.mean(difference.places(model, drawn.z))
         u = difference.places(model, drawn.z)
-        along, error = _along(difference, u, noise.whiten((noise.value - values[:, noise.rows]).T))
+        along, error = _residuals_along(difference, u, noise.whiten((noise.value - values[:, noise.rows]).T))
         shared = difference.covariance(np.concatenate([u, _places(lost, centre, lower)]))
         theta = np.column_stack([*theta_at(case, drawn.z).values()])
-        apart = _apart(theta, weights, along, error, difference.size, shared[: len(u), : len(u)], random)
+        apart = _errors_of_surrogate(theta, weights, along, error, difference.size, shared[: len(u), : len(u)], random)
         settled = settled + 1 if apart[0] < MEDIAN_WITHIN and apart[1] < SD_WITHIN else 0
         room = command.most - len(z) - failed
         if settled > SETTLED_FOR or room <= 0:
@@ -337,7 +337,7 @@ def learn(command: CommandToLearn, base: ModesAndErrors, start: Mixture, watch: 
     return Learned(replace(base, model=surrogate, noise=under, fits=fits), density, result)
 
 
-def _apart(
+def _errors_of_surrogate(
     theta: Array, weights: Array, along: Array, error: Array, size: Array, shared: Array, random: np.random.Generator
 ) -> tuple[float, float]:
     """Standard errors of medians [standard deviations] and of standard deviations [-], the largest of any parameter.

@@ -97,10 +97,10 @@ def station_table(*parts: pd.DataFrame) -> pd.DataFrame:
     KeyError
         If a column is missing.
     """
-    return _typed(parts, STATION_TYPES)[list(STATION_COLUMNS)]
+    return _with_types(parts, STATION_TYPES)[list(STATION_COLUMNS)]
 
 
-def _typed(parts: Sequence[pd.DataFrame], types: Mapping[str, type]) -> pd.DataFrame:
+def _with_types(parts: Sequence[pd.DataFrame], types: Mapping[str, type]) -> pd.DataFrame:
     if not parts:
         return pd.DataFrame({name: pd.Series(dtype=one) for name, one in types.items()})
     return pd.concat(parts, ignore_index=True).astype(types)
@@ -193,8 +193,8 @@ def read_observations(case: Case) -> Observations:
     refuse_unknown_limits(case, table)
     return Observations(
         table=table,
-        points=_typed([section.points for section in sections.values()], POINT_TYPES),
-        profiles=_typed([section.profiles for section in sections.values()], PROFILE_TYPES),
+        points=_with_types([section.points for section in sections.values()], POINT_TYPES),
+        profiles=_with_types([section.profiles for section in sections.values()], PROFILE_TYPES),
         discharge={key: section.discharge for key, section in sections.items()},
         neighbour_error={key: section.neighbour_error for key, section in sections.items()},
         canopy_height={key: section.canopy_height for key, section in sections.items() if section.canopy_height},

@@ -323,7 +323,7 @@ def carried_discharges(case: Case, site: Site, station: pd.DataFrame) -> list[Ca
     for (experiment, section), rows in velocity.groupby(["experiment", "section"], sort=False):
         if np.ptp(rows["x"]) <= np.ptp(rows["y"]):
             name, own = str(experiment), used[(used["experiment"] == experiment) & (used["kind"] == WATER_LEVEL)]
-            found.append(_carried(case, in_experiment(site, name), name, str(section), rows, own))
+            found.append(_carried_discharge(case, in_experiment(site, name), name, str(section), rows, own))
     return [one for one in found if one is not None]
 
 
@@ -356,7 +356,7 @@ def changing_discharge(case: Case, experiment: str, x: float) -> str:
     return ""
 
 
-def _carried(
+def _carried_discharge(
     case: Case, site: Site, experiment: str, section: str, rows: pd.DataFrame, gauges: pd.DataFrame
 ) -> CarriedDischarge | None:
     """None if fewer than FEWEST_VERTICALS stand in the water, or nothing passes them.

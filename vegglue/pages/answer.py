@@ -254,7 +254,7 @@ def next_steps(run: Run) -> list[NextStep]:
     instruments = [NextStep("check-instrument", instrument=one) for one in found.instruments]
     if found.verdict.doubts_the_data:
         return [NextStep("mend", config), *instruments]
-    return [*_better_model(run, found, config), *_measurements(run, found, config), *instruments]
+    return [*_better_model(run, found, config), *_measurements_worth(run, found, config), *instruments]
 
 
 def _better_model(run: Run, found: Diagnosis, config: str) -> Iterator[NextStep]:
@@ -276,7 +276,7 @@ def _better_model(run: Run, found: Diagnosis, config: str) -> Iterator[NextStep]
         yield NextStep("compare", model=(first.config, run.loop.pages[first.name]))
 
 
-def _measurements(run: Run, found: Diagnosis, config: str) -> Iterator[NextStep]:
+def _measurements_worth(run: Run, found: Diagnosis, config: str) -> Iterator[NextStep]:
     """What to measure, and what no single measurement would settle."""
     questions, ladder = run.loop.questions, run.loop.ladder
     if questions is None:

@@ -287,9 +287,9 @@ def pictures(run: Run) -> dict[str, list[Picture]]:
     """
     weights = draw_weights(run.posterior.sample.weights)
     return {
-        "marginals": [_marginal(run, row) for row in parameter_rows(run)],
-        "joints": list(_joint_posteriors(run)),
-        "plants": list(_plant_drag(run)),
+        "marginals": [_draw_marginal(run, row) for row in parameter_rows(run)],
+        "joints": list(_draw_joint_posteriors(run)),
+        "plants": list(_draw_plant_drag(run)),
         "residuals": list(residuals(run)),
         "verticals": list(verticals(run)),
         "canopy_and_discharge": [*canopy_profiles(run), *discharges(run)],
@@ -348,7 +348,7 @@ def references_of(run: Run, name: str) -> list[ReferenceValue]:
     return found
 
 
-def _marginal(run: Run, row: ParameterRow) -> Picture:
+def _draw_marginal(run: Run, row: ParameterRow) -> Picture:
     name, posterior, canopy = row.parameter.name, run.posterior, run.posterior.canopy
     drawn, references = _drawn_parameter(run, name), references_of(run, name)
     if row.corrected is not None and canopy is not None:  # phi of another canopy height, which values of others are of
@@ -367,7 +367,7 @@ def _marginal(run: Run, row: ParameterRow) -> Picture:
     return published_picture(run, figure, f"posterior-{name}", "caption_marginal", row, sources)
 
 
-def _joint_posteriors(run: Run) -> Iterator[Picture]:
+def _draw_joint_posteriors(run: Run) -> Iterator[Picture]:
     posterior, symbols = run.posterior, symbols_of(run.case)
     names, correlation = posterior.parameters, posterior.marginals.correlation
     pairs = sorted(combinations(range(len(names)), 2), key=lambda pair: -abs(np.nan_to_num(correlation[pair])))
@@ -386,7 +386,7 @@ def _joint_posteriors(run: Run) -> Iterator[Picture]:
         yield published_picture(run, figure, f"joint-{one}-{other}", "caption_joint", *both, r, posterior.claimed)
 
 
-def _plant_drag(run: Run) -> Iterator[Picture]:
+def _draw_plant_drag(run: Run) -> Iterator[Picture]:
     name, cylinder, posterior = plant_parameter(run.case), run.cylinder, run.posterior
     if name is None or cylinder is None:
         return

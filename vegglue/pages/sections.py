@@ -210,7 +210,7 @@ class SectionPanels:
 
 def section_panels(run: Run) -> SectionPanels:
     """Every section at which velocities were measured, drawn and written to run.folder/figures."""
-    stations = _stations(run)
+    stations = _predicted_stations(run)
     stations = stations[velocity_rows(stations) & np.isfinite(stations["value"].to_numpy(float))]
     added, note = accepted_causes(run.behind) if run.behind else "", SYNTHETIC if is_synthetic(run.case) else ""
     taken: set[str] = set()
@@ -229,7 +229,7 @@ def section_panels(run: Run) -> SectionPanels:
             pictures.append(picture)
             reasons = rows[rows["section"] == section].sort_values("y")["reason"]
             words = [phrase("why_unused", one) for one in reasons]
-            data.append(_numbers(picture.name, kind, panel, drawn) | {"reason": words})
+            data.append(_under_pointer(picture.name, kind, panel, drawn) | {"reason": words})
         left = (rows["value"] - rows["before"])[~rows["aside"]]
         title = str(experiment) if kind.name == STREAMWISE else f"{experiment}, {kind.words}"
         experiments.append(ExperimentPanels(title, pictures, float(np.sqrt(np.mean(left**2))) if len(left) else 0.0))
@@ -244,7 +244,7 @@ def safe_json(tree: Any) -> str:
     return "".join(ESCAPED.get(letter, letter) for letter in text)
 
 
-def _stations(run: Run) -> pd.DataFrame:
+def _predicted_stations(run: Run) -> pd.DataFrame:
     """Stations with columns before, after, low and high: of the diagnosis if there is one, else of the posterior."""
     band, total = run.posterior.predicted.model_band, run.posterior.predicted.total_band
     levels = {"low": band[0], "low50": band[1], "middle": band[2], "high50": band[3], "high": band[4]}
@@ -311,7 +311,7 @@ def panel_misfit(panel: SectionPanel, unit: str) -> PanelMisfit:
     return PanelMisfit(y, float(first[worst]), after, unit, inside, int(counted.sum()))
 
 
-def _numbers(name: str, kind: Kind, panel: SectionPanel, drawn: DrawnPanel) -> dict[str, Any]:
+def _under_pointer(name: str, kind: Kind, panel: SectionPanel, drawn: DrawnPanel) -> dict[str, Any]:
     """What the page shows of each station under the pointer, and where it is in the picture [px]."""
 
     def plain(values: Array) -> list[float | None]:

@@ -93,7 +93,7 @@ def new(name: str, reach: Reach | None = None, *, folder: Path | str = ".") -> C
     into = Path(folder) / name
     if into.exists():
         raise InputError(f"{shown_path(into)}: expected a name that is free, got one in use; take another.")
-    words = {"name": case_name(Path(name).name), "plants": reach.plants, **_numbers(reach)}
+    words = {"name": case_name(Path(name).name), "plants": reach.plants, **_grid_and_patch(reach)}
     growing = into.with_name(f".{into.name}.new")
     _clear(growing)
     write_text(growing / "case.yaml", file_text("case.yaml.j2", words), ANOTHER_NAME)
@@ -123,7 +123,7 @@ def _clear(growing: Path) -> None:
             growing.rmdir()
 
 
-def _numbers(reach: Reach) -> dict[str, str]:
+def _grid_and_patch(reach: Reach) -> dict[str, str]:
     """Grid and patch: banks of 1:2 up to half a metre above the water, cells about twice as long as wide."""
     dy = reach.width / CELLS_OF_FLOOR
     beside = int(np.ceil((reach.depth + reach.slope * reach.length + 0.5) / 0.5 / dy))
