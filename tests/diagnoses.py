@@ -149,7 +149,7 @@ def a_diagnosis(
         a_candidate_effect("mixing[D3]", {"width": 0.1}, amplitude=refitted),
         a_candidate_effect("wind", test={"score": 0.3, "p_family": 1.0}, detectability={"testable": False}),
         a_candidate_effect("turning", test={"score": -1.0, "p_family": 0.7}),
-    )  # fmt: skip
+    )
     step = Step(
         "eddies", ("eddies", "mixing[D3]"), (0.7, 0.28), (("eddies", "mixing[D3]"),), 2300.5, 248.1, 0.0, {"bed": 0.02},
         {"bed": an_anomaly(term="bed", unit="m")},

@@ -18,7 +18,7 @@ def flowtracker(places: list[float], depths: list[float], velocities: list[float
         "",
         "St  Clock     Loc  Depth   IceD %Dep  MeasD Npts Spike     Vel   SNR Angle    Verr Bnd    Temp CorrFact MeanV",
         "()     ()     (ft)   (ft)  (ft) (*D)   (ft)   ()    ()   (ft/s)  (dB) (deg)  (ft/s)  ()  (degC)    ()  (ft/s)",
-    ]  # fmt: skip
+    ]
     for number, (at, depth, u) in enumerate(zip(places, depths, velocities, strict=True)):
         at, depth, u = at / FOOT, depth / FOOT, u / FOOT
         lines.append(

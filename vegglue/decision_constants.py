@@ -54,8 +54,8 @@ class DecisionConstants:
         "quantities of one term; after 76 sets of the study of laws with 0, 0.07 and 0.15",
     )  # fmt: skip
     misplaced_share: float = _constant(
-        0.1, "-", MEASURED, "share of an accepted fingerprint that the model may place wrongly; on open-c and open-e",
-    )  # fmt: skip
+        0.1, "-", MEASURED, "share of an accepted fingerprint that the model may place wrongly; on open-c and open-e"
+    )
     scale_evidence: float = _constant(
         6.6, "-", DERIVED, "rise of twice the log-likelihood above which stated errors are too small: 99 % point of "
         "chi2 with one degree of freedom",
@@ -66,8 +66,8 @@ class DecisionConstants:
         "on a floor of 3 m 1.1 1/m, which were 1 after twelve unlisted objects of the blind study",
     )  # fmt: skip
     spot_rise: float = _constant(
-        0.3, "-", CHOSEN, "bed at a place over the mean depth; after the twelve objects and the measured confluence",
-    )  # fmt: skip
+        0.3, "-", CHOSEN, "bed at a place over the mean depth; after the twelve objects and the measured confluence"
+    )
     spot_inflow: float = _constant(0.05, "-", CHOSEN, "water that enters at a place over that of the inflows")
     spot_viscosity: float = _constant(
         0.3, "-", CHOSEN, "viscosity at a place over h u*: the least of streams (Fischer et al. 1979); 0.03 m2/s in "
@@ -107,30 +107,30 @@ class DecisionConstants:
         "strong evidence of Jeffreys (1961); same verdicts of open-a to f from e to e^6, one reading of open-b apart",
     )  # fmt: skip
     same_kind_odds: float = _constant(
-        3.0, "-", CHOSEN, "odds within which a rival of the same kind is followed; after open-l and two drawn sites",
-    )  # fmt: skip
+        3.0, "-", CHOSEN, "odds within which a rival of the same kind is followed; after open-l and two drawn sites"
+    )
     common_omission: float = _constant(
         3.0, "-", CHOSEN, "prior weight of a common omission, two surfaces stated as one, beside another listed "
         "effect; after the compound channel A1 of docs/measured.md, whose grass four effects explain alike",
     )  # fmt: skip
     listed_over_laws: float = _constant(
-        10.0, "-", CHOSEN, "prior odds of all listed effects together to all laws together",
-    )  # fmt: skip
+        10.0, "-", CHOSEN, "prior odds of all listed effects together to all laws together"
+    )
     set_chance: float = _constant(0.95, "-", CHOSEN, "chance that a set holds; before the blind study", True)
     rival_share: float = _constant(
         0.05, "-", CHOSEN, "chance of a rival over the best one's below which it is excluded: odds of 20, strong "
         "evidence of Kass and Raftery (1995)",
     )  # fmt: skip
     alike_cosine: float = _constant(
-        0.9, "-", CHOSEN, "cosine of projected fingerprints above which the data cannot separate them", True,
-    )  # fmt: skip
+        0.9, "-", CHOSEN, "cosine of projected fingerprints above which the data cannot separate them", True
+    )
     # Alarms.
     false_alarm_rate: float = _constant(0.05, "-", CHOSEN, "rate at which errors alone sound the first alarm: usual")
     later_alarm_share: float = _constant(0.2, "-", CHOSEN, "rate of later alarms over that of the first")
     law_alarm_rate: float = _constant(0.01, "-", CHOSEN, "rate at which errors alone sound the alarm of laws")
     effect_alarm_rate: float = _constant(
-        0.04, "-", CHOSEN, "rate at which errors alone reach the score that counts as detectable",
-    )  # fmt: skip
+        0.04, "-", CHOSEN, "rate at which errors alone reach the score that counts as detectable"
+    )
     # The verdict.
     instrument_errors: float = _constant(
         4.5, "standard errors", CHOSEN, "offset of an instrument that is a verdict; after seven false alarms of 3.1 to "
@@ -146,11 +146,11 @@ class DecisionConstants:
         "reported: 3 cm in 1 m, as surveys of natural reaches are judged",
     )  # fmt: skip
     held_out_ratio: float = _constant(
-        1.3, "-", CHOSEN, "held-out errors over expected ones above which the model disagrees with the data",
-    )  # fmt: skip
+        1.3, "-", CHOSEN, "held-out errors over expected ones above which the model disagrees with the data"
+    )
     absurd_misfit: float = _constant(
-        4.0, "-", CHOSEN, "chi2 over its degrees of freedom above which no name is believed: twice all errors allowed",
-    )  # fmt: skip
+        4.0, "-", CHOSEN, "chi2 over its degrees of freedom above which no name is believed: twice all errors allowed"
+    )
     absurd_errors: float = _constant(
         4.0, "-", CHOSEN, "errors over stated ones, with all that was found, above which no name is believed; after A1 "
         "(2.3, named rightly) and F (6.0, wrongly) of docs/measured.md; in 347 runs of open, drawn and measured sites "
@@ -172,18 +172,18 @@ class DecisionConstants:
         "are good to a quarter",
     )  # fmt: skip
     largest_correlation: float = _constant(
-        0.8, "-", CHOSEN, "correlation of errors above which they, not the model, explain the misfit", True,
-    )  # fmt: skip
+        0.8, "-", CHOSEN, "correlation of errors above which they, not the model, explain the misfit", True
+    )
     testable_share: float = _constant(
-        0.25, "-", CHOSEN, "share of effects that must be testable before nothing is found missing",
-    )  # fmt: skip
+        0.25, "-", CHOSEN, "share of effects that must be testable before nothing is found missing"
+    )
     most_groups: float = _constant(3.0, "-", CHOSEN, "groups of effects above which a set is too wide to be stated")
     poor_fit_chance: float = _constant(
-        1e-3, "-", CHOSEN, "chance of the last misfit under errors alone below which something is still missing",
-    )  # fmt: skip
+        1e-3, "-", CHOSEN, "chance of the last misfit under errors alone below which something is still missing"
+    )
     needed_errors: float = _constant(
-        2.0, "standard errors", CHOSEN, "distance of an amplitude from off below which an earlier effect is dropped",
-    )  # fmt: skip
+        2.0, "standard errors", CHOSEN, "distance of an amplitude from off below which an earlier effect is dropped"
+    )
 
 
 @dataclass(frozen=True)

@@ -70,9 +70,7 @@ def test_shapes_calibrated_with_the_amplitude_are_parameters_of_a_case_and_numbe
     assert added == {f"inflow_distribution_{name}" for name in ("excess", *others)}
     cause = cause_of(CASE, one, {"mode": 2.0})
     assert set(cause.case.parameters) - set(CASE.parameters) == {cause.parameter}
-    assert cause.case.effects[one.key].values == {
-        "excess": cause.parameter, "mode": 2.0, **dict.fromkeys(others, 0.0),
-    }  # fmt: skip
+    assert cause.case.effects[one.key].values == {"excess": cause.parameter, "mode": 2.0, **dict.fromkeys(others, 0.0)}
     assert set(child_tree(CASE, tmp_path / "child.yaml", [(one, {"mode": 2.0})])["parameters"]) == added
 
 

@@ -109,9 +109,9 @@ def test_a_case_in_a_bend(tmp_path: Path) -> None:
 
 def test_surveys_and_rasters_lie_on_the_map(tmp_path: Path) -> None:
     """A bed z = x / 100 + y / 50 of surveyed points, read at the cells of the bend."""
-    (tmp_path / "z.csv").write_text("x,y,z\n" + "".join(
-        f"{x},{y},{x / 100 + y / 50}\n" for x in (-20, 80) for y in (-20, 70)
-    ))  # fmt: skip
+    (tmp_path / "z.csv").write_text(
+        "x,y,z\n" + "".join(f"{x},{y},{x / 100 + y / 50}\n" for x in (-20, 80) for y in (-20, 70))
+    )
     head = "ncols 50\nnrows 46\nxllcorner -20\nyllcorner -20\ncellsize 2\n"
     rows = [" ".join(str((-19 + 2 * i) / 100 + (71 - 2 * j) / 50) for i in range(50)) for j in range(46)]
     (tmp_path / "z.asc").write_text(head + "\n".join(rows))

@@ -78,7 +78,7 @@ def test_what_is_significant_in_the_last_model_is_kept_unless_it_is_in_it() -> N
         fingerprints=SimpleNamespace(candidates=[SimpleNamespace(name=name) for name in chances]),
         best_score=lambda j: [-4.0, 3.5, 5.0][j],
         effects=SimpleNamespace(p_of=lambda score: {4.0: 0.008, 3.5: 0.02, 5.0: 0.001}.get(score, 0.3)),
-    )  # fmt: skip
+    )
     assert significant_effects(last, SearchState(steps=(step("jet"),))) == {"wind": 0.008}
     assert significant_effects(last, SearchState(steps=(step("jet"),)), slack=1.0) == {}
 

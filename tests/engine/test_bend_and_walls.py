@@ -174,10 +174,10 @@ def test_members_far_away_are_those_newton_finds(model: Model) -> None:
 
 def test_answers_to_cells_of_a_flume_add_up_to_the_slope() -> None:
     """Where the rows beside the sides are wet an inflow shared out by depth couples them all: 3 % were lost."""
-    case = Case.model_validate(TREE | {
-        "inflows": {"main": {"side": "west"}},
-        "experiments": {"one": {"discharge": {"main": 0.04}, "level": 0.1}},
-    })  # fmt: skip
+    case = Case.model_validate(
+        TREE
+        | {"inflows": {"main": {"side": "west"}}, "experiments": {"one": {"discharge": {"main": 0.04}, "level": 0.1}}}
+    )
     seen = stations()
     seen = seen[(seen["kind"] == "velocity") & (seen["x"] > 2.0)].reset_index(drop=True)
     model = Model(case, build_site(case), seen, NEWTON)

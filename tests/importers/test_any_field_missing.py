@@ -280,8 +280,7 @@ def _vectrino() -> Format:
         path.with_suffix(".hdr").write_text(VECTRINO_HEADING, encoding="utf-8")
 
     read = {"3", "4", "5", *map(str, range(15, 19))}
-    return Format("p.dat", AT, rows, write, ("NaN", "-32.768", "-999", "99999"),
-                  frozenset({*headings} - read))  # fmt: skip
+    return Format("p.dat", AT, rows, write, ("NaN", "-32.768", "-999", "99999"), frozenset({*headings} - read))
 
 
 def _vector() -> Format:
@@ -537,9 +536,7 @@ def test_a_pixel_marked_as_missing_is_no_level(tmp_path: Path, column: int, row:
 
 
 @SOME
-@given(
-    row=st.integers(0, 11), column=st.sampled_from("xyz"), mark=st.sampled_from(OF_TEXT), sections=st.booleans(),
-)  # fmt: skip
+@given(row=st.integers(0, 11), column=st.sampled_from("xyz"), mark=st.sampled_from(OF_TEXT), sections=st.booleans())
 def test_a_point_of_the_bed_marked_as_missing_is_none(
     tmp_path: Path, row: int, column: str, mark: str, sections: bool
 ) -> None:
@@ -564,11 +561,11 @@ def test_a_point_of_the_bed_marked_as_missing_is_none(
 
 @SOME
 @given(
-    which=st.integers(0, 2), column=st.sampled_from(["stems", "name", "x", "y"]), ending=st.sampled_from(
-        [".geojson", ".shp", ".csv"]
-    ),
+    which=st.integers(0, 2),
+    column=st.sampled_from(["stems", "name", "x", "y"]),
+    ending=st.sampled_from([".geojson", ".shp", ".csv"]),
     mark=st.sampled_from([None, float("nan"), -9999.0, 9999.0, 1e30]),
-)  # fmt: skip
+)
 def test_a_patch_with_a_mark_is_refused_or_as_the_others(
     tmp_path: Path, which: int, column: str, ending: str, mark: float | None
 ) -> None:
@@ -735,9 +732,8 @@ def test_a_summary_of_qrev_without_a_value_has_none(tmp_path: Path, mark: str, n
 
 @SOME
 @given(
-    place=st.integers(0, 3), axis=st.integers(0, 1),
-    mark=st.sampled_from([None, float("nan"), -9999.0, -999.0, 1e30]),
-)  # fmt: skip
+    place=st.integers(0, 3), axis=st.integers(0, 1), mark=st.sampled_from([None, float("nan"), -9999.0, -999.0, 1e30])
+)
 def test_a_centreline_with_a_mark_is_refused(tmp_path: Path, place: int, axis: int, mark: Any) -> None:
     corners: list[list[Any]] = [[0.0, 0.0], [20.0, 1.0], [40.0, 0.0], [60.0, -2.0]]
     corners[place][axis] = mark

@@ -156,7 +156,7 @@ SCALED = '<Item name="SCALE" sample="0" role="scale">0.01</Item><Item name="OFFS
         ("", (4099, 0, 1, 9003), 200 * 1200 / 3937),
         ("", (4099, 0, 1, 9001), 200.0),
     ],
-)  # fmt: skip
+)
 def test_scale_offset_and_unit_of_a_geotiff_count(
     tmp_path: Path, item: str, keys: tuple[int, ...], level: float
 ) -> None:
@@ -474,7 +474,7 @@ def test_a_raster_without_levels_is_refused(tmp_path: Path) -> None:
         ("urn:ogc:def:crs:OGC:1.3:CRS84", (5.3813, 52.1506), "degrees"),
         ("urn:ogc:def:crs:EPSG::28992", (155090.0, 463072.0), ""),
     ],
-)  # fmt: skip
+)
 def test_polygons_of_another_system_are_refused(
     tmp_path: Path, crs: str, corner: tuple[float, float], refused: str
 ) -> None:
@@ -580,9 +580,9 @@ def test_a_density_is_known_by_its_heading_and_its_unit(
 
 
 @pytest.mark.parametrize(
-    ("heading", "units"), [("name,x,y,stems", ["m", "1/m2"]), ("name,x_m,y [m],stems", ["1/m2"]),
-    ("name,x_cm,y_cm,stems_per_m2", [])]
-)  # fmt: skip
+    ("heading", "units"),
+    [("name,x,y,stems", ["m", "1/m2"]), ("name,x_m,y [m],stems", ["1/m2"]), ("name,x_cm,y_cm,stems_per_m2", [])],
+)
 def test_units_that_a_table_of_patches_does_not_state_are_reported(
     tmp_path: Path, heading: str, units: list[str]
 ) -> None:

@@ -350,7 +350,7 @@ def test_rows_without_a_value_may_name_any_experiment(tmp_path: Path) -> None:
         ("x;y;u;Remarks\n12;0;0.4;\n12;1;0.3;in reeds\n12;2;0.4;\n", "`survey.txt: {experiment: low}`"),
         ("run;debiet [l/s];opmerking\nlow;620;meetschot\nmid;1400;ADCP, 4 raaien\n", "`discharge` of low"),
     ],
-)  # fmt: skip
+)
 def test_a_table_that_hides_its_experiments_is_refused_with_what_to_write(
     tmp_path: Path, table: str, words: str
 ) -> None:

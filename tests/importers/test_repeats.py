@@ -164,7 +164,7 @@ SQUARE, OBLIQUE = "[[12, 1.5], [12, -1.5]]", "[[12, 1.5], [15, -1.5]]"
         (OBLIQUE, "x13.06", ["0.12", "0.25", "0.25", "0.12"], []),
         (SQUARE, "x12.00", ["1.8"] * 4, [1.8]),
     ],
-)  # fmt: skip
+)
 def test_a_discharge_beside_verticals_is_that_of_the_section_or_a_share(
     tmp_path: Path, line: str, section: str, discharges: list[str], kept: list[float]
 ) -> None:

@@ -196,9 +196,7 @@ def test_the_report_has_a_whole_diagnosis(tmp_path: Path) -> None:
     assert "ddies &lt;b&gt;or so&lt;/b&gt;" in text
     assert all(f"<b>{one.name}</b>" in text for one in found.candidate_effects)
     drawn = {path.stem for path in (tmp_path / "figures").glob("missing-*.svg")}
-    assert drawn == {
-        "missing-suspects", "missing-places", "missing-zones", "missing-alike", "missing-gauges"
-    }  # fmt: skip
+    assert drawn == {"missing-suspects", "missing-places", "missing-zones", "missing-alike", "missing-gauges"}
     assert drawn <= set(page.ids)
 
 

@@ -16,7 +16,7 @@ NOISES = (
     ("white errors", "white"),
     ("neighbours correlated by 0.5", "ar1:0.5"),
     ("errors 1.5 times as stated", "understated:1.5"),
-)  # fmt: skip
+)
 RATIOS = (("3 s.e.", ("listed3",)), ("6 s.e.", ("listed6",)))
 LISTED, TWO = ("listed3", "listed6"), ("pair", "probe")
 # Data sets that were looked at one by one when places were changed, or that a rule which was chosen after them changed:
@@ -117,9 +117,7 @@ def interval(successes: int, trials: int) -> tuple[float, float]:
 
 def made(records: Sequence[Record], truth: str, case: str = "") -> list[Record]:
     """Data sets that were made of one truth, in one case or in all."""
-    return [
-        one for one in records if one["truth"] == truth and case in ("", one["case"]) and "left_out" not in one
-    ]  # fmt: skip
+    return [one for one in records if one["truth"] == truth and case in ("", one["case"]) and "left_out" not in one]
 
 
 def counts(records: Sequence[Record], line: Line) -> tuple[int, int]:

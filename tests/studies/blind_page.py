@@ -146,7 +146,7 @@ def _data_limits(
     groups = {
         group: [one for key, one in ideal.items() if f"/{group}/" in key]
         for group in ("unlisted", "listed6", "listed3")
-    }  # fmt: skip
+    }
     if all(groups.values()):
 
         def mean(name: str, group: str = "unlisted") -> str:

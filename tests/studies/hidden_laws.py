@@ -38,7 +38,7 @@ FORMS: dict[str, Callable[[Array, Array | float], Array]] = {
     "wave": lambda q, r: np.sin(2.0 * np.pi * (q - r)),
     "bow": lambda q, r: 4.0 * (q - r) ** 2,
     "place": lambda q, r: 1.0 / (1.0 + np.exp(-100.0 * (q - r))) - 0.5,
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)

@@ -51,9 +51,7 @@ PAPER = Channel(
     (1.0,) * 4 + (7.3 / 22.0,) * 3, 4.5,
 )  # fmt: skip
 # Banks as its config writes them, and two patches.
-SHORT = Channel(
-    32.0, 1.5, 0.6667, 0.001, (((8.0, 12.0), (-1.5, 0.0)), ((18.0, 22.0), (0.0, 1.5))), (1.0, 0.5), 3.75,
-)  # fmt: skip
+SHORT = Channel(32.0, 1.5, 0.6667, 0.001, (((8.0, 12.0), (-1.5, 0.0)), ((18.0, 22.0), (0.0, 1.5))), (1.0, 0.5), 3.75)
 
 
 def lie_of(channel: Channel, x: Field, y: Field, dx: float = 0.0, dy: float = 0.0) -> Lie:

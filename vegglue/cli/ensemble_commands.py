@@ -27,7 +27,7 @@ from vegglue.cli.terminal import (
     opened_run,
     print_doubts_of_ensemble,
     print_object,
-)  # fmt: skip
+)
 from vegglue.errors import InputError, shown_path
 from vegglue.wording.commands import DEMO, HELP
 from vegglue.wording.sentences import phrase

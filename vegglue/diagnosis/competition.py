@@ -170,10 +170,9 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
     far = ~((places.length == places.length[spot]) & within)
     # Elsewhere first-order evidence promises as much too much as at the spot that was refitted.
     kept = refit.log_factor - float(log_factors(kind.scores, kind.size)[spot])
-    weight = np.concatenate([
-        kind.log_evidence[far] + kept,
-        window.log_factor + kind.log_prior[spot] + 2.0 * np.log(SHARE_OF_SPACING),
-    ])  # fmt: skip
+    weight = np.concatenate(
+        [kind.log_evidence[far] + kept, window.log_factor + kind.log_prior[spot] + 2.0 * np.log(SHARE_OF_SPACING)]
+    )
     away = np.stack([
         np.concatenate([places.x[far], window.x]) - moved.shapes["x"],
         np.concatenate([places.y[far], window.y]) - moved.shapes["y"],

@@ -44,9 +44,7 @@ VELOCITY_UNITS = {
 }  # fmt: skip
 DISCHARGE_UNITS = {"ft3/s": (18.0, 70.0), "l/s": (300.0, 3000.0)}
 TENFOLD = "dm, or mm taken for cm"
-LEVEL_UNITS = {
-    "ft": 0.3048, TENFOLD: 0.1, "cm": 0.01, "mm": 0.001, "m, taken for cm": 100.0, "m, taken for mm": 1000.0,
-}  # fmt: skip
+LEVEL_UNITS = {"ft": 0.3048, TENFOLD: 0.1, "cm": 0.01, "mm": 0.001, "m, taken for cm": 100.0, "m, taken for mm": 1000.0}
 # Share of the depth [-] within which a tenth of a level must lie at the outlet's: another datum may do as much.
 NEAR_THE_OUTLET = 0.25
 # Depth over width of the grid [-] that no channel has: flumes reach 1.

@@ -302,10 +302,7 @@ def save_diagnosis_figure(diagnosis: Diagnosis, case: Case, path: Path) -> None:
 # Width of a column of the misfit by zone [inch]: a square and two numbers stand in it.
 ZONE_WIDTH = 0.72
 # What the parts of the picture of a diagnosis show.
-TITLES = (
-    "candidates", "alike",
-    "zones", "spots",
-)  # fmt: skip
+TITLES = ("candidates", "alike", "zones", "spots")
 
 
 def save_fingerprint_figure(trace: np.ndarray, station: pd.DataFrame, size: str, path: Path) -> None:

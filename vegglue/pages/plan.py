@@ -117,9 +117,8 @@ def days_of_work(case: Case, plan: FieldPlan, places: Sequence[FieldPlace]) -> l
         days: list[list[WorkInFlow]] = []
         for piece in sorted(of_flow, key=lambda one: (order.get(one.work, 2), -one.x)):
             place = next(
-                one for one in places
-                if one.work is piece.work and one.x == piece.x and set(piece.y) <= set(one.y)
-            )  # fmt: skip
+                one for one in places if one.work is piece.work and one.x == piece.x and set(piece.y) <= set(one.y)
+            )
             work = next((one for one in days if one[-1].ends + piece.hours <= DAY + LATER), None)
             if work is None:
                 days.append(work := [])

@@ -68,9 +68,7 @@ from vegglue.wording.sentences import tag_of, tagged
 AT_STATIONS = ("prediction_first", "prediction", "error")
 STATION_VALUES = dict.fromkeys(AT_STATIONS, Stored(("station",)))
 SPOTS = dict.fromkeys(("x", "y", "score"), Stored(("place",)))
-FIELD_MAP = {
-    "x": Stored(("x",)), "y": Stored(("y",)), "value": Stored(("x", "y")), "error": Stored(("x", "y")),
-}  # fmt: skip
+FIELD_MAP = {"x": Stored(("x",)), "y": Stored(("y",)), "value": Stored(("x", "y")), "error": Stored(("x", "y"))}
 ENDS = ("low95", "high95", "least", "most")  # of the interval and of the support of an amplitude
 NUMBERS_OF_CANDIDATE = (
     "amplitude", "score", "p_family", "visibility", "smallest_detectable", "objective", "likeness", "off", "scale",

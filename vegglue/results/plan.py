@@ -373,9 +373,7 @@ def plan_json(plan: FieldPlan) -> dict[str, Any]:
 
 # Letters before the numbers of places, by their work.
 LETTERS = {Work.TRANSECT: "T", Work.POINT: "V", Work.GAUGE: "G", Work.DISCHARGE: "Q", Work.SURVEY_LINE: "L"}
-KIND_OF_WORK = {
-    Work.TRANSECT: STREAMWISE, Work.POINT: STREAMWISE, Work.GAUGE: WATER_LEVEL, Work.DISCHARGE: "discharge",
-}  # fmt: skip
+KIND_OF_WORK = {Work.TRANSECT: STREAMWISE, Work.POINT: STREAMWISE, Work.GAUGE: WATER_LEVEL, Work.DISCHARGE: "discharge"}
 # Folder of the sheet in that of the plan, and key of its site file that names the case.
 SHEET, OF_CASE = "sheet", "case"
 WGS84 = "EPSG:4326"
