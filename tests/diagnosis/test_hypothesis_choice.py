@@ -10,6 +10,7 @@ from vegglue.diagnosis.competition import (
     What,
     chance_of_a_place,
     chosen_hypothesis,
+    log_odds_taken,
     nearly_as_likely,
     odds_against_nothing,
     under_larger_errors,
@@ -98,3 +99,15 @@ def test_a_place_beside_a_misfit_that_nothing_explains_does_not_lead_nothing() -
     at_stated = np.array([3.8])
     found = under_larger_errors(at_stated, np.array([16.0]), 497.0, 285)
     assert odds_against_nothing(found) < 1.0 < constants().missing_odds < odds_against_nothing(at_stated)
+
+
+def test_only_what_would_be_taken_counts_beside_a_rival() -> None:
+    """What is followed a step further has the evidence of all that would be taken then, and of nothing else."""
+
+    def next_to(*evidence: float) -> float:
+        return log_odds_taken(np.array(evidence))
+
+    least = np.log(constants().missing_odds)
+    assert next_to(least - 0.1) == next_to(-np.inf, -1.0) == 0.0
+    assert next_to(least + 0.1) == pytest.approx(least + 0.1)
+    assert next_to(2.0, 2.0) == pytest.approx(2.0 + np.log(2.0))

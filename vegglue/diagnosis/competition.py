@@ -18,7 +18,8 @@ b is ln B to first order of the same thing at another place, in the flow with it
 seen at its true size. The best of such places is refitted, until none promises more. Of the evidence, the spots of the
 screening near by are replaced by the mean over these places, which stand closer.
 
-Hypotheses nearly as likely as the best are followed a step further, and what is vaguer has to lead. Something at a
+Hypotheses nearly as likely as the best are followed a step further, with all that would be taken then, as it competes
+there: to first order it promises more than it keeps. What is vaguer has to lead. Something at a
 place says "none of what is known", which is vague: all places together have to lead all that is known by
 known_first_odds. Which of the places is taken need not be sure: they say the same. A place that nothing rivals within
 strong_odds is taken as it is: nothing is followed beside it.
@@ -562,6 +563,12 @@ def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
 def odds_against_nothing(evidence: Array) -> float:
     """sum of e^E_j: the odds that one of them is missing, and not nothing, both as likely before [-]."""
     return float(np.exp(min(logsumexp(evidence), LARGEST_LOG_ODDS)))
+
+
+def log_odds_taken(evidence: Array) -> float:
+    """ln of these odds, 0 where they are below missing_odds and none is taken [-]."""
+    odds = odds_against_nothing(evidence)
+    return float(np.log(odds)) if odds >= constants().missing_odds else 0.0
 
 
 def worth_refitting(evidence: Array, best: float) -> list[int]:

@@ -32,8 +32,8 @@ from vegglue.diagnosis.competition import (
     chosen_hypothesis,
     evidence_under_larger_errors,
     hypotheses_of,
+    log_odds_taken,
     nearly_as_likely,
-    odds_against_nothing,
     tempered_probabilities,
     under_larger_errors,
 )
@@ -113,14 +113,15 @@ MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
 
 @dataclass(frozen=True)
 class SearchBranch:
-    """What is found with one hypothesis more, what that is, the model that follows, and its screening where it is at
-    hand.
+    """What is found with one hypothesis more, what that is, the model that follows, and where they are at hand its
+    screening and what competes next.
     """
 
     what: What
     found: SearchState
     base: Baseline
     screening: Screening | None = None
+    hypotheses: Sequence[Hypothesis] = ()
 
 
 def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = None) -> Diagnosis:
@@ -141,6 +142,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
     watch(Progress(SEARCHING))
     first = screening = screen(base)
     found, effects = SearchState(implausible=implausible), dict[str, CandidateEffect]()
+    hypotheses: Sequence[Hypothesis] = ()
     laws = partial(laws_beside, first) if implausible else submit(laws_beside, first)
     while True:
         tested = candidate_effects_of(screening)
@@ -149,7 +151,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         found = _with_alarm(screening, found)
         if found.implausible or not found.alarmed:
             break
-        hypotheses = hypotheses_of(screening, watch)
+        hypotheses = hypotheses or hypotheses_of(screening, watch)
         effects |= refitted(hypotheses, tested)
         branch = _best_branch(screening, hypotheses, found, watch)
         if isinstance(branch, Undecided):
@@ -163,8 +165,8 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         base, again, effects = with_rivals_again(base, earlier, found.flagged, effects, watch)
         found = found.with_steps((*again, *last))
         watch(Progress(SEARCHING_WITH))
-        at_hand = branch.screening if base is branch.base else None
-        screening = at_hand or screen(base, found.flagged)
+        kept = branch if base is branch.base else SearchBranch(branch.what, found, base)
+        screening, hypotheses = kept.screening or screen(base, found.flagged), kept.hypotheses
         model, fitted = screening.base.model, screening.base.fitted
         for step in found.steps:  # with the amplitude in the model as it is now
             one = effects[step.accepted]
@@ -189,15 +191,14 @@ def _best_branch(
     come next, see `competition`.
     """
 
-    def screened(one: SearchBranch) -> SearchBranch:
-        return replace(one, screening=screen(one.base, one.found.flagged))
+    def with_what_is_next(one: SearchBranch, further: Screening) -> SearchBranch:
+        alarmed = _with_alarm(further, one.found).alarmed
+        return replace(one, screening=further, hypotheses=hypotheses_of(further, watch) if alarmed else ())
 
     def further(one: SearchBranch) -> float:
-        """ln evidence of the best that could come next, to first order."""
+        """ln evidence of all that would be taken next, as it competes: to first order it promises more."""
         assert one.screening is not None
-        if not _with_alarm(one.screening, one.found).alarmed:
-            return 0.0
-        return max(0.0, *(kind.total for kind in one.screening.kinds))
+        return log_odds_taken(evidence_under_larger_errors(one.screening, one.hypotheses)) if one.hypotheses else 0.0
 
     def prospect(one: SearchBranch) -> float:
         """ln evidence of a model and of what could come next, less that of the prior so far; of a place as it competed,
@@ -206,14 +207,15 @@ def _best_branch(
         before = found.log_prior + found.of_shape
         return log_evidence(one.base) + one.found.log_prior + one.found.of_shape - before + further(one)
 
-    if odds_against_nothing(evidence_under_larger_errors(screening, hypotheses)) < constants().missing_odds:
+    if not log_odds_taken(evidence_under_larger_errors(screening, hypotheses)):
         return Undecided(tuple(hypotheses), tuple(chances_of(hypotheses)))
     rivals = nearly_as_likely(hypotheses)
     branches = in_threads(branch_with, [(screening, hypotheses, j, found, watch) for j in rivals])
     possible = [(j, one) for j, one in zip(rivals, branches, strict=True) if one is not None]
     if len(possible) < 2:
         return possible[0][1] if possible else Undecided(tuple(hypotheses), tuple(chances_of(hypotheses)))
-    ends = in_threads(screened, [(one,) for _, one in possible])
+    screened = in_threads(screen, [(one.base, one.found.flagged) for _, one in possible])
+    ends = [with_what_is_next(one, further) for (_, one), further in zip(possible, screened, strict=True)]
     evidence = np.array([prospect(one) for one in ends]) - log_evidence(screening.base)
     followed = [hypotheses[j] for j, _ in possible]
     names, chances = [one.name for one in followed], tempered_probabilities(evidence)
