@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.spatial.distance import cdist
 from scipy.special import logsumexp, ndtri
 
 from vegglue.arrays import Array
@@ -114,12 +115,13 @@ class Conditional:
 
 def correlation_of_bed(places: Array, others: Array, along: float, across: float, rough: bool) -> Array:
     """M (n, m) [-] between places (n, >= 2) and others (m, >= 2) [m]."""
-    found = np.empty((len(places), len(others)))
+    found, axes = np.empty((len(places), len(others))), slice(1 if rough else 0, 2)
+    here, there = (each[:, :2] / (along, across) for each in (places, others))
     for first in range(0, len(others), PLACES_AT_A_TIME):
-        some = slice(first, first + PLACES_AT_A_TIME)
-        dx, dy = (np.abs(places[:, None, axis] - others[None, some, axis]) for axis in (0, 1))
-        q = np.sqrt(5.0) * (dy / across if rough else np.hypot(dx / along, dy / across))
-        found[:, some] = (1.0 + q + q**2 / 3.0) * np.exp(-q - (dx / along if rough else 0.0))
+        some = there[first : first + PLACES_AT_A_TIME]
+        q = np.sqrt(5.0) * cdist(here[:, axes], some[:, axes])
+        fall = q + np.abs(here[:, None, 0] - some[None, :, 0]) if rough else q
+        found[:, first : first + PLACES_AT_A_TIME] = (1.0 + q + q**2 / 3.0) * np.exp(-fall)
     return found
 
 
