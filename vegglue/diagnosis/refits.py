@@ -99,18 +99,25 @@ def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = 
 
 def _best_of_starts(search: SearchModel, trial: RefitTrial) -> MapEstimate | None:
     """The best end of all starts, or of a share of the way to them from the amplitude off, each later one followed
-    while it promises more than those before it.
+    while it promises more than those before it. Flows are found from the nearest that is known, the nearest first.
     """
     model, candidate, best = _with(search.model, trial), trial.candidate, None
     here = start_with(candidate, search.point.z, 0.0)
-    for start in trial.starts:
-        enough = np.inf if best is None else best.objective - WORTH_FOLLOWING
+    known: list[tuple[Array, Point]] = [(here, search.point)]
+    points = dict[int, Point]()
+    for number in np.argsort([np.linalg.norm(start - here) for start in trial.starts], kind="stable").tolist():
+        start = trial.starts[number]
+        near = min(known, key=lambda one: float(np.linalg.norm(start - one[0])))[1]
         ways = (np.asarray(here + share * (start - here)) for share in SHARES_OF_START)
-        point = next((one for z in ways if (one := linearise_from(model, z, search.point)) is not None), None)
+        point = next((one for z in ways if (one := linearise_from(model, z, near)) is not None), None)
         if point is not None:
-            steps = REFIT_STEPS + SHAPE_STEPS * len(candidate.fitted)
-            found = fit(model, search.noise, point, steps, enough)
-            best = found if best is None or found.objective < best.objective else best
+            points[number] = point
+            known.append((point.z, point))
+    steps = REFIT_STEPS + SHAPE_STEPS * len(candidate.fitted)
+    for number in sorted(points):
+        enough = np.inf if best is None else best.objective - WORTH_FOLLOWING
+        found = fit(model, search.noise, points[number], steps, enough)
+        best = found if best is None or found.objective < best.objective else best
     return best
 
 
