@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from result_files import GridFlow, a_flow, at_nodes, write_flow_fm, write_hec_ras, write_selafin, write_trim
@@ -88,6 +89,17 @@ def test_flow_fm(tmp_path: Path, classic: bool) -> None:
     result = read_result(path)
     assert (result.code, result.crs) == ("D-Flow FM", "EPSG:28992")
     compare(result, flow)
+
+
+@pytest.mark.parametrize("name", ["mesh2d_face_nodes", "mesh2d_node_x"])
+def test_a_mesh_without_its_nodes_is_refused_by_their_name(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "map.nc"
+    write_flow_fm(path, a_flow(), classic=False)
+    with h5py.File(path, "a") as file:
+        del file[name]
+    with pytest.raises(InputError) as caught:
+        read_result(path)
+    assert (caught.value.kind, caught.value.values["missing"]) == ("not_on_mesh", [name])
 
 
 def test_ghost_cells_of_a_partition(tmp_path: Path) -> None:

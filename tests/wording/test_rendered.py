@@ -455,6 +455,7 @@ REFUSED = [
         InputError("invalid_json", file=Path("site.json"), line=2, column=14, why=why)
         for why in ("Expecting property name enclosed in double quotes", "Extra data", "of another version of Python")
     ),
+    *(InputError("no_result", file=Path("map.nc"), mesh=mesh) for mesh in (True, False)),
     InputError("no_geojson", file=Path("p.geojson"), what="polygons"),
     *(
         InputError("missing_columns", file=CSV, wanted=("x", "y", "u"), got=got, missing=missing)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from vegglue.errors import InputError, shown_path
+from vegglue.errors import InputError
 from vegglue.importers.delft3d_trim import read_delft3d_trim
 from vegglue.importers.hec_ras import read_hec_ras
 from vegglue.importers.library_files import read_by_library
@@ -66,10 +66,7 @@ def _read(path: Path) -> ModelResult:
     if looks_like_selafin(path):
         return read_selafin(path)
     if head != HDF5 and head[:3] != NETCDF:
-        raise InputError(
-            f"{shown_path(path)}: expected a result of HEC-RAS (.hdf), TELEMAC (.slf), D-Flow FM, Delft3D-4 or "
-            "UGRID (.nc), got another file."
-        )
+        raise InputError("no_result", file=path, mesh=True)
     with read_by_library(path, "result", limit=LARGEST_RESULT):
         with netcdf_variables(path) as variables:
             names = set(variables)
@@ -78,6 +75,8 @@ def _read(path: Path) -> ModelResult:
             return read_ugrid(path)
         if {"U1", "V1", "S1"} <= names:
             return read_delft3d_trim(path)
+        if path.suffix.lower() == ".nc":
+            raise InputError("no_result", file=path, mesh=False)
         return read_hec_ras(path)
 
 

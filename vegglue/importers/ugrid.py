@@ -64,11 +64,17 @@ def read_ugrid(path: Path) -> ModelResult:
         if not meshes:
             raise InputError(f"{shown_path(path)}: expected a UGRID file with a 2D mesh, got none; export one.")
         mesh, topology = meshes[0]
-        of_nodes = topology.text("node_coordinates").split()
-        node_x, node_y = (variables[name] for name in of_nodes[:2])
+        named = {key: topology.text(key).split() for key in ("node_coordinates", "face_node_connectivity")}
+        absent = [
+            *(key for key, names in named.items() if not names),
+            *(name for names in named.values() for name in names if name not in variables),
+        ]
+        if absent:
+            raise InputError("not_on_mesh", file=path, missing=absent, layers=False)
+        node_x, node_y = (variables[name] for name in named["node_coordinates"][:2])
         refuse_degrees(path, node_x)
         nodes = np.column_stack([node_x.values(), node_y.values()])
-        corners = _corners_of_faces(variables[topology.text("face_node_connectivity")])
+        corners = _corners_of_faces(variables[named["face_node_connectivity"][0]])
         faces, times = corners.shape[0], max(variables["time"].shape[0], 1) if "time" in variables else 0
         fields = {key: _field(variables, mesh, key, (faces, len(nodes)), times) for key in UGRID_NAMES}
         given = {key: one for key, one in fields.items() if one is not None}
@@ -77,8 +83,9 @@ def read_ugrid(path: Path) -> ModelResult:
             raise InputError("not_on_mesh", file=path, missing=missing, layers=layers)
         at_faces = given["u"].size == faces
         centre = _mean_of_corners(nodes, corners)
-        if (named := topology.text("face_coordinates").split()) and at_faces and set(named[:2]) <= variables.keys():
-            centre = np.column_stack([variables[name].values() for name in named[:2]])
+        of_faces = topology.text("face_coordinates").split()[:2]
+        if of_faces and at_faces and set(of_faces) <= variables.keys():
+            centre = np.column_stack([variables[name].values() for name in of_faces])
         places = centre if at_faces else nodes
         for key, one in given.items():
             if one.size != places.shape[0] and at_faces:  # a bed at nodes
