@@ -209,6 +209,10 @@ NEARLY_TESTABLE, SHARE_OF_ANSWER = 4.0, 0.3
 AtDraws = tuple[PossibleMeasurements, ...]
 
 
+def _squares(known: AtDraws) -> Array:
+    return np.array([one.squares for one in known])
+
+
 @dataclass(frozen=True)
 class PlanAnswer:
     """The answer to a question [-], the mean over all places of the priors and the least of them."""
@@ -218,40 +222,33 @@ class PlanAnswer:
 
 
 @dataclass(frozen=True)
-class PlanSearch:
-    """What the search for pieces to add knows: of the effects that the question is about their amplitudes; present:
-    flows that are measured in anyhow; another: hours of another one; level: of the alarm; beyond: by how much the score
-    of each has to be above that of the alarm to be named [standard errors]; bending (k,), see `bending_of`; base: given
-    the plan as it is. Of two effects there are three traces, the third the sum of both.
+class DesignCriterion:
+    """How well measurements answer a question, by the lengths of the traces that they would leave.
+
+    Attributes
+    ----------
+    question
+        What is asked. Of two effects there are three traces, the third the sum of both.
+    candidates
+        Number of hypotheses about listed effects.
+    level
+        Of the alarm.
+    amplitudes
+        Of the effects that the question is about (k,).
+    beyond
+        By how much the score of each has to be above that of the alarm to be named (k,) [standard errors].
+    bending
+        See `bending_of` (k,).
     """
 
-    wide: PlanModel
     question: PlanQuestion
+    candidates: int
     level: float
-    present: frozenset[str]
-    another: float
     amplitudes: tuple[Amplitude, ...]
     beyond: Array
     bending: Array
-    base: AtDraws
 
-    @cached_property
-    def start(self) -> PlanAnswer:
-        """The answer without a further piece."""
-        return self._answer(self._sizes(self._squares(self.base)))
-
-    @cached_property
-    def sections(self) -> frozenset[float]:
-        """Where velocities are measured or planned along the reach, see `place_along`."""
-        known = self.wide.model.station.iloc[self.wide.known]
-        velocity = known[known["kind"] == STREAMWISE]
-        return frozenset(place_along(self.wide.model.case, x) for x in section_places(velocity).unique())
-
-    @staticmethod
-    def _squares(known: AtDraws) -> Array:
-        return np.array([one.squares for one in known])
-
-    def _sizes(self, squares: Array) -> Array:
+    def sizes(self, squares: Array) -> Array:
         """Lengths of traces at places of the priors (place, ..., k), or the distance of two, of squares at each draw:
         those around the middle over that in the middle, on the coarsest cells, times that on the cells of the search.
         """
@@ -260,7 +257,7 @@ class PlanSearch:
         size = np.sqrt(np.maximum(squares, 0.0))
         return size[:1] if len(size) < 3 else size[0] * ratios_of_lengths(size[1:])
 
-    def _answers(self, size: Array) -> Array:
+    def answers(self, size: Array) -> Array:
         """The answer at each place of the priors (place, ...)."""
         if isinstance(self.question, TwoEffects):
             return chance_to_separate(size[..., 0] ** 2)
@@ -271,12 +268,28 @@ class PlanSearch:
             return detection_chance(relative * size, threshold, amplitude.only_sign)[..., 0]
         return np.asarray(chance_over_prior(size, threshold).sum(axis=-1))
 
-    def _answer(self, size: Array) -> PlanAnswer:
-        found = self._answers(size)
+    def answer(self, size: Array) -> PlanAnswer:
+        """The mean answer and the least."""
+        found = self.answers(size)
         return PlanAnswer(float(found.mean()), float(found.min()))
 
+    def worths(self, squares: Array) -> Array:
+        """What is maximised (...,), of squares at each draw (draw, ..., c): the answer, or of all effects
+
+            sum over effects of min(P / PLANNED_POWER, 1)^NEARLY_TESTABLE + SHARE_OF_ANSWER answer,
+
+        P the chance to be named at twice a plausible size, from PLANNED_POWER of which it is testable.
+        """
+        size = self.sizes(squares)
+        answer = self.answers(size).mean(axis=0)
+        if not isinstance(self.question, EffectsInGeneral):
+            return np.asarray(answer)
+        chance = detection_chance(self._twice * size, self._threshold(size)).mean(axis=0)
+        nearly = np.minimum(chance / PLANNED_POWER, 1.0) ** NEARLY_TESTABLE
+        return np.asarray(nearly.sum(axis=-1) + SHARE_OF_ANSWER * answer)
+
     def _threshold(self, size: Array) -> Array:
-        prior = np.full(size.shape, -np.log(GROUPS * len(self.wide.candidates)))
+        prior = np.full(size.shape, -np.log(GROUPS * self.candidates))
         return single_threshold(size, prior, self.level) + self.beyond
 
     def _bent(self, relative: Array) -> Array:
@@ -289,24 +302,44 @@ class PlanSearch:
         sizes = [min(2.0 * one.scale, one.furthest) / one.scale for one in self.amplitudes]
         return self._bent(np.array([size**one.power for size, one in zip(sizes, self.amplitudes, strict=True)]))
 
-    def _worths(self, squares: Array) -> Array:
-        """What is maximised (...,), of squares at each draw (draw, ..., c): the answer, or of all effects
 
-            sum over effects of min(P / PLANNED_POWER, 1)^NEARLY_TESTABLE + SHARE_OF_ANSWER answer,
+@dataclass(frozen=True)
+class PlanSearch:
+    """The search for pieces of field work to add.
 
-        P the chance to be named at twice a plausible size, from PLANNED_POWER of which it is testable.
-        """
-        size = self._sizes(squares)
-        answer = self._answers(size).mean(axis=0)
-        if not isinstance(self.question, EffectsInGeneral):
-            return np.asarray(answer)
-        chance = detection_chance(self._twice * size, self._threshold(size)).mean(axis=0)
-        nearly = np.minimum(chance / PLANNED_POWER, 1.0) ** NEARLY_TESTABLE
-        return np.asarray(nearly.sum(axis=-1) + SHARE_OF_ANSWER * answer)
+    Attributes
+    ----------
+    wide
+        All pieces that are possible.
+    criterion
+        What is maximised.
+    present, another
+        Flows that are measured in anyhow, and hours of another one [h].
+    base
+        Given the plan as it is.
+    """
+
+    wide: PlanModel
+    criterion: DesignCriterion
+    present: frozenset[str]
+    another: float
+    base: AtDraws
+
+    @cached_property
+    def start(self) -> PlanAnswer:
+        """The answer without a further piece."""
+        return self.criterion.answer(self.criterion.sizes(_squares(self.base)))
+
+    @cached_property
+    def sections(self) -> frozenset[float]:
+        """Where velocities are measured or planned along the reach, see `place_along`."""
+        known = self.wide.model.station.iloc[self.wide.known]
+        velocity = known[known["kind"] == STREAMWISE]
+        return frozenset(place_along(self.wide.model.case, x) for x in section_places(velocity).unique())
 
     def worth(self, pieces: Sequence[int]) -> float:
         """What is maximised, with some pieces added."""
-        return float(self._worths(self.with_each(self.base, [pieces]))[0])
+        return float(self.criterion.worths(self.with_each(self.base, [pieces]))[0])
 
     def with_pieces(self, pieces: Sequence[int]) -> AtDraws:
         """Given the plan and some pieces more, at each draw."""
@@ -354,9 +387,9 @@ class PlanSearch:
         found = []
         moves = self.moves()
         # A flow that the case does not have is known in the middle of the priors: elsewhere traces keep their ratio.
-        size = self._sizes(self.with_each(self.base, moves))
+        size = self.criterion.sizes(self.with_each(self.base, moves))
         for k, move in enumerate(moves):
-            after = self._answer(size[:, k])
+            after = self.criterion.answer(size[:, k])
             if after.mean - self.start.mean > LEAST_PLAN_GAIN:
                 found.append(self._proposed(move, after))
         found.sort(key=lambda one: -one.per_hour)
@@ -371,7 +404,7 @@ class PlanSearch:
     def extended(self, budget: float) -> ProposedPieces | None:
         """The best set to add for so many hours; None if nothing fits."""
         chosen = self.best_set(budget)
-        after = self._answer(self._sizes(self.with_each(self.base, [chosen])[:, 0]))
+        after = self.criterion.answer(self.criterion.sizes(self.with_each(self.base, [chosen])[:, 0]))
         return self._proposed(chosen, after) if chosen else None
 
     def best_set(self, budget: float) -> list[int]:
@@ -435,8 +468,8 @@ class PlanSearch:
                         and one.experiment in {*flows, ""} and one.place not in taken]  # fmt: skip
             if not possible:
                 return chosen
-            now = float(self._worths(self._squares(known)))
-            gain = self._worths(self.with_each(known, [(j,) for j in possible])) - now
+            now = float(self.criterion.worths(_squares(known)))
+            gain = self.criterion.worths(self.with_each(known, [(j,) for j in possible])) - now
             rate = gain / np.array([pieces[j].hours for j in possible])
             best = int(np.argmax(rate))
             if rate[best] <= LEAST_PLAN_GAIN / budget:
@@ -449,7 +482,7 @@ class PlanSearch:
 def plan_search(
     wide: PlanModel, question: PlanQuestion, planned: Planned, level: float, present: frozenset[str], beyond: Array
 ) -> PlanSearch:
-    """The search for pieces to add to the stations of the plan; beyond: of each candidate, see `PlanSearch`."""
+    """The search for pieces to add to the stations of the plan; beyond: of each candidate, see `DesignCriterion`."""
     match question:
         case OneEffect():
             names = [question.name]
@@ -471,12 +504,8 @@ def plan_search(
 
     return PlanSearch(
         wide=wide,
-        question=question,
-        level=level,
+        criterion=DesignCriterion(question, len(wide.candidates), level, amplitudes, beyond[kept], bending),
         present=present,
         another=planned.costs.discharge,
-        amplitudes=amplitudes,
-        beyond=beyond[kept],
-        bending=bending,
         base=tuple(in_threads(at, [(draw,) for draw in wide.draws])),
     )
