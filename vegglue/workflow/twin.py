@@ -46,7 +46,7 @@ def opened_answer(path: Path) -> Answer:
         told = json.loads(unpacked)
         return Answer(**told | {"hidden": tuple(Hidden(**one) for one in told["hidden"])})
     except (ValueError, KeyError, TypeError, RecursionError, zlib.error):
-        raise InputError(f"{path}: the seal is broken, make it again by `vegglue twin`.") from None
+        raise InputError(f"{path}: the encoded answer is damaged; make it anew by `vegglue twin`.") from None
 
 
 SEAL = "answer.sealed"
