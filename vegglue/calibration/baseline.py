@@ -21,6 +21,7 @@ from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_ind
 from vegglue.case.channel_geometry import cells_across
 from vegglue.case.parameter_space import refuse_without_parameters
 from vegglue.case.resolved_config import dumped, plain_tree
+from vegglue.case.size_limits import WIDE_FROM
 from vegglue.engine.command import CommandRuns
 from vegglue.engine.corrected import Correction, InsensitiveCommandError, corrected, correction_at
 from vegglue.engine.interface import Model, Point, linearise, linearise_from, relinearised
@@ -131,7 +132,7 @@ def _best_from_prior(model: Model, noise: Noise) -> Point:
     """The point of the best fit among those that start from the FITTED_POINTS with the least objective; on a wide grid
     searched on half as many cells each way, and fitted again here.
     """
-    rough = on_half_as_many_cells(model)
+    rough = on_half_as_many_cells(model) if model.site.bed.shape[1] >= WIDE_FROM else None
     if rough is not None:
         there = _best_from_prior(rough, noise)
         start = linearise_from(model, there.z, there)

@@ -80,6 +80,9 @@ SMALL_CHANGE: dict[Term, float] = {
     "friction": 1e-3, "drag": 1e-5, "bed": 1e-4, "inflow": 1e-6, "viscosity": 1e-4, "mixing": 1e-2,
     "advection": 1e-3,
 }  # fmt: skip
+# Rows from which a flow without a start begins on half as many cells each way [-]. Chosen: with 25 rows Newton from
+# there takes half of its time from a backwater curve, and with fewer both take little.
+COARSER_FROM = 16
 # Stages of effects that move a flow and nothing else that a reading without effects on instruments depends on.
 UNSEEN_BY_SENSORS = {"plants", "resistance", "exchange", "force"}
 # Sites on half as many cells each way, by the site on its own.
@@ -192,13 +195,11 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
 
 
 def _from_coarser_cells(model: Model, experiment: str, z: Array, problem: Problem) -> Array | None:
-    """A start (nx, 3, ny, 1) on a wide grid: the flow on cells of about twice the size, and so on to narrow ones; None
-    if the grid is narrow, or no flow is found there.
+    """A start (nx, 3, ny, 1): the flow on cells of about twice the size, and so on to less than COARSER_FROM rows that
+    may be wet; None if there are no more to begin with, or no flow is found there.
     """
-    if problem.shape[1] < WIDE_FROM:
-        return None
     south, north = wet_band(problem, backwater(problem))
-    coarse = on_half_as_many_cells(model) if north - south >= WIDE_FROM else None
+    coarse = on_half_as_many_cells(model) if north - south >= COARSER_FROM else None
     if coarse is None:
         return None
     there = problem_at(coarse, experiment, z)
@@ -207,11 +208,11 @@ def _from_coarser_cells(model: Model, experiment: str, z: Array, problem: Proble
 
 
 def on_half_as_many_cells(model: Model) -> Model | None:
-    """A model of a wide grid on half as many cells along and across, to whole numbers; None if the grid is narrow, or
-    an inflow or the outlet has none of these cells.
+    """A model on half as many cells along and across, to whole numbers; None if the grid has less than COARSER_FROM
+    rows, or an inflow or the outlet has none of these cells.
     """
     (nx, ny), of = model.site.bed.shape, model.case.grid
-    if ny < WIDE_FROM:
+    if ny < COARSER_FROM:
         return None
     case = on_cells(model.case, (float(np.ptp(of.x)) / (nx // 2), float(np.ptp(of.y)) / (ny // 2)))
     if model.site not in _ON_COARSER_CELLS:
