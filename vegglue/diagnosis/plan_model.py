@@ -2,7 +2,7 @@
 stations, and flows, slopes, fingerprints and errors at several draws of the priors.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -304,6 +304,37 @@ def plan_model(
     raise InputError(f"{model.case.name}: no steady flow was found in the middle of the priors; narrow the priors.")
 
 
+PlaceOfPiece = tuple[Work, str, float, tuple[float, ...]]  # see `PlannedPiece.place`
+
+
+def _rows_of_pieces(
+    possible: Sequence[PlannedPiece],
+    whole: Mapping[PlaceOfPiece, PlannedPiece],
+    first: Mapping[PlaceOfPiece, int],
+    level: int,
+) -> tuple[np.ndarray, ...]:
+    """Rows of each piece: among the stations of the whole transect, by its place, or behind them from `level` on."""
+    rows = list[np.ndarray]()
+    for piece in possible:
+        if piece.work is Work.SURVEY_LINE:
+            rows.append(np.arange(level, level + len(piece.y)))
+            level += len(piece.y)
+        else:
+            across = whole[piece.place].y
+            rows.append(first[piece.place] + np.array([across.index(y) for y in piece.y] or [0]))
+    return tuple(rows)
+
+
+def _usual_where_unknown(difference: Array, kind: np.ndarray) -> Array:
+    """Differences of two grids (station,), those of flows that the case does not have as usual for their kind."""
+    found = difference.copy()
+    for name in np.unique(kind):
+        known = difference[(kind == name) & np.isfinite(difference)]
+        usual = float(np.sqrt(np.mean(known**2))) if known.size else 0.0
+        found[(kind == name) & ~np.isfinite(difference)] = usual
+    return found
+
+
 def _plan_model(
     model: Model,
     wide: Model,
@@ -323,14 +354,6 @@ def _plan_model(
     first = dict(zip((one.place for one in own), np.cumsum([len(stations), *counts])[:-1], strict=True))
     level = len(here.station) + sum(len(one.y) for one in base if one.work is Work.SURVEY_LINE)
     surveyed = np.arange(len(here.station), level)
-    rows = list[np.ndarray]()
-    for piece in possible:
-        if piece.work is Work.SURVEY_LINE:
-            rows.append(np.arange(level, level + len(piece.y)))
-            level += len(piece.y)
-        else:
-            across = whole[piece.place].y
-            rows.append(first[piece.place] + np.array([across.index(y) for y in piece.y] or [0]))
     on_coarse = coarser(here)
     # A diagnosis knows no error of the grid where cells of just twice the size do not fit.
     half = on_coarse or on_half_as_many_cells(here)
@@ -348,17 +371,11 @@ def _plan_model(
     start = linearise_from(search, middle, None if coarsest.site is search.site else below)
     if start is None:
         return None
-    # Flows that the case does not have have the usual grid error.
+    near_start = start if search is on_coarse else None
+    there = None if other is None else prediction_at(in_own_flows(other), middle, near_start)
     difference = np.zeros(len(here.station))
-    if other is not None:
-        there = prediction_at(in_own_flows(other), middle, start if search is on_coarse else None)
-        if there is not None:
-            difference = there - start.prediction  # its sign is of no matter
-            kind = here.station["kind"].to_numpy()
-            for name in np.unique(kind):
-                known_there = difference[(kind == name) & np.isfinite(difference)]
-                usual = float(np.sqrt(np.mean(known_there**2))) if known_there.size else 0.0
-                difference[(kind == name) & ~np.isfinite(difference)] = usual
+    if there is not None:  # its sign is of no matter
+        difference = _usual_where_unknown(there - start.prediction, here.station["kind"].to_numpy())
     of_stations = here.station["standard_error"].to_numpy(float)
     error = np.concatenate([of_stations, np.full(len(places), planned.errors.survey)])
     grid_error = constants().grid_error_share * np.concatenate([difference, np.zeros(len(places))])
@@ -391,7 +408,7 @@ def _plan_model(
         known=np.arange(len(stations)),
         surveyed=surveyed,
         pieces=tuple(possible),
-        rows=tuple(rows),
+        rows=_rows_of_pieces(possible, whole, first, level),
         error=error,
         grid_error=grid_error,
         candidates=tuple(candidates),
