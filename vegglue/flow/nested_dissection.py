@@ -17,7 +17,6 @@ Beside the south wall its level is given in the east only. On cells of 14 m by 0
 banks, single precision loses D there; such a Jacobian is factored by blocks.
 """
 
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from threading import Lock
@@ -53,15 +52,17 @@ class Dissection:
     """Parts of a grid, those below before those above.
 
     own, around: cells (i ny + j) that each part eliminates, and those it leaves a front on, one part after the other;
-    own_start, around_start: where each part begins in them (part + 1,); beside: places of `around` in `own`; above:
-    place of each cell around in the front of the part above, its own cells first; child_start, children: parts below
-    each; memory_start: where D^-1, L and G of each part begin in the memory of factors (3, part + 1).
+    own_start, around_start: where each part begins in them (part + 1,); place, beside: places of all cells and of
+    `around` in `own`; above: place of each cell around in the front of the part above, its own cells first;
+    child_start, children: parts below each; memory_start: where D^-1, L and G of each part begin in the memory of
+    factors (3, part + 1).
     """
 
     own_start: Indices
     own: Indices
     around_start: Indices
     around: Indices
+    place: Indices
     beside: Indices
     above: Indices
     child_start: Indices
@@ -118,7 +119,7 @@ def dissection(nx: int, ny: int, leaf: int = LEAF) -> Dissection:
     place[np.concatenate(owns)] = np.arange(nx * ny)
     return Dissection(
         starts(own // 3), np.concatenate(owns), starts(around // 3), np.concatenate(arounds),
-        place[np.concatenate(arounds)], np.concatenate(above),
+        place, place[np.concatenate(arounds)], np.concatenate(above),
         starts(np.array([len(below) for below in children_of])),
         np.array([child for below in children_of for child in below], dtype=np.int64),
         np.stack([starts(own * own), starts(around * own), starts(own * around)]),
@@ -170,13 +171,15 @@ def compact(values, far):
 
 
 @compiled_exactly
-def times(product, values, far, x, transposed):
-    """product -= A x, or A' x; x (nx, ny, 3, n)."""
-    nx, ny, _, n = x.shape
+def times(product, values, far, x, place, transposed):
+    """product -= A x, or A' x; x (3 cell, n), cells in the order of elimination, in which each has its place."""
+    nx, ny, n = values.shape[0], values.shape[1], x.shape[1]
     for i in range(nx):
         for j in range(ny):
+            here = 3 * place[i * ny + j]
             for a in range(max(i - 1, 0), min(i + 2, nx)):
                 for b in range(max(j - ROWS_REACH, 0), min(j + ROWS_REACH + 1, ny)):
+                    there = 3 * place[a * ny + b]
                     for e in range(3):
                         for k in range(3):
                             value = values[i, j, a - i + 1, b - j + ROWS_REACH, e, k]
@@ -184,17 +187,18 @@ def times(product, values, far, x, transposed):
                                 continue
                             if transposed:
                                 for t in range(n):
-                                    product[a, b, k, t] -= value * x[i, j, e, t]
+                                    product[there + k, t] -= value * x[here + e, t]
                             else:
                                 for t in range(n):
-                                    product[i, j, e, t] -= value * x[a, b, k, t]
+                                    product[here + e, t] -= value * x[there + k, t]
             if i > 1:
+                there = 3 * place[(i - 2) * ny + j]
                 for e in range(3):
                     for t in range(n):
                         if transposed:
-                            product[i - 2, j, e, t] -= far[i, j, e] * x[i, j, e, t]
+                            product[there + e, t] -= far[i, j, e] * x[here + e, t]
                         else:
-                            product[i, j, e, t] -= far[i, j, e] * x[i - 2, j, e, t]
+                            product[here + e, t] -= far[i, j, e] * x[there + e, t]
 
 
 @compiled_exactly
@@ -341,69 +345,76 @@ class SparseFactors:
     kept: list[tuple[Single, ...]]
 
     def solve(self, right: Single, transposed: bool = False) -> None:
-        """A x = right, or A' x = right, in place and nearly; right (nx, 3 ny, n)."""
+        """A x = right, or A' x = right, in place and nearly; right (nx, 3 ny, n), contiguous."""
         memory = self._memory()
         if self.by_blocks:
             (block_elimination.solve_transposed if transposed else block_elimination.solve)(*memory, right)
             return
-        found = self._by_parts(memory, right, transposed)
+        (nx, ny), rows = self.values.shape[:2], right.reshape(-1, right.shape[2])
+        at, place = _rows_in_order(nx, ny), dissection(nx, ny).place
+        found = rows[at]
+        self._by_parts(memory, found, transposed)
         for _ in range(MOST_ADJOINT_ROUNDS if transposed else 0):
-            step = self._by_parts(memory, self._left(right, found, transposed), transposed)
+            step = rows[at]
+            times(step, self.values, self.far, found, place, transposed)
+            self._by_parts(memory, step, transposed)
             found += step
-            if (np.abs(step).max(axis=(0, 1)) <= ADJOINT_TOLERANCE * np.abs(found).max(axis=(0, 1))).all():
+            if (_largest(step) <= ADJOINT_TOLERANCE * _largest(found)).all():
                 break
-        right[...] = found
+        rows[at] = found
 
     def contracts(self) -> bool:
         """Whether |x - M^-1 A x| is at most 1 for random x in -1..1: 0.2 on common cells, 134 and more if D is lost."""
         nx, ny = self.values.shape[:2]
-        x = np.random.default_rng(0).uniform(-1.0, 1.0, (nx, 3 * ny, 1)).astype(np.float32)
-        back = self._by_parts(self._memory(), self._left(np.zeros_like(x), x, False), False)
+        x = np.random.default_rng(0).uniform(-1.0, 1.0, (3 * nx * ny, 1)).astype(np.float32)[_rows_in_order(nx, ny)]
+        back = np.zeros_like(x)
+        times(back, self.values, self.far, x, dissection(nx, ny).place, False)
+        self._by_parts(self._memory(), back, False)
         return float(np.abs(x + back).max()) <= 1.0
 
-    def _by_parts(self, memory: tuple[Single, ...], right: Single, transposed: bool) -> Single:
-        """M^-1 right, or M'^-1 right."""
-        (nx, ny), n = self.values.shape[:2], right.shape[2]
-        parts, at = dissection(nx, ny), _rows_in_order(nx, ny)
-        rows = right.reshape(3 * nx * ny, n)
-        ordered = rows[at]
-        one = ordered[:, 0] if n == 1 else ordered  # products with one vector need no packing
+    def _by_parts(self, memory: tuple[Single, ...], right: Single, transposed: bool) -> None:
+        """M x = right, or M' x = right, in place; right (3 cell, n), cells in the order of elimination."""
+        parts = dissection(*self.values.shape[:2])
+        one = right[:, 0] if right.shape[1] == 1 else right  # products with one vector need no packing
         solve_parts(one, parts.own_start, parts.around_start, parts.beside, parts.memory_start, memory, transposed)
-        found = np.empty_like(rows)
-        found[at] = ordered
-        return found.reshape(right.shape)
-
-    def _left(self, right: Single, x: Single, transposed: bool) -> Single:
-        """right - A x, or right - A' x."""
-        (nx, ny), n = self.values.shape[:2], x.shape[2]
-        cells, left = (np.array(one.reshape(nx, 3, ny, n).swapaxes(1, 2), order="C") for one in (x, right))
-        times(left, self.values, self.far, cells, transposed)
-        return np.ascontiguousarray(left.swapaxes(1, 2)).reshape(right.shape)
 
     def _memory(self) -> tuple[Single, ...]:
-        """The factors, made again to the same bits if need be; those used longest ago make room."""
-        memory = next(iter(self.kept), None) or _factors_of(self.values, self.far, self.by_blocks)
+        """The factors, made again to the same bits if need be; those used longest ago make room before."""
         with _LOCK:
-            self.kept[:] = [memory]
             _USED.pop(id(self), None)
             _USED[id(self)] = ref(self)
-            whole = 0
+            whole = 0.0
             for key, one in reversed(list(_USED.items())):
                 other = one()
                 if other is None:
                     del _USED[key]
                     continue
-                whole += sum(part.nbytes for memory in other.kept for part in memory)
+                whole += other.nbytes
                 if whole > _most_bytes and other is not self:
                     other.kept.clear()
                     del _USED[key]
+        memory = next(iter(self.kept), None) or _factors_of(self.values, self.far, self.by_blocks)
+        with _LOCK:
+            if id(self) in _USED:  # else another flow needs the room as soon as this one has used them
+                self.kept[:] = [memory]
         return memory
+
+    @property
+    def nbytes(self) -> float:
+        """Of the factors, kept or not."""
+        nx, ny = self.values.shape[:2]
+        return block_bytes(nx, ny) if self.by_blocks else 4.0 * float(dissection(nx, ny).memory_start[:, -1].sum())
 
 
 def keep_factors_within(most: float) -> None:
     """Let factors of wide grids take so many bytes together at most, but for those in use; no result depends on it."""
     global _most_bytes
     _most_bytes = most
+
+
+def _largest(values: Single) -> Single:
+    """The largest |value| of each column."""
+    return np.maximum(values.max(axis=0), -values.min(axis=0))
 
 
 @lru_cache(16)
@@ -442,13 +453,11 @@ def sparse_factors(values: Single, far: Single) -> SparseFactors:
     numpy.linalg.LinAlgError
         If there is none.
     """
-    found = None
-    with suppress(np.linalg.LinAlgError):
-        found = SparseFactors(values, far, False, [_factors_of(values, far, False)])
-        if found.contracts():
-            return found
-    if block_bytes(*values.shape[:2]) <= LARGEST_BLOCKS:
-        return SparseFactors(values, far, True, [_factors_of(values, far, True)])
-    if found is None:
-        raise np.linalg.LinAlgError
-    return found
+    by_parts, blocks_fit = SparseFactors(values, far, False, []), block_bytes(*values.shape[:2]) <= LARGEST_BLOCKS
+    try:
+        if by_parts.contracts() or not blocks_fit:
+            return by_parts
+    except np.linalg.LinAlgError:
+        if not blocks_fit:
+            raise
+    return SparseFactors(values, far, True, [_factors_of(values, far, True)])

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Single
 from vegglue.case.grid import Grid
 from vegglue.effects.active_effect import ActiveEffect, applied
 from vegglue.effects.physical_constants import FILM_ON_LAND
@@ -371,7 +371,7 @@ def _after_effects(
     return value
 
 
-def reading_weights(problem: Problem, state: Array, grid: Grid, station: pd.DataFrame) -> Array:
+def reading_weights(problem: Problem, state: Array, grid: Grid, station: pd.DataFrame) -> Single:
     """d prediction / d state (nx, 3, ny, n) at a state (nx, 3, ny, 1), without effects on instruments.
 
     Raises
@@ -380,7 +380,7 @@ def reading_weights(problem: Problem, state: Array, grid: Grid, station: pd.Data
         If a kind of observation is unknown.
     """
     flow = GriddedFlow(problem, state, grid)
-    weights = _no_weights(flow, len(station))
+    weights = np.zeros((*state.shape[:3], len(station)), np.float32)
     for kind, rows, x, y in _by_kind(station):
         weights[..., rows] = READERS[kind.name].weights(flow, x, y)
     return weights
