@@ -14,7 +14,7 @@ from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.schema import Case
-from vegglue.engine.interface import Engine, Model, Point, Wanted, always
+from vegglue.engine.interface import Engine, Model, Point, StationsOfCells, Wanted, always
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.local_changes import Term
 
@@ -64,10 +64,10 @@ def linear_engine(
         assert of_causes is not None
         return of_causes[: len(model.station)]
 
-    def responses_to_cells(model: Model, _: Point, experiment: str, terms: Sequence[Term]) -> dict[Term, Array]:
+    def responses_to_cells(model: Model, _: Point, experiment: str, terms: Sequence[Term]) -> StationsOfCells:
         rows, grid = model.rows[experiment], model.site.grid
         nothing = np.zeros((rows.size, grid.x.size, grid.y.size), np.float32)
-        return {term: nothing if of_cells is None else of_cells[term][rows] for term in terms}
+        yield rows, {term: nothing if of_cells is None else of_cells[term][rows] for term in terms}
 
     return Engine(
         "linear", linearise, predict, responses, responses_to_cells, NEWTON.flow_at_centres,

@@ -7,12 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from vegglue.calibration.model_error import cell_responses
 from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.resolved_config import dumped
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import GridExtent
-from vegglue.engine.interface import Model, linearise, predict, relinearised, responses_to_cells
+from vegglue.engine.interface import Model, linearise, predict, relinearised
 from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.problem_setup import build_problem
@@ -185,6 +186,6 @@ def test_answers_to_cells_of_a_flume_add_up_to_the_slope() -> None:
     assert point is not None
     beside = np.log([theta_at(case, np.array([[z]]))["n_b"][0] for z in (-1e-4, 1e-4)])
     of_log_n = point.slope[:, 0] * 2e-4 / (beside[1] - beside[0])
-    answers = responses_to_cells(model, relinearised(model, point), "one", ["friction"])["friction"]
+    answers = cell_responses(model, relinearised(model, point), ("friction",)).of["friction"]
     # k goes with the square of n.
     np.testing.assert_allclose(2.0 * answers.sum(axis=(1, 2)), of_log_n, atol=0.005 * np.abs(of_log_n).max())

@@ -57,7 +57,9 @@ def point(model: Model) -> Point:
 
 @pytest.fixture(scope="module")
 def cells(model: Model, point: Point) -> dict[Term, Array]:
-    return dict(responses_to_cells(model, point, "high", TERMS))
+    [(rows, of)] = responses_to_cells(model, point, "high", TERMS)
+    assert np.array_equal(rows, model.rows["high"])
+    return dict(of)
 
 
 def of_effects(model: Model, point: Point, *names: str) -> Array:

@@ -19,10 +19,11 @@ from typing import Any
 import numpy as np
 
 from vegglue.calibration.fit import fit
+from vegglue.calibration.model_error import cell_responses
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.size_limits import factor_bytes
-from vegglue.engine.interface import Point, linearise, predict, responses_to_cells
+from vegglue.engine.interface import Point, linearise, predict
 from vegglue.engine.model import ever_coarser, model_of
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most
@@ -125,7 +126,7 @@ def one_size(columns: int, rows: int, with_cells: bool) -> None:
     predicted = measured(f"  {MEMBERS} members around it", lambda: predict(model, [point], away))
     assert np.isfinite(predicted).all()
     if with_cells:
-        measured("  answers to each cell", lambda: responses_to_cells(model, point, "June", ("friction",)))
+        measured("  answers to each cell", lambda: cell_responses(model, point, ("friction",)))
 
 
 def down_to(grids: list[Any], z: np.ndarray) -> Point:

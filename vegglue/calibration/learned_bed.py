@@ -105,7 +105,7 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
     seen = project(slope, residual, where.point.z, white).fingerprints  # seen' seen = F' (C + J J')^-1 F
     values, vectors = np.linalg.eigh(np.eye(columns.shape[1]) - seen.T @ seen)
     left = columns @ (vectors * np.sqrt(np.maximum(values, 0.0))).astype(columns.dtype)
-    return LearnedBed(grid, (columns @ amounts).reshape(grid.x.size, grid.y.size), left, columns)
+    return LearnedBed(grid, np.einsum("ck,k->c", columns, amounts).reshape(grid.x.size, grid.y.size), left, columns)
 
 
 def line_offset(loose: Baseline, line: SurveyedLine, tight: Baseline) -> tuple[float, float]:

@@ -48,7 +48,7 @@ from vegglue.engine.interface import Cause, Model, Point, responses, responses_t
 from vegglue.engine.newton import problem_at
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
-from vegglue.parallel import in_threads
+from vegglue.parallel import give_back_memory, in_threads
 
 # The effect of the library that is a spot of a term.
 EFFECT_AT_PLACE: dict[Term, str] = {
@@ -89,12 +89,17 @@ def excluded_terms(case: Case) -> set[Term]:
 
 def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellResponses:
     """Those of all experiments, in parallel."""
+    give_back_memory()  # a diagnosis needs most of it here
     shape = (len(model.station), model.site.grid.x.size, model.site.grid.y.size)
     found = {term: np.zeros(shape, dtype=np.float32) for term in terms}
-    tasks = [(model, point, experiment, terms) for experiment in point.flows]
-    for experiment, of in zip(point.flows, in_threads(responses_to_cells, tasks), strict=True):
-        for term in terms:
-            found[term][model.rows[experiment]] = of[term]
+
+    def fill(experiment: str) -> None:
+        for rows, of in responses_to_cells(model, point, experiment, terms):
+            for term in terms:
+                found[term][rows] = of[term]
+
+    in_threads(fill, [(experiment,) for experiment in point.flows])
+    give_back_memory()
     return CellResponses(model.site.grid, found)
 
 
@@ -320,8 +325,9 @@ def _sides(model: Model, cells: CellResponses) -> Array:
     patch, rate = site.main_patch, dict[str, Array]()
     for experiment, rows in model.rows.items():
         # k (nx, ny) [1/m]: what answers to friction made larger by its own part is k times what answers to drag.
-        friction, drag = (cells.of[term][rows].astype(float) for term in ("friction", "drag"))
-        rate[experiment] = (friction * drag).sum(axis=0) / np.maximum((drag**2).sum(axis=0), np.finfo(float).tiny)
+        friction, drag = (cells.of[term][rows] for term in ("friction", "drag"))
+        both, square = (np.einsum("nij,nij->ij", one, drag, dtype=float) for one in (friction, drag))
+        rate[experiment] = both / np.maximum(square, np.finfo(float).tiny)
     sides = [(axis, step) for axis in (0, 1) for step in (-1, 1)]
     for index, (axis, outwards) in ((int(index), side) for index in np.unique(patch[patch >= 0]) for side in sides):
         inside, width = patch == index, (site.grid.dx, site.grid.dy)[axis]

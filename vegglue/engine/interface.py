@@ -4,13 +4,14 @@ A model is a function f from z (p,) to predictions (n,) at stations. z is a plac
 is standard normal, z = Phi^-1(F(theta)), so that the misfit of the prior is |z|^2.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
 from vegglue.case.gridded_site import Site
@@ -78,6 +79,8 @@ class CentreFlow:
     v: Array
 
 
+# Rows of some stations of an experiment (n,), and by term what each cell does to them (n, nx, ny).
+StationsOfCells = Iterator[tuple[NDArray[np.int_], Mapping[Term, Single]]]
 # Whether the slopes of predictions (n,) are worth their time. If not, no point is returned, either.
 Wanted = Callable[[Array], bool]
 
@@ -103,8 +106,8 @@ class Engine:
     responses
         (model, point, causes) -> df / d(amplitude - off)^power at off (n, causes).
     responses_to_cells
-        (model, point, experiment, terms) -> df / d term (n, nx, ny) by term, of the stations of the experiment, for a
-        change in each cell; terms: of `flow.local_changes.TERMS`.
+        (model, point, experiment, terms) -> df / d term (n, nx, ny) by term for a change in each cell, of the stations
+        of the experiment, some rows of them at a time; terms: of `flow.local_changes.TERMS`.
     flow_at_centres
         (model, point, experiment) -> depth and velocities of a point.
     relinearised
@@ -119,7 +122,7 @@ class Engine:
     linearise: Callable[["Model", Array, Point | None, Wanted], Point | None]
     predict: Callable[["Model", Sequence[Point], Array], Array]
     responses: Callable[["Model", Point, Sequence[Cause]], Array]
-    responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], Mapping[Term, Single]]
+    responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], "StationsOfCells"]
     flow_at_centres: Callable[["Model", Point, str], CentreFlow]
     relinearised: Callable[["Model", Point], Point]
     with_coarse_correction: Callable[[Point, Point, Point], Point]
@@ -221,8 +224,9 @@ def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
     return model.engine.responses(model, point, causes)
 
 
-def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:
-    """df / d term for a change of it in each cell.
+def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> StationsOfCells:
+    """df / d term for a change of it in each cell, of some stations at a time: those of all may not fit the memory
+    beside what they are made of.
 
     Parameters
     ----------
@@ -232,10 +236,10 @@ def responses_to_cells(model: Model, point: Point, experiment: str, terms: Seque
     terms : sequence of str
         Of `flow.local_changes.TERMS`.
 
-    Returns
-    -------
-    mapping of str to (n, nx, ny)
-        For the stations of the experiment [unit of each station per unit of the term].
+    Yields
+    ------
+    (n,), mapping of str to (n, nx, ny)
+        Rows of stations of the experiment, and theirs [unit of each station per unit of the term].
     """
     return model.engine.responses_to_cells(model, point, experiment, terms)
 

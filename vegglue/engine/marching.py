@@ -11,7 +11,7 @@ import numpy as np
 from vegglue.arrays import Array, Single
 from vegglue.case.channel_geometry import channel_geometry
 from vegglue.case.parameter_space import theta_at
-from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
+from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, StationsOfCells, Wanted
 from vegglue.engine.newton import problem_at
 from vegglue.flow.equations import faces
 from vegglue.flow.local_changes import Term, with_changed_term
@@ -92,7 +92,7 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
             found[np.ix_(rows, np.array(here))] = moved.T / gains[here]
         return found
 
-    def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> dict[Term, Single]:
+    def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> StationsOfCells:
         """(f(change) - f(-change)) / (2 change) for every cell of the grid: two members each. (f(change) - f(0)) /
         change for water that enters, which comes without momentum, while water that leaves takes its own along.
         """
@@ -107,7 +107,7 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
             prediction = read_at_rest(model, experiment, problem, start)[1]
             response = (prediction[: nx * ny] - prediction[nx * ny :]).T / (change * (1.0 if inflow else 2.0))
             found[term] = response.reshape(-1, nx, ny).astype(np.float32)
-        return found
+        yield model.rows[experiment], found
 
     def flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:
         now = faces(problem_at(model, experiment, point.z[None]), point.flows[experiment])

@@ -11,12 +11,13 @@ how discharge is shared over all cells of an inflow, that part is added on its o
     + (l_n . dR/d ln Q) d ln W/da_c
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import pandas as pd
 from scipy.special import ndtr, ndtri
 
 from vegglue.arrays import Array, Single
@@ -28,7 +29,7 @@ from vegglue.case.parameter_space import theta_at
 from vegglue.case.size_limits import WIDE_FROM
 from vegglue.case.zones import ranges_without_cells
 from vegglue.compilation import compiled
-from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, Wanted
+from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, StationsOfCells, Wanted
 from vegglue.flow.batch import solve_members
 from vegglue.flow.equations import cell_depths, faces, residual
 from vegglue.flow.jacobian import (
@@ -71,7 +72,7 @@ CELL_STRIDE = 5
 # Stations whose adjoints are made together [-]. On 342 x 40 cells 1,000 stations take 1.6 s of a core with 128, 1.7 s
 # with 64 or 32, and 2.6 s all at once, when each holds some 50 bytes in every cell.
 STATIONS_TOGETHER = 128
-# Stations times cells on a wide grid whose adjoints are made together [-]: they then take 0.25 GB.
+# Stations times cells on a wide grid whose adjoints are made together [-]: they then take 0.1 GB for each core.
 STATIONS_AND_CELLS = 2e6
 # Largest correction [m, m/s] of flows on coarser cells, which are off by more than that: chosen.
 ROUGH = 1e-3
@@ -348,7 +349,7 @@ def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[
     return np.asarray((now - point.prediction[rows]).T / gains)
 
 
-def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> Mapping[Term, Single]:
+def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> StationsOfCells:
     """df/da_c of each cell, see `Engine.responses_to_cells`; in single precision, one solve for each station."""
     flow, grid, station = point.flows[experiment], model.site.grid, model.stations[experiment]
     problem = problem_at(model, experiment, point.z[None])
@@ -358,42 +359,49 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
     changes = {term: _cell_changes(part, flow.state, geometry, term) for term in terms}
     inflows = shared_inflows(part)
     discharges = [answer_to_discharge(part, flow.state, inflow).astype(np.float32) for inflow in inflows]
-    found = {term: np.zeros((len(station), grid.x.size, grid.y.size), np.float32) for term in terms}
     together, cells = STATIONS_TOGETHER, part.shape[0] * part.shape[1]
     if part.shape[1] >= WIDE_FROM:
         together = int(np.clip(STATIONS_AND_CELLS / cells, 8, STATIONS_TOGETHER))
-    for first in range(0, len(station), together):
-        some = slice(first, first + together)
-        weights = reading_weights(problem, state, grid, station.iloc[some])[:, :, rows].astype(np.float32)
-        sensitivity = adjoints(part, flow.state, flow.factors, weights)
+
+    def responses_of(some: pd.DataFrame) -> dict[Term, Single]:
+        sensitivity = adjoints(part, flow.state, flow.factors, reading_weights(problem, state, grid, some)[:, :, rows])
         of_discharges = [np.einsum("ikjn,ikj->n", sensitivity, discharge) for discharge in discharges]
         nx, _, ny, n = sensitivity.shape
+        found = {term: np.zeros((n, nx, grid.y.size), np.float32) for term in terms}
         for term, (local, of_wholes) in changes.items():
             windows = np.zeros((nx, ny, n), dtype=np.float32)
             _sum_windows(sensitivity, local, windows)
-            answers = np.ascontiguousarray(np.moveaxis(windows, -1, 0))
+            answers = found[term][:, :, rows]
+            answers[...] = np.moveaxis(windows, -1, 0)
             for inflow, of_discharge, of_whole in zip(inflows, of_discharges, of_wholes, strict=True):
                 column, row = cells_of(part, inflow)
                 answers[:, column, row] += np.outer(of_discharge, of_whole)
-            found[term][some, :, rows] = answers
-    return found
+        return found
+
+    for first in range(0, len(station), together):
+        some = slice(first, first + together)
+        yield model.rows[experiment][some], responses_of(station.iloc[some])
 
 
 def _cell_changes(part: Problem, state: Array, geometry: ChannelGeometry, term: Term) -> tuple[Single, list[Array]]:
-    """A term changed in each cell: dR/da at unchanged shares of the inflows, in every CELL_STRIDE-th cell at once
-    (nx, 3, ny, CELL_STRIDE^2), and d ln W/da of each inflow that shares by depth, (cell,) each.
+    """A term changed in each cell: dR/da at unchanged shares of the inflows, in every CELL_STRIDE-th cell both ways at
+    once (nx, 3, ny, CELL_STRIDE^2), and d ln W/da of each inflow that shares by depth, (cell,) each.
     """
-    (nx, ny), small = part.shape, SMALL_CHANGE[term]
-    member = np.arange(CELL_STRIDE**2)  # of each cell that is changed in it: every so many-th both ways
+    (nx, ny), small, inflows = part.shape, SMALL_CHANGE[term], shared_inflows(part)
+    base, before, states = residual(part, state), cell_depths(part, state), np.repeat(state, CELL_STRIDE, axis=3)
+    found = np.empty((nx, 3, ny, CELL_STRIDE**2), np.float32)
+    of_wholes = [np.zeros(cells_of(part, inflow)[0].size) for inflow in inflows]
     i, j = np.arange(nx)[:, None, None] % CELL_STRIDE, np.arange(ny)[None, :, None] % CELL_STRIDE
-    lattice = ((i == member // CELL_STRIDE) & (j == member % CELL_STRIDE)).astype(float)
-    states = np.repeat(state, CELL_STRIDE**2, axis=3)
-    many = with_changed_term(part, geometry, term, small * lattice)
-    before, after = cell_depths(part, state), cell_depths(many, states)
-    rates = residual(with_kept_shares(many, before, after), states)
-    # The depth of a cell changes in the one member only in which the cell itself is changed.
-    of_wholes = [changes_of_whole(part, one, before, after).sum(axis=1) / small for one in shared_inflows(part)]
-    return ((rates - residual(part, state)) / small).astype(np.float32), of_wholes
+    for column in range(CELL_STRIDE):  # some members at a time, in a fifth of the memory
+        lattice = ((i == column) & (j == np.arange(CELL_STRIDE))).astype(float)
+        many = with_changed_term(part, geometry, term, small * lattice)
+        after = cell_depths(many, states)
+        rates = residual(with_kept_shares(many, before, after), states)
+        found[..., column * CELL_STRIDE : (column + 1) * CELL_STRIDE] = (rates - base) / small
+        # The depth of a cell changes in the one member only in which the cell itself is changed.
+        for of_whole, inflow in zip(of_wholes, inflows, strict=True):
+            of_whole += changes_of_whole(part, inflow, before, after).sum(axis=1) / small
+    return found, of_wholes
 
 
 @compiled
