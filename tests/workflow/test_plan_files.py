@@ -2,16 +2,20 @@
 
 import csv
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import pytest
 from browser import found_in_page
 from small_case import SMALL
 
 import vegglue
+from vegglue.calibration.candidates import effect_entry
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
 from vegglue.engine.interface import linearise
@@ -20,6 +24,7 @@ from vegglue.measurements.observations import read_observations
 from vegglue.pages.plan import confusions, days_of_work
 from vegglue.results.plan import FieldPlan, PlannedPiece, Work, field_places, field_stations
 from vegglue.workflow.case_run import CaseRun
+from vegglue.workflow.hidden_effect import candidate_of
 
 # Of UTM zone 32: the central meridian of 9 degrees east has the easting 500,000 m, the equator the northing 0.
 FRAME = """
@@ -96,12 +101,21 @@ def filled(sheet: Path, values: dict[str, list[float]]) -> None:
             writer.writerows(rows)
 
 
-def test_the_sheet_filled_in_is_imported_and_diagnosed_without_an_edit(made: Made, tmp_path: Path) -> None:
+def filled_in(made: Made, sheet: Path) -> pd.DataFrame:
+    """A sheet filled in with numbers that are none of a flow, and its stations."""
     folder, plan = made
-    sheet = folder / "runs/small/plan/sheet"
+    if sheet.name != "sheet":
+        copytree(folder / "runs/small/plan/sheet", sheet)
     count = sum(len(one.y) for one in plan.pieces if one.work.value != "gauge")
     filled(sheet, {"velocities.csv": [0.5 + 0.01 * k for k in range(count)], "levels.csv": [0.93]})
-    table = read_observations(vegglue.import_folder(sheet, tmp_path / "first.yaml")).table
+    return read_observations(vegglue.import_folder(sheet, sheet.parent / "first.yaml", force=True)).table
+
+
+def test_the_sheet_filled_in_is_imported_and_diagnosed_without_an_edit(made: Made, tmp_path: Path) -> None:
+    folder, _ = made
+    sheet = folder / "runs/small/plan/sheet"
+    table = filled_in(made, sheet)
+    count = int((table["kind"] == "velocity").sum())
     # What the model shows with what nobody guessed: a roughness off the middle of its prior.
     model = CaseRun(load_case(folder / "small.yaml")).model
     point = linearise(replace(model, station=table), np.array([0.6, -0.4]))
@@ -124,6 +138,70 @@ def test_the_sheet_filled_in_is_imported_and_diagnosed_without_an_edit(made: Mad
     low, high = found.parameters.last["n_b"][1:]
     true = theta_at(case, np.array([0.6, -0.4]))["n_b"][0]
     assert low < true < high
+
+
+def test_what_the_plan_said_would_be_seen_is_named_from_its_sheet(made: Made, tmp_path: Path) -> None:
+    folder, plan = made
+    sheet, name = folder / "runs/small/plan/sheet", "discharge_error[low]"
+    assert next(one for one in plan.effects if one.name == name).seen
+    table = filled_in(made, sheet)
+    model = replace(CaseRun(load_case(folder / "small.yaml")).model, station=table)
+    candidate = candidate_of(model, name)
+    hidden = effect_entry(candidate, 1.2 * candidate.amplitude.scale, candidate.settings()[0])
+    case = model.case.model_copy(update={"effects": {candidate.key: hidden}})
+    point = linearise(replace(model, case=case), np.array([0.5, -0.5]))
+    assert point is not None
+    error = table["standard_error"].to_numpy(float) * np.random.default_rng(1).standard_normal(len(table))
+    value, velocity = point.prediction + error, (table["kind"] == "velocity").to_numpy()
+    filled(sheet, {"velocities.csv": list(value[velocity]), "levels.csv": list(value[~velocity])})
+    found = vegglue.diagnose(vegglue.import_folder(sheet, tmp_path / "measured.yaml"), runs=tmp_path / "runs")
+    assert name in [one.name for one in found.verdict.effects]
+
+
+def as_saved_by_a_person(sheet: Path) -> None:
+    """With semicolons and decimal commas, in another order, with an empty row and remarks."""
+    heading, *rows = (line.split(",") for line in (sheet / "velocities.csv").read_text().splitlines())
+    rows = [[*(cell.replace(".", ",") for cell in row), "Äste davor" if k == 3 else ""] for k, row in enumerate(rows)]
+    lines = [[*heading, "Bemerkung"], *rows[::-1], [""] * (len(heading) + 1)]
+    (sheet / "velocities.csv").write_bytes("\r\n".join(";".join(row) for row in lines).encode("cp1252"))
+
+
+def as_a_workbook(sheet: Path) -> None:
+    pd.read_csv(sheet / "velocities.csv").to_excel(sheet / "velocities.xlsx", index=False)
+    (sheet / "velocities.csv").unlink()
+
+
+@pytest.mark.parametrize("saved", [as_saved_by_a_person, as_a_workbook])
+def test_a_sheet_may_be_saved_as_spreadsheets_do(made: Made, saved: Callable[[Path], None]) -> None:
+    sheet = made[0] / f"runs/small/plan/{saved.__name__}"
+    columns = ["x", "y", "value", "standard_error"]
+    before = filled_in(made, sheet)[columns].sort_values(columns[:2])
+    saved(sheet)
+    found = read_observations(vegglue.import_folder(sheet, sheet.parent / "first.yaml", force=True)).table
+    assert found[columns].sort_values(columns[:2]).to_numpy() == pytest.approx(before.to_numpy())
+
+
+def test_levels_that_were_not_measured_may_be_deleted(made: Made) -> None:
+    sheet = made[0] / "runs/small/plan/without_levels"
+    count = len(filled_in(made, sheet))
+    (sheet / "levels.csv").unlink()
+    case = vegglue.import_folder(sheet, sheet.parent / "first.yaml", force=True)
+    assert len(read_observations(case).table) == count - 1
+
+
+def test_a_sheet_without_its_config_is_refused(made: Made, tmp_path: Path) -> None:
+    copytree(made[0] / "runs/small/plan/sheet", tmp_path / "sheet")
+    with pytest.raises(InputError, match="planned with"):
+        vegglue.import_folder(tmp_path / "sheet", tmp_path / "measured.yaml")
+
+
+def test_a_sheet_that_was_filled_in_is_not_replaced(made: Made) -> None:
+    folder, _ = made
+    filled_in(made, folder / "runs/small/plan/sheet")
+    before = (folder / "runs/small/plan/sheet/velocities.csv").read_text(encoding="utf-8")
+    with pytest.raises(InputError, match="filled in"):
+        vegglue.plan(load_case(folder / "small.yaml"), runs=folder / "runs")
+    assert (folder / "runs/small/plan/sheet/velocities.csv").read_text(encoding="utf-8") == before
 
 
 def test_an_empty_sheet_is_refused(tmp_path: Path) -> None:

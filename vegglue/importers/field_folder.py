@@ -245,10 +245,19 @@ def case_of_sheet(folder: Path) -> Path | None:
 def case_from_sheet(folder: Path, target: Path, config: Path) -> FolderCase:
     """A child of the case that a sheet is of, with what was filled in as its measurements.
 
+    Options of a table are those of its name: it may have been saved in another format, or be of what was not measured.
+
     Errors: InputError if the config is not there, or nothing was filled in.
     """
+    path = site_file(folder)
+    if not config.is_file():
+        raise InputError(
+            f"{shown_path(path)}: `{OF_SHEET}` expected the config that this sheet was planned with, got {config}, "
+            "which is not there; correct its path."
+        )
     case = load_case(config)
-    given = read_tree(site_file(folder)).get("files") or {}
+    options = {Path(name).stem: one for name, one in (read_tree(path).get("files") or {}).items()}
+    given = {one.name: options[one.stem] for one in sorted(folder.iterdir()) if one.stem in options}
     site = FieldSite.model_construct(experiments=dict.fromkeys(case.experiments), holdout={}, files=given)
     ground = build_site(case)
 

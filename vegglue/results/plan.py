@@ -15,12 +15,14 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from vegglue.case.grid import centreline_in, on_map
+from vegglue.case.resolved_config import refuse_not_made, write_made
 from vegglue.case.safe_yaml import yaml_of
 from vegglue.case.schema import Case, Planned
 from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, path_from
 from vegglue.measurements.kinds import KINDS, STREAMWISE, WATER_LEVEL
 from vegglue.results.calibration_files import csv_text
+from vegglue.wording.numbers import shown_path
 from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.wording.sentences import lines_of, phrase, tagged
 
@@ -495,8 +497,7 @@ def write_field_files(folder: Path, case: Case, plan: FieldPlan) -> FieldFiles:
         write_text(gpx, _gpx(case, stations), MAKE_ROOM)
     elif gpx.exists():
         gpx.unlink()
-    for name, text in sheets(folder / SHEET, case, plan).items():
-        write_text(folder / SHEET / name, text, MAKE_ROOM)
+    write_made({folder / SHEET / name: text for name, text in sheets(folder / SHEET, case, plan).items()}, MAKE_ROOM)
     surveyed = [one for one in stations if one.work is Work.SURVEY_LINE]
     if surveyed:
         levels = [[f"{one.x:g}", f"{one.y:g}", ""] for one in surveyed]
@@ -504,22 +505,42 @@ def write_field_files(folder: Path, case: Case, plan: FieldPlan) -> FieldFiles:
     return FieldFiles(folder, stations, without)
 
 
+def refuse_filled_in(folder: Path) -> None:
+    """Errors: InputError if the sheet in the folder of a plan was filled in since it was written."""
+    tables = sorted((folder / SHEET).glob("*.csv"))
+    try:
+        refuse_not_made({**dict.fromkeys(tables, ""), folder / SHEET / "site.yaml": ""}, MAKE_ROOM)
+    except InputError:
+        raise InputError(
+            f"{shown_path(folder / SHEET)}: was filled in or changed since it was written; move this folder to another "
+            "place, then plan again."
+        ) from None
+
+
 def sheets(folder: Path, case: Case, plan: FieldPlan) -> dict[str, str]:
-    """The tables to fill in, by their names, and the site file that names the case they are of."""
+    """The tables to fill in, by their names, flow by flow from downstream as the work goes, and last the site file that
+    names the case they are of.
+    """
     planned, found = case.planned or Planned(), {}
+    names = {(one.work, one.x, one.y): one.name for one in field_stations(case, plan)[0]}
+    flows = list(dict.fromkeys(one.experiment for one in plan.pieces))
+    pieces = sorted(plan.pieces, key=lambda one: (flows.index(one.experiment), -one.x))
+    middle = 0.5 * (case.grid.y[0] + case.grid.y[1])
     files: dict[str, dict[str, str]] = {}
     for kind in (STREAMWISE, WATER_LEVEL, "discharge"):
         of, stated = KINDS[kind], getattr(planned.errors, kind)
         rows = []
-        for one in plan.pieces:
+        for one in pieces:
             if KIND_OF_WORK.get(one.work) != kind:
                 continue
             section = "points" if one.work is Work.POINT else f"x{one.x:g}"
             error = of.usual_error if stated is None else stated
-            for y in one.y or (0.0,):
-                rows.append([one.experiment, section, f"{one.x:g}", f"{y:g}", "", f"{error:g}"])
+            for y in one.y or (middle,):
+                name = names[one.work, one.x, y]
+                rows.append([name, one.experiment, section, f"{one.x:g}", f"{y:g}", "", f"{error:g}"])
         if rows:
-            found[of.file] = csv_text(["experiment", "section", "x", "y", of.column, of.error_column], rows)
+            heading = ["station", "experiment", "section", "x", "y", of.column, of.error_column]
+            found[of.file] = csv_text(heading, rows)
             files[of.file] = {"coordinates": "channel"}
     named = path_from(folder.resolve(), case.source)
     text = yaml_of({OF_CASE: named, "files": files})

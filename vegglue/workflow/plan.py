@@ -11,7 +11,7 @@ from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.plain_json import plain
 from vegglue.progress import Watch, silent
-from vegglue.results.plan import FieldPlan, plan_json, write_field_files
+from vegglue.results.plan import FieldPlan, plan_json, refuse_filled_in, write_field_files
 from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.workflow.case_run import CaseRun, case_run
 
@@ -62,7 +62,8 @@ def plan(
     Raises
     ------
     InputError
-        If there is nothing to calibrate, nothing is under water, no flow is found, or an effect is unknown.
+        If there is nothing to calibrate, nothing is under water, no flow is found, an effect is unknown, or the sheet
+        of an earlier plan was filled in.
     StorageError
         If a file cannot be written.
     """
@@ -72,9 +73,10 @@ def plan(
             raise InputError(f"--hours: expected hours of field work above 0, got {hours:g}; give another.")
         planned = (run.case.planned or Planned()).model_copy(update={"hours": float(hours)})
         run = run.of(run.case.model_copy(update={"planned": planned}))
+    folder = run.folder / FOLDER
+    refuse_filled_in(folder)
     with at_most(run.jobs):
         found = plan_measurements(run.model, about, size, between, run.watch)
-    folder = run.folder / FOLDER
     files = write_field_files(folder, run.case, found)
     write_text(folder / "plan.json", json.dumps(plain(plan_json(found)), allow_nan=False), MAKE_ROOM)
     from vegglue.pages.plan import render_plan
