@@ -8,9 +8,10 @@ import numpy as np
 from vegglue.calibration.score_test import alike_groups
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import Site, in_experiment
-from vegglue.case.schema import Case
+from vegglue.case.schema import Case, Planned
 from vegglue.case.site_schema import Interval
 from vegglue.case.zones import corners_of
+from vegglue.measurements.kinds import KINDS
 from vegglue.pages.svg import (
     COLOUR,
     Scale,
@@ -24,6 +25,7 @@ from vegglue.pages.svg import (
     tick_labels,
 )
 from vegglue.results.plan import (
+    KIND_OF_WORK,
     LETTERS,
     FieldFiles,
     FieldPlace,
@@ -84,6 +86,7 @@ def render_plan(case: Case, site: Site, plan: FieldPlan, files: FieldFiles) -> s
         places=places,
         days=days_of_work(case, plan, places),
         hours_of_day=DAY,
+        to_measure=what_to_measure(case, places),
         letters=[(letter, work) for work, letter in LETTERS.items() if work in {one.work for one in places}],
         seen=[one for one in plan.effects if one.seen],
         larger=[one for one in plan.effects if not one.seen and one.testable],
@@ -91,6 +94,16 @@ def render_plan(case: Case, site: Site, plan: FieldPlan, files: FieldFiles) -> s
         on_map=bool(files.stations) and bool(np.isfinite(files.stations[0].east)),
         mixed=confusions(plan.effects),
     )
+
+
+def what_to_measure(case: Case, places: Sequence[FieldPlace]) -> list[tuple[str, float, str]]:
+    """What is measured in the field, and the standard error of it that a plan assumes [its unit]."""
+    errors, found = (case.planned or Planned()).errors, dict[str, tuple[float, str]]()
+    for place in places:
+        name = KIND_OF_WORK.get(place.work, "survey")
+        usual, unit = (KINDS[name].usual_error, KINDS[name].unit) if name in KINDS else (0.0, "m")
+        found[name] = (getattr(errors, name) or usual, unit)
+    return [(name, *one) for name, one in found.items()]
 
 
 def confusions(effects: Sequence[PlannedEffect]) -> list[list[str]]:
