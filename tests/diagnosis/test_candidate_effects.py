@@ -60,7 +60,7 @@ def test_the_least_sum_of_squares_is_told_with_the_prior_of_the_amplitude(visibl
 
 @pytest.mark.parametrize(("end", "testable"), [(5.0, True), (1.5, False)])
 def test_what_would_be_seen_only_beyond_its_bounds_is_untestable(end: float, testable: bool) -> None:
-    """The turning of the earth ends at 1.5 plausible sizes, and was told to be testable at two."""
+    """The rotation of the earth ends at 1.5 plausible sizes, and was told to be testable at two."""
     candidate_effect, _ = on_linear_model(2.6, end)
     assert 1.5 < candidate_effect.detectability.smallest < 2.0
     assert candidate_effect.detectability.testable is testable

@@ -172,7 +172,7 @@ def test_a_seal_hides_and_opens(tmp_path: Path) -> None:
     assert opened_answer(path) == answer
     assert "stream" not in path.read_text(encoding="utf-8")
     path.write_text(sealed_answer(answer)[:-20], encoding="utf-8")
-    with pytest.raises(InputError, match="seal is broken"):
+    with pytest.raises(InputError, match="answer is damaged"):
         opened_answer(path)
     with pytest.raises(InputError, match="cannot be read"):
         opened_answer(tmp_path / "none")

@@ -211,7 +211,7 @@ EFFECTS = (
     Effect(
         name="inflow_distribution",
         stage="boundary",
-        title="The inflow is distributed otherwise than by conveyance: it is not developed",
+        title="The inflow is not distributed by conveyance: it is not developed",
         equation="q -> q exp(sum_k a_k cos(k pi (1 + s)/2)/k), k = 1 .. 4, s from -1 to 1 across the inflow",
         act=inflow_distribution,
         amplitude=Amplitude(

@@ -405,7 +405,7 @@ EFFECTS = (
     Effect(
         name="dispersion",
         stage="exchange",
-        title="Velocity varies over the depth, so that more momentum is carried than its mean says",
+        title="Velocity varies over the depth, so that more momentum is carried than by its mean",
         equation="-(1/h) div((beta - 1) h U U)",
         act=dispersion,
         amplitude=Amplitude(

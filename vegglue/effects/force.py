@@ -103,7 +103,7 @@ EFFECTS = (
     Effect(
         name="turning_earth",
         stage="force",
-        title="The turning of the earth",
+        title="The rotation of the earth",
         equation="f_x = c v, f_y = -c u, to the right on the northern half of the earth",
         act=turning_earth,
         amplitude=Amplitude("parameter", "1/s", "Coriolis parameter c", 1e-4, -1.5e-4, 1.5e-4),

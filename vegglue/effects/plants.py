@@ -348,7 +348,7 @@ EFFECTS = (
     Effect(
         name="foliage",
         stage="plants",
-        title="Leaves add drag of their own that yields to speed",
+        title="Leaves add drag of their own, which they reduce by streamlining",
         equation="phi -> phi + phi_F (|U|/U_0)^chi_F min(h/h_d, 1)",
         act=foliage,
         amplitude=Amplitude("drag", "-", "drag phi_F of the leaves at U_0", 2.0, 0.0, 100.0),

@@ -242,7 +242,7 @@ EFFECTS = (
     Effect(
         name="depth_dependent_bank",
         stage="resistance",
-        title="Banks grow rougher or smoother with depth than their law says",
+        title="The roughness of the banks changes with depth beyond their law",
         equation="k -> k (h / h_0)^e on the banks, h at least 0.02 of that of the site",
         act=depth_dependent_bank,
         amplitude=Amplitude("exponent", "-", "exponent e", 0.5, -3.0, 3.0),
@@ -254,7 +254,7 @@ EFFECTS = (
     Effect(
         name="depth_dependent_bed",
         stage="resistance",
-        title="The floor grows rougher or smoother with depth than its law says",
+        title="The roughness of the floor changes with depth beyond its law",
         equation="k -> k (h / h_0)^e on the floor without plants, h at least 0.02 of that of the site",
         act=depth_dependent_bed,
         amplitude=Amplitude("exponent", "-", "exponent e", 0.5, -3.0, 3.0),
@@ -276,7 +276,7 @@ EFFECTS = (
     Effect(
         name="bank_drag_trend",
         stage="resistance",
-        title="Plants or stones on the banks stand ever closer along the channel",
+        title="Plants or stones on the banks become denser along the channel",
         equation="k -> k + c (1/2 + d (x - x_m)/L) on the banks, x_m the middle of the grid, L its length",
         act=bank_drag_trend,
         # On half of the depth, as on banks, friction is twice that of the floor.
@@ -337,7 +337,7 @@ EFFECTS = (
     Effect(
         name="bed_stretch",
         stage="resistance",
-        title="A stretch of the floor is of another roughness than the rest",
+        title="A stretch of the floor has another roughness than the rest",
         equation="k -> k exp(a exp(-((x/L - c)/(s/2))^4)) on the floor without plants, x/L from -1/2 to 1/2",
         act=bed_stretch,
         amplitude=Amplitude(
@@ -353,7 +353,7 @@ EFFECTS = (
     Effect(
         name="steep_bank",
         stage="resistance",
-        title="Steep banks touch more water than their width says",
+        title="Steep banks have a longer wetted perimeter than their width",
         equation="k -> k (1 + a ((1 + s^2)^(1/2) - 1)), s = |dz_b/dy|",
         act=steep_bank,
         amplitude=Amplitude(
@@ -379,7 +379,7 @@ EFFECTS = (
     Effect(
         name="stem_blockage",
         stage="resistance",
-        title="Stems take up room, so that water between them runs faster",
+        title="Stems take up space, so that water between them is faster",
         equation="k -> k / (1 - s)^2 among plants",
         act=stem_blockage,
         amplitude=Amplitude("share", "-", "share s of the volume that stems take up", 0.05, 0.0, 0.6),

@@ -173,7 +173,7 @@ EFFECTS = (
     Effect(
         name="station_shift",
         stage="sensor",
-        title="Probes stood beside the places reported",
+        title="Probes stood beside their reported positions",
         equation="u -> u + d du/dy, d towards larger y",
         act=station_shift,
         amplitude=Amplitude("shift", "m", "true less reported place", 0.1, -0.5, 0.5, of="depth"),
@@ -198,7 +198,7 @@ EFFECTS = (
     Effect(
         name="among_plants",
         stage="sensor",
-        title="Probes among plants do not see the mean between stems",
+        title="Probes among plants do not measure the mean between stems",
         equation="u -> u (1 + a min(h_d/h, 1)) where plants stand",
         act=among_plants,
         amplitude=Amplitude("gain", "-", "relative error a of a probe deep in the plants", 0.2, -0.9, 2.0),
@@ -209,7 +209,7 @@ EFFECTS = (
     Effect(
         name="gauge_datum",
         stage="sensor",
-        title="Gauges stand on another datum than the bed",
+        title="Gauges have another datum than the bed",
         equation="z_s -> z_s + d",
         act=gauge_datum,
         amplitude=Amplitude("shift", "m", "how much too high the gauges read", 0.02, -0.5, 0.5, of="depth"),
@@ -220,7 +220,7 @@ EFFECTS = (
     Effect(
         name="gauge_head",
         stage="sensor",
-        title="Gauges feel the speed of the water, not its level alone",
+        title="Gauges respond to the velocity head, not only to the level",
         equation="z_s -> z_s + a u^2/(2 g)",
         act=gauge_head,
         amplitude=Amplitude("share", "-", "share a of the velocity head that they show", 0.5, -1.0, 1.0),
