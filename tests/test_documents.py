@@ -117,13 +117,9 @@ def lines_of_shell(page: Path) -> list[str]:
 def table_of_options() -> dict[str, set[str]]:
     """Options of each command as the table of docs/commands.md has them."""
     text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8").partition("### Which command takes which")[2]
-    heading, _, *rows = ([cell.strip() for cell in row[1:-1].split("|")] for row in re.findall(r"^\|.*\|$", text, re.M))
-    shared = [cell.strip("`") for cell in heading[1:-1]]
-    found = {}
-    for command, *marks, own in rows[: next(i for i, row in enumerate(rows) if row[0] == "exit code")]:
-        marked = {option for option, mark in zip(shared, marks, strict=True) if mark == "x"}
-        found[command.strip("`")] = marked | set(re.findall(r"--[a-z-]+", own))
-    return found
+    text = text.partition("\n## ")[0]
+    rows = (row.split("|")[1:3] for row in re.findall(r"^\| `.*\|$", text, re.MULTILINE))
+    return {command.strip(" `"): set(re.findall(r"--[a-z-]+", options)) for command, options in rows}
 
 
 def test_the_table_of_options_is_true() -> None:
