@@ -3,7 +3,6 @@
 `cluster` is such a backend; this module only knows that there may be one, see `task_backend`.
 """
 
-import ctypes
 import os
 import signal
 import sys
@@ -139,14 +138,6 @@ def cores_of(jobs: int) -> int:
 def memory_of_machine() -> float:
     """All of its memory [bytes]."""
     return float(psutil.virtual_memory().total)
-
-
-def give_back_memory() -> None:
-    """Give what is free back to the system: the C library of Linux keeps arrays below 32 MB, 0.3 GB of a diagnosis on
-    360 x 150 cells.
-    """
-    with suppress(AttributeError, OSError, TypeError):  # other C libraries keep none, or have no such call
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def in_threads(

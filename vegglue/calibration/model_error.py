@@ -48,7 +48,7 @@ from vegglue.engine.interface import Cause, Model, Point, responses, responses_t
 from vegglue.engine.newton import problem_at
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
-from vegglue.parallel import give_back_memory, in_threads
+from vegglue.parallel import in_threads
 
 # The effect of the library that is a spot of a term.
 EFFECT_AT_PLACE: dict[Term, str] = {
@@ -89,7 +89,6 @@ def excluded_terms(case: Case) -> set[Term]:
 
 def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellResponses:
     """Those of all experiments, in parallel."""
-    give_back_memory()  # a diagnosis needs most of it here
     shape = (len(model.station), model.site.grid.x.size, model.site.grid.y.size)
     found = {term: np.zeros(shape, dtype=np.float32) for term in terms}
 
@@ -99,7 +98,6 @@ def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellR
                 found[term][rows] = of[term]
 
     in_threads(fill, [(experiment,) for experiment in point.flows])
-    give_back_memory()
     return CellResponses(model.site.grid, found)
 
 
