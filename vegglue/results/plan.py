@@ -512,8 +512,8 @@ def refuse_filled_in(folder: Path) -> None:
         refuse_not_made({**dict.fromkeys(tables, ""), folder / SHEET / "site.yaml": ""}, MAKE_ROOM)
     except InputError:
         raise InputError(
-            f"{shown_path(folder / SHEET)}: was filled in or changed since it was written; move this folder to another "
-            "place, then plan again."
+            f"{shown_path(folder / SHEET)}: was filled in since, or another version wrote it; move this folder "
+            "to another place, then plan again."
         ) from None
 
 
