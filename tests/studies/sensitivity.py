@@ -3,15 +3,13 @@
     python tests/studies/sensitivity.py [--cases open-a ...] [--constants field_odds ...]
     python tests/studies/sensitivity.py --page
 
-The first diagnoses what is not recorded yet, each in a process of its own, and may be stopped at any time; the ten that
-matter most come first. The second writes the table of docs/sensitivity.md from the records, as the first does at its
-end. A share near 1 is halved and doubled in its distance from 1.
+The first diagnoses what is not recorded yet, the constants that matter most first, and may be stopped at any time. The
+second writes the table of docs/sensitivity.md from the records, as the first does at its end. A share near 1 is halved
+and doubled in its distance from 1.
 """
 
 import argparse
 import json
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -19,7 +17,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import vegglue
 from vegglue.decision_constants import DecisionConstants, Described, described, using
+from vegglue.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 CASES, RECORDS, PAGE = ROOT / "data/open_cases", ROOT / "data/sensitivity/records.jsonl", ROOT / "docs/sensitivity.md"
@@ -43,8 +43,6 @@ def varied(one: Described, factor: float) -> float:
 
 def diagnosed(case: str, constant: str, factor: float) -> Record:
     """The verdict of one open case, with one constant varied or with all as they are."""
-    import vegglue
-
     by_name = {one.name: one for one in described()}
     values = DecisionConstants()
     if constant != AS_IS:
@@ -128,24 +126,18 @@ def main() -> None:
     parser.add_argument("--cases", nargs="*", default=sorted(path.name for path in CASES.glob("open-*")))
     parser.add_argument("--constants", nargs="*", default=[one.name for one in _in_order(described())])
     parser.add_argument("--page", action="store_true", help="only write the table")
-    parser.add_argument("--one", nargs=3, metavar=("CASE", "CONSTANT", "FACTOR"), help=argparse.SUPPRESS)
     given = parser.parse_args()
-    if given.one:
-        case, constant, factor = given.one
-        print(json.dumps(diagnosed(case, constant, float(factor))))
-        return
     RECORDS.parent.mkdir(exist_ok=True)
     kept = "".join(json.dumps(one) + "\n" for one in read_records())
     RECORDS.write_text(kept, encoding="utf-8")
     for case, constant, factor in [] if given.page else missing(given.cases, given.constants, read_records()):
-        command = [sys.executable, __file__, "--one", case, constant, str(factor)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            print(f"{case}, {constant} x {factor}: {done.stderr.strip().splitlines()[-1]}", flush=True)
+        try:
+            record = diagnosed(case, constant, factor)
+        except InputError as error:
+            print(f"{case}, {constant} x {factor:g}: {error}", flush=True)
             continue
         with RECORDS.open("a", encoding="utf-8") as file:
-            file.write(done.stdout)
-        record = json.loads(done.stdout)
+            file.write(json.dumps(record) + "\n")
         print(f"{case}, {constant} x {factor:g}: {record['kind']}, {record['seconds']} s", flush=True)
     write_page(read_records())
 
