@@ -1,10 +1,16 @@
 """Chances of what competes: as often true as told, tempered by what fingerprints may be wrong, and told anew."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
+from coarse_twin import CASE
 
 from vegglue.calibration import score_test
-from vegglue.diagnosis.competition import tempered_odds, tempered_probabilities, worth_refitting
+from vegglue.case.case_effects import effect_named
+from vegglue.diagnosis import competition
+from vegglue.diagnosis.competition import found_extent, tempered_odds, tempered_probabilities, worth_refitting
 from vegglue.diagnosis.search_state import followed_further, with_chances
 from vegglue.results.causes import Step
 
@@ -73,3 +79,24 @@ def test_effects_are_refitted_while_they_are_within_reach_of_what_is_kept() -> N
     assert worth_refitting(promised, 3.0) == [0, 1]
     assert worth_refitting(promised, 100.0) == [0], "one at least"
     assert worth_refitting(np.zeros(0), -np.inf) == []
+
+
+@pytest.mark.parametrize(("lengths", "log_sd"), [([2.0, 6.0], 0.5 * np.log(3.0)), ([2.0, 2.0], 0.7)])
+def test_an_extent_has_a_prior_where_only_spots_of_one_length_fit(
+    monkeypatch: pytest.MonkeyPatch, lengths: list[float], log_sd: float
+) -> None:
+    """A reach shorter than 3.6 widths has no room for long spots of viscosity."""
+    tried: list[Any] = []
+    monkeypatch.setattr(competition, "refits_of", lambda _, trials: tried.extend(trials) or [None for _ in trials])
+    place = {"x": 12.0, "y": 0.5, "length": 2.0, "width": 0.5}
+    places: Any = SimpleNamespace(
+        x=np.array([10.0, 14.0]), y=np.array([0.0, 1.0]), length=np.array(lengths), width=np.array([0.5, 0.5]),
+        plausible=0.01,
+    )  # fmt: skip
+    spot: Any = SimpleNamespace(
+        candidate=SimpleNamespace(effect=effect_named(CASE, "unlisted_viscosity"), above_off=False), amplitude=0.01,
+        fitted=SimpleNamespace(point=SimpleNamespace(z=np.zeros(3))), shapes=place,
+    )  # fmt: skip
+    nothing: Any = None
+    assert found_extent(nothing, places, nothing, spot, place) is None
+    assert [dict(one.candidate.fitted)["length"].log_sd for one in tried] == pytest.approx([log_sd, log_sd])

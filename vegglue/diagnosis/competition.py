@@ -269,10 +269,8 @@ def found_extent(
     """
     effect, above_off = spot.candidate.effect, spot.candidate.above_off
     ends = float(places.length.min()), float(places.length.max())
-    length = Parameter(
-        distribution="lognormal", median=float(np.sqrt(ends[0] * ends[1])), log_sd=0.5 * np.log(ends[1] / ends[0]),
-        unit="m",
-    )  # fmt: skip
+    spread = 0.5 * np.log(ends[1] / ends[0]) or LOG_SIZE  # in a short reach only the shortest spots fit
+    length = Parameter(distribution="lognormal", median=float(np.sqrt(ends[0] * ends[1])), log_sd=spread, unit="m")
     width = Parameter(distribution="lognormal", median=float(places.width.min()), log_sd=LOG_SIZE, unit="m")
     trials = []
     for start in (spot.shapes, outline):
