@@ -256,7 +256,7 @@ PERFECT = an_ensemble(a_case(), stations(measured(design=TWICE)), TWICE).predict
         (stations(measured()), {"likelihood": "nse", "behavioural": 1.5}, r"infer\.behavioural: .* 1\.5, "),
         # No threshold is set: the message names the likelihood.
         (stations(measured() + 100.0), {"likelihood": "nse"}, r"infer\.likelihood: nse .* 0, the best has -\d"),
-        (ONE_UNSTATED, {"sigma": "known"}, r"1 of velocity.* x = 2\.5"),
+        (ONE_UNSTATED, {"sigma": "known"}, r"1 value of velocity.* x = 2\.5"),
         (stations(PERFECT), {"design": TWICE}, "observations: .* velocity .*known"),
         (stations(measured()).assign(used=False), {}, "observations: .*check"),
         (stations(measured()), {"members": 16, "failed": tuple(range(16))}, "ensemble: .* 16 "),

@@ -194,7 +194,7 @@ def test_the_method_can_be_chosen(
 def test_missing_standard_errors_are_told(reach: SolvedReach) -> None:
     case, observations, ensemble = reach
     unknown = replace(observations, table=observations.table.assign(standard_error=math.nan))
-    with pytest.raises(InputError, match=r"15 of velocity, .* x = 8, y = -2 m"):
+    with pytest.raises(InputError, match=r"15 values of velocity, .* x = 8, y = -2 m"):
         refine(ensemble, model_of(case, unknown))
 
 
