@@ -296,6 +296,28 @@ def test_columns_that_are_not_read_are_listed(tmp_path: Path) -> None:
     assert "surface velocity (m/s)" in named
 
 
+def test_velocities_of_no_usual_name_are_refused_beside_levels(tmp_path: Path) -> None:
+    levels = "x,y,level\n8,0,0.4\n9,0,0.4\n"
+    named = refusal_of(tmp_path, a__csv="x,y,surface velocity (m/s)\n8,0,0.4\n9,0,0.4\n", levels_of_june__csv=levels)
+    assert "a.csv: " in named
+    assert "surface velocity (m/s)" in named
+
+
+@pytest.mark.parametrize(
+    ("heading", "roles"),
+    [
+        ("RD X;RD Y;snelheid_x [cm/s];snelheid_y [cm/s]", ["x", "y", "u", "v"]),
+        ("x [m];y [m];z über Sohle [mm];u [cm/s]", ["x", "y", "height", "u"]),
+        ("Lauf;X_RD;Y_RD;vitesse x (m/s)", ["x", "y", "u"]),
+    ],
+)
+def test_components_and_heights_are_found_in_other_languages(tmp_path: Path, heading: str, roles: list[str]) -> None:
+    row = ";".join("1" for _ in heading.split(";"))
+    taken = rows_of(tmp_path, f"{heading}\n{row}\n")
+    assert sorted(taken.numbers) == sorted(roles)
+    assert ("experiment" in taken.texts) == heading.startswith("Lauf")
+
+
 def test_own_columns_and_units_are_kept_in_the_case(tmp_path: Path) -> None:
     entry = "files: {a.csv: {columns: {u: V1, x: P}, units: {u: ft/s}, flip: [x], missing: [-1], section: A}}\n"
     found = import_of(tmp_path, CHANNEL + JUNE + entry, a__csv="P,y,V1\n-4,0,-1.0\n-6,0,-2.0\n-8,0,-1\n")

@@ -25,7 +25,7 @@ from vegglue.importers.repeats import (
 )
 from vegglue.importers.table_parser import numbers_of
 from vegglue.measurements.kinds import KINDS, STREAMWISE, Kind
-from vegglue.wording.numbers import so_many
+from vegglue.wording.numbers import listed, so_many
 from vegglue.wording.sentences import sentences
 
 EXPERIMENTS = "experiments"
@@ -127,6 +127,13 @@ def station_tables(
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else (ImportNote(Noted.ON_AXIS),)
     if options.experiment is not None and options.experiment not in known.names:
         raise known.refusal(file, options.experiment)
+    unnamed_velocities = [heading for heading in taken.others if unit_stated(heading, "velocity")]
+    if not kinds and unnamed_velocities:
+        raise InputError(
+            f"{file}: expected a column of velocities by a usual name, got {listed(unnamed_velocities)}; name them by "
+            "`columns: {u: ...}` of this file in `files` (with `v`, or `speed` and `direction`), or move the file out "
+            "of the folder."
+        )
     if kinds and taken.lines:
         measured = taken.only(np.any([np.isfinite(taken.numbers[kind.column]) for kind in kinds], axis=0))
         known.refuse_unknown(file, measured.lines, measured.texts["experiment"])
