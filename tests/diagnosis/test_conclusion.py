@@ -14,6 +14,7 @@ from verdicts import step
 
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import with_effect
+from vegglue.calibration.fingerprints import least_depth
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of, with_correlation, with_grid_error
 from vegglue.calibration.residual_screening import Screening, screen
@@ -203,19 +204,21 @@ def test_cells_with_a_larger_error_than_the_readings_are_a_note() -> None:
 
 
 def test_more_mixing_where_deep_and_shallow_water_meet_is_a_shear_layer() -> None:
-    """At the toe of a bank, not in the middle of the floor, and no other term nor less mixing."""
+    """On a bank, not in the middle of the floor nor beside land, and no other term nor less mixing."""
     model, point = coarse_twin()
     depth = np.asarray(flow_at_centres(model, point, next(iter(point.flows))).depth)
     grid, column = model.site.grid, depth.shape[0] // 2
-    x, edge, middle = float(grid.x[column]), float(grid.y[1]), float(grid.y[grid.y.size // 2])
+    x, (land, edge, middle) = float(grid.x[column]), (float(grid.y[j]) for j in (1, 4, grid.y.size // 2))
     reach = 2.0 * grid.dy
     expected = depth[column, np.abs(grid.y - edge) <= reach]
     mixing = an_anomaly(x=x, y=edge, width=reach, term="viscosity", amplitude=0.02)
-    there = (mixing, replace(mixing, amplitude=-0.02), replace(mixing, term="drag"), replace(mixing, y=middle))
+    there = (mixing, replace(mixing, amplitude=-0.02), replace(mixing, term="drag"))
+    there += tuple(replace(mixing, y=y) for y in (middle, land))
     (found,) = shear_layers(model, point, there)
     assert (found.x, found.y) == (x, edge)
     assert found.deep >= 2.0 * found.shallow
     assert found.deep >= expected.max()
+    assert found.shallow > least_depth(model)  # a dry cell is no shallow water
 
 
 def test_a_fault_of_the_probes_near_the_inflow_may_be_an_inflow_that_develops() -> None:

@@ -434,15 +434,18 @@ def cells_too_coarse(noise: Noise, station: pd.DataFrame) -> Iterator[CellsTooCo
 
 
 def shear_layers(model: Model, point: Point, places: Sequence[LocalAnomaly]) -> Iterator[ShearLayer]:
-    """Places of more mixing across which the depth changes by a factor of TWO_DEPTHS, in the deepest flow there."""
-    y = model.site.grid.y
+    """Places of more mixing across which the depth of the water changes by a factor of TWO_DEPTHS, in the deepest flow
+    there; where a cell is dry, no water meets.
+    """
+    y, least = model.site.grid.y, least_depth(model)
     for one in (each for each in places if each.term == "viscosity" and each.amplitude > 0.0):
         column = cells_at(model.site, np.array([one.x]), np.array([one.y]))[0][0]
         beside = np.abs(y - one.y) <= max(one.width, model.site.grid.dy)
         depths = [flow_at_centres(model, point, name).depth[column, beside] for name in point.flows]
         deepest = max(depths, key=lambda depth: float(depth.max()))
-        if deepest.max() >= TWO_DEPTHS * deepest.min():
-            yield ShearLayer(one.x, one.y, float(deepest.min()), float(deepest.max()))
+        water = deepest[deepest > least]
+        if water.size and water.max() >= TWO_DEPTHS * water.min():
+            yield ShearLayer(one.x, one.y, float(water.min()), float(water.max()))
 
 
 def significant_effects(last: Screening, found: SearchState, slack: float = 0.0) -> dict[str, float]:
