@@ -11,6 +11,7 @@ import pytest
 from house import FILES, PACKAGE
 
 from vegglue.compilation import SHARED, _stamp, shapes_loops
+from vegglue.wording.phases import COMPILING
 
 CHEZY = """
 from vegglue.effects.plant_laws import baptist_chezy
@@ -134,5 +135,4 @@ def test_the_first_command_says_that_it_compiles(tmp_path: Path) -> None:
         ).stdout.splitlines()
         for _ in range(2)
     ]
-    told = "calibrating (compiling the solver for this machine first, once: up to a minute)"
-    assert said == [[told, "calibrating"], ["calibrating", "calibrating"]]
+    assert said == [[f"calibrating{COMPILING}", "calibrating"], ["calibrating", "calibrating"]]

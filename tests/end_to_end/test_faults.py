@@ -258,11 +258,11 @@ def test_a_disk_that_fills_up_in_the_middle_loses_no_chunk(tmp_path: Path, monke
     ("damage", "expected"),
     [
         (lambda text: text.replace("0.436", "fast"), "csv, row 3: expected a number in column u, got 'fast'"),
-        (lambda text: text.replace("0.436", ""), "csv, row 3: expected a number in column u, got ''"),
+        (lambda text: text.replace("0.436", ""), "csv, row 3: expected a number in column u, got nothing"),
         (lambda text: text.replace("section,x,y,u", "section,x,y,v"), "velocities.csv, row 1: expected the columns"),
         (lambda text: text + "below,20,2,0.397\n", "row 17: expected experiment, section, x, y to differ"),
         (lambda text: text[:14], "velocities.csv: expected rows below the heading, got none"),
-        (lambda text: "", "velocities.csv, row 1: expected the columns"),
+        (lambda text: "", "velocities.csv: expected the columns section, x, y, u, got an empty file"),
         (lambda text: text.replace("above", "\udcff"), "velocities.csv is not text in UTF-8: save it as UTF-8"),
     ],
 )

@@ -346,7 +346,11 @@ SETS = (
         "a shear layer with large eddies, cells of secondary current (Proust and Nikora 2020)",
         ("coherent_structures",),
         (
-            "mixing_length", "smagorinsky", "secondary_current", "panel_current", "viscosity as a field",
+            "mixing_length",
+            "smagorinsky",
+            "secondary_current",
+            "panel_current",
+            "viscosity as a field",
             "viscosity at a place",
         ),
     ),

@@ -92,7 +92,7 @@ def read_nortek(path: Path, options: FileOptions) -> MeasuredRows:
             try:
                 float(word)
             except ValueError:
-                raise InputError("no_number", file=path, row=row, column=column, got=word) from None
+                raise InputError("no_number", file=path, row=row, column=column, got=word, why="no number") from None
     rows = np.array(lines, dtype=np.float64)
     if layout is None or rows.ndim != 2:
         raise InputError(
