@@ -82,22 +82,22 @@ def test_hypotheses_compete_with_nothing_too() -> None:
 )
 def test_what_is_explained_counts_less_beside_a_misfit_that_nothing_explains(left: float, share: float) -> None:
     evidence, explained = np.array([8.0, 5.0]), np.array([16.0, 10.0])
-    found = under_larger_errors(evidence, explained, left + 32.0, 200)
+    found = under_larger_errors(evidence, left + 32.0 - 2.0 * explained, left + 32.0, 200)
     assert found == pytest.approx(evidence - share * explained)
 
 
 def test_of_one_trace_the_likelier_size_leads_where_errors_are_too_small() -> None:
     """A size of 3.4 standard deviations leads one of 1.6 by 14 in chi2, and not where all errors are too small."""
     prior = -0.5 * np.array([3.4, 1.6]) ** 2
-    for left, leading in ((180.0, 0), (600.0, 1)):
-        explained = -0.5 * np.array([left, left + 14.0])
-        assert np.argmax(under_larger_errors(explained + prior, explained, 0.0, 200)) == leading
+    for least, leading in ((180.0, 0), (600.0, 1)):
+        left = np.array([least, least + 14.0])
+        assert np.argmax(under_larger_errors(prior - 0.5 * left, left, left.max(), 200)) == leading
 
 
 def test_a_place_beside_a_misfit_that_nothing_explains_does_not_lead_nothing() -> None:
     """One drag of A2 in docs/measured.md: E is 3.8 with 16 of likelihood, and 465 of 285 readings are left."""
     at_stated = np.array([3.8])
-    found = under_larger_errors(at_stated, np.array([16.0]), 497.0, 285)
+    found = under_larger_errors(at_stated, np.array([465.0]), 497.0, 285)
     assert odds_against_nothing(found) < 1.0 < constants().missing_odds < odds_against_nothing(at_stated)
 
 

@@ -243,11 +243,8 @@ def within_places(values: Array, start: float) -> tuple[float, Parameter]:
 
 def fitted_extent(search: SearchModel, refit: Refit) -> tuple[dict[str, float], dict[str, float]]:
     """Shapes of something whose place and sizes were fitted, rounded, and the standard errors of what was fitted."""
-    model, names = (
-        replace(search.model, case=with_effect(search.model.case, refit.candidate, refit.shapes)),
-        refit.candidate.free,
-    )
-    ends = {name: interval95(model, refit.fitted, parameter) for name, parameter in names.items()}
+    model = replace(search.model, case=with_effect(search.model.case, refit.candidate, refit.shapes))
+    ends = {name: interval95(model, refit.fitted, parameter) for name, parameter in refit.candidate.free.items()}
     digits = digits_of_place(ends["width"][0])
     shapes = {**refit.shapes} | {name: round(middle, digits) for name, (middle, _, _) in ends.items()}
     return shapes, {name: (high - low) / (2.0 * NORMAL95) for name, (_, low, high) in ends.items()}
@@ -607,15 +604,15 @@ What = Literal["effect", "place", "instrument"]
 KNOWN = ("effect", *get_args(InstrumentKind))
 
 
-def under_larger_errors(evidence: Array, explained: Array, before: float, readings: int) -> Array:
-    """E' = E - (1 - 1/w) L, see the head of this file.
+def under_larger_errors(evidence: Array, left: Array, before: float, readings: int) -> Array:
+    """E' = E - (1 - 1/w) L with L = (before - left) / 2, see the head of this file.
 
     Parameters
     ----------
-    evidence, explained : ndarray (k,)
-        E of each hypothesis, and its part L that is likelihood, half of the chi2 that it explains [-].
+    evidence, left : ndarray (k,)
+        E of each hypothesis, and the chi2 that it leaves [-].
     before : float
-        chi2 without any [-].
+        chi2 without any [-]; what it is changes no difference between hypotheses.
     readings : int
         How many there are, n.
 
@@ -624,25 +621,25 @@ def under_larger_errors(evidence: Array, explained: Array, before: float, readin
     ndarray (k,)
         E itself where errors alone leave as large a chi2 as the best does, by poor_fit_chance.
     """
-    least = before - 2.0 * float(explained.max())
+    least = float(left.min())
     if chance_of_misfit(least, readings) >= constants().poor_fit_chance:
         return evidence
-    return np.asarray(evidence - (1.0 - readings / least) * explained)
+    return np.asarray(evidence - 0.5 * (1.0 - readings / least) * (before - left))
 
 
 def evidence_under_larger_errors(screening: Screening, hypotheses: Sequence[Hypothesis]) -> Array:
     """E' of each hypothesis (k,), see `under_larger_errors`."""
     before = chi2(screening.search.noise, screening.search.point)
 
-    def explained_by(one: Hypothesis) -> float:
+    def left_by(one: Hypothesis) -> float:
         if isinstance(one.what, Refit):
-            return 0.5 * (before - one.what.fitted.chi2)
+            return one.what.fitted.chi2
         kind = kind_named(screening.kinds, one.kind)
-        return 0.5 * float(kind.scores[one.column] ** 2 * prior_shrinkage(kind.size[one.column]))
+        return before - float(kind.scores[one.column] ** 2 * prior_shrinkage(kind.size[one.column]))
 
-    explained = np.array([explained_by(one) for one in hypotheses])
+    left = np.array([left_by(one) for one in hypotheses])
     evidence = np.array([one.log_evidence for one in hypotheses])
-    return under_larger_errors(evidence, explained, before, screening.base.noise.rows.size)
+    return under_larger_errors(evidence, left, before, screening.base.noise.rows.size)
 
 
 def nearly_as_likely(hypotheses: Sequence[Hypothesis]) -> list[int]:

@@ -227,7 +227,8 @@ def _best_branch(
         group = next(one for one in ends[best].found.steps[-1].groups if names[best] in one)
         alike, readings = [j for j, name in enumerate(names) if name in group], screening.base.noise.rows.size
         left = np.array([chi2(one.base.noise, one.base.fitted.point) - 2.0 * further(one) for one in ends])
-        best = alike[int(np.argmax(under_larger_errors(evidence[alike], -0.5 * left[alike], 0.0, readings)))]
+        leading = np.argmax(under_larger_errors(evidence[alike], left[alike], float(left.max()), readings))
+        best = alike[int(leading)]
     taken = ends[best].found
     if ends[best].what == "effect":  # with the chances of all that was followed
         *earlier, step = taken.steps
