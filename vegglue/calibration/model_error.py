@@ -271,7 +271,9 @@ def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: C
         slope = responses(model, point, [_cause(model.case, "station_shift")])[:, 0]
         columns.append(allowed.probes * np.diag(slope)[:, velocities])
     if (beside := beside_walls(model) & velocities).any():
-        columns.append(np.diag(_over_wall_cell(model, point))[:, beside])
+        rate = problem_at(model, next(iter(point.flows)), point.z).walls.rate[0]  # c_w / dy, the same in all flows
+        deviation = np.sqrt(rate * model.site.grid.dy) / KARMAN * np.abs(point.prediction)
+        columns.append(np.diag(deviation)[:, beside])
     if allowed.discharge:
         stated = [name for name in model.case.experiments if name not in of_discharge]
         causes = [_cause(model.case, "discharge_error", name) for name in stated]
@@ -292,13 +294,6 @@ def beside_walls(model: Model) -> Mask:
     (south, north), width, y = model.case.grid.y, model.case.grid.cell[1], model.station["y"].to_numpy(float)
     near = np.minimum(np.abs(y - south), np.abs(north - y)) <= width
     return np.asarray(near & (model.case.friction.walls is not None))
-
-
-def _over_wall_cell(model: Model, point: Point) -> Array:
-    """u*/kappa = (c_w^(1/2) / kappa) |u| (n,) [m/s], see the head of this file."""
-    experiment = next(iter(point.flows))
-    rate = problem_at(model, experiment, point.z).walls.rate
-    return np.asarray(np.sqrt(rate[0] * model.site.grid.dy) / KARMAN * np.abs(point.prediction))
 
 
 def _cause(case: Case, effect: str, *experiments: str) -> Cause:
