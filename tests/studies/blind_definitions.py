@@ -236,11 +236,6 @@ def sensor_in_set(record: Record) -> bool:
     return instrument_found(record) is True or any(EffectIdentity.parse(name).name in SENSORS for name in record["set"])
 
 
-def station_set_aside(record: Record) -> bool:
-    """Some station was set aside."""
-    return record["flagged"] > 0
-
-
 def amplitudes_held(record: Record) -> list[bool]:
     """Whether the interval of each amplitude holds the true one."""
     known = [one for one in record["amplitudes"] if None not in (one["low"], one["high"], one["true"])]

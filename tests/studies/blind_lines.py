@@ -66,10 +66,8 @@ LINES: tuple[Line, ...] = (
     *(Line(f"Nothing hidden, {label}: something named", NULL, what.named, 0.07, True, noise)
       for label, noise in NOISES),
     Line("Nothing hidden: a false name", NULL, what.false_named, 0.07, True),
-    Line("Nothing hidden: a reading excluded", NULL, what.station_set_aside),
     *(Line(f"Listed effect, {label}: in the credible set", groups, what.in_set, 0.9) for label, groups in RATIOS),
     *(line for (label, groups), wanted in zip(RATIOS, (0.4, 0.85), strict=True) for line in (
-        Line(f"Listed effect, {label}: something named", groups, what.named),
         Line(f"Listed effect, {label}: the true effect named", groups, what.in_steps),
         Line(f"Listed effect, {label}: at most three groups", groups, what.few_groups, wanted),
         Line(f"Listed effect, {label}: at most three groups, with the true one", groups, what.few_and_true))),
@@ -79,7 +77,7 @@ LINES: tuple[Line, ...] = (
       for label, groups in (*RATIOS, ("unlisted object", ("unlisted",)), ("instrument off", ("instrument",)),
                             ("two causes", TWO))),
     *(Line(f"Something named, all of it false, {label}", groups, what.only_false)
-      for label, groups in (*RATIOS, ("unlisted object", ("unlisted",)), ("instrument off", ("instrument",)))),
+      for label, groups in (*RATIOS, ("unlisted object", ("unlisted",)))),
     Line("95 % interval of an amplitude contains the true one", (*LISTED, *TWO), what.amplitudes_held, 0.9),
     Line("Unlisted object: none of these", ("unlisted",), what.none_of_these, 0.85),
     Line("Unlisted object: a local anomaly within 1.5 m", ("unlisted",), what.place_near, 0.7),

@@ -155,10 +155,9 @@ def _data_limits(
         parts.append(
             f"If the kind is unknown and all hypotheses compete to first order by the rules of a diagnosis, "
             f"`none-of-these` is reported for {mean('told')} of {len(groups['unlisted'])} objects and a local anomaly "
-            f"within 1.5 m for {mean('near')}; always guessing a position reaches {mean('guessed')} "
-            f"(`tests/studies/object_limits.py`). Reporting an anomaly at even odds would give {mean('evenly')}, but "
-            f"also `none-of-these` for {mean('evenly', 'listed6')} of listed effects of 6 s.e. and "
-            f"{mean('evenly', 'listed3')} of 3 s.e., instead of {mean('told', 'listed6')} and "
+            f"within 1.5 m for {mean('near')} (`tests/studies/object_limits.py`). Reporting an anomaly at even odds "
+            f"would give {mean('evenly')}, but also `none-of-these` for {mean('evenly', 'listed6')} of listed effects "
+            f"of 6 s.e. and {mean('evenly', 'listed3')} of 3 s.e., instead of {mean('told', 'listed6')} and "
             f"{mean('told', 'listed3')}."
         )
     if not parts:
@@ -172,24 +171,21 @@ Causes were hidden in synthetic measurements, and each data set was diagnosed on
 
 ## Protocol
 
-- **Truth.** A second solver computes it (`tests/studies/second_solver.py`): explicit finite volumes with their own
-  grid, waterline and closures, coded from the same formulas without any code of vegglue.
+- **Truth.** A second solver (`tests/studies/second_solver.py`): explicit finite volumes with their own grid, waterline
+  and closures, coded from the same formulas without any code of vegglue, on finer cells.
 - **Two channels.** The small channel: 32 m, two patches, 93 stations (`configs/twin.yaml`), {twin} data sets. The field
-  campaign: 100 m, seven patches, 270 stations (`configs/campaign.yaml`), {campaign} data sets. Cells are 0.25 x 0.125 m
-  in the truth and 0.5 x 0.1875 m in the model.
-- **Errors of measurement** are drawn anew for each data set, with standard errors of 1 cm/s for velocities and 3 mm for
-  levels. They are independent; with nothing hidden also correlated between neighbours by 0.5, or 1.5 times as large as
-  stated.
-- **Imperfect sites** are drawn anew for each data set: floor of the bank law 1.1 to 1.6 (1.3 in the model); the
-  logarithm above plants 0.85 to 1.15 times Baptist's; bed under plants of 45 to 75 m^(1/2)/s (60 in the model); eddy
-  viscosity 0.5 to 2.5 times the stated one; sides of patches up to 0.1 m off; stems 12 %, the bed 1 cm, probes 2 cm and
-  discharges 1 % off. Every cause is hidden on such sites; with nothing hidden half of the sites are exact.
+  campaign: 100 m, seven patches, 270 stations (`configs/campaign.yaml`), {campaign} data sets.
+- **Errors of measurement** are independent, with standard errors of 1 cm/s for velocities and 3 mm for levels; with
+  nothing hidden also correlated between neighbours by 0.5, or 1.5 times as large as stated.
+- **Imperfect sites**: floor of the bank law 1.1 to 1.6 (1.3 in the model); the logarithm above plants 0.85 to 1.15
+  times Baptist's; bed under plants of 45 to 75 m^(1/2)/s (60 in the model); eddy viscosity 0.5 to 2.5 times the stated
+  one; sides of patches up to 0.1 m off; stems 12 %, the bed 1 cm, probes 2 cm and discharges 1 % off. Every cause is
+  hidden on such sites; with nothing hidden half of the sites are exact.
 - **Errors allowed to the model** (`model_error`): friction 5 %, bed 1 cm, edges of patches 5 cm, probes 2 cm,
-  discharges 1 %, stems 12 %. The eddy viscosity is calibrated with a prior of a factor of two. True parameters lie 0.3
-  to 1 standard deviations from the middle of their priors.
+  discharges 1 %, stems 12 %. The eddy viscosity is calibrated with a prior of a factor of two.
 - **Hidden causes**: an effect of the library, an object in no list (a pier, a hole, ...), an instrument that is off,
-  or two of these, with a signal of 3 or 6 standard errors (s.e.). The signal is the norm of the change of the
-  predictions that calibration cannot absorb, in standard errors of data, grid, model and site together.
+  or two of these, with a signal of 3 or 6 standard errors (s.e.): the norm of the change of the predictions that
+  calibration cannot absorb, in standard errors of data, grid, model and site together.
 
 | term | meaning |
 |---|---|
@@ -217,8 +213,8 @@ its 95 % interval (Clopper and Pearson), in at least 20 data sets. All {sets} da
   after parts of these data sets. Only the lines "not inspected" are free of that, and only for objects.
 - **Several states of the code.** Data sets that a later change could affect were diagnosed again, as far as time
   allowed; what `extend --auto` keeps is counted by an earlier rule in all but 170. `make blind` computes the rest.
-- **Dependence.** True parameters lie at eight points of the prior. `own equations` in the figures ({own} data sets)
-  have the model's own equations as truth, an easier test.
+- **Dependence.** True parameters lie at eight points of the prior, 0.3 to 1 standard deviations from its middle. `own
+  equations` in the figures ({own} data sets) have the model's own equations as truth, an easier test.
 - **Few data sets** of a campaign with something hidden, of pairs and of bad readings; none with water that enters
   locally, none with the side of a patch within a cell.
 {kept}
