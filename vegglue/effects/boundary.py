@@ -11,74 +11,22 @@ from vegglue.effects.surroundings import BoundaryValues
 
 
 def discharge_error(boundary: BoundaryValues, relative_error: Array) -> dict[str, Array]:
-    """Q -> Q (1 + e).
-
-    Parameters
-    ----------
-    boundary : BoundaryValues
-    relative_error : (m,) [-]
-        true over reported discharge, less one.
-
-    Returns
-    -------
-    dict
-        `discharge` (inflow, m) [m3/s].
-    """
+    """Q -> Q (1 + e)."""
     return {"discharge": boundary.discharge * (1.0 + relative_error)}
 
 
 def inflow_skew(boundary: BoundaryValues, skew: Array) -> dict[str, Array]:
-    """q -> q (1 + a s), s = -1 .. 1 across each inflow.
-
-    Parameters
-    ----------
-    boundary : BoundaryValues
-    skew : (m,) [-]
-        relative excess a at the end of the inflow.
-
-    Returns
-    -------
-    dict
-        `spread` (inflow, cell, m) [-].
-    """
+    """q -> q (1 + a s), s = -1 .. 1 across each inflow."""
     return {"spread": boundary.spread * (1.0 + skew * boundary.position)}
 
 
 def inflow_core(boundary: BoundaryValues, excess: Array) -> dict[str, Array]:
-    """q -> q (1 + a (1 - 3 s^2) / 2), s = -1 .. 1 across each inflow.
-
-    Parameters
-    ----------
-    boundary : BoundaryValues
-    excess : (m,) [-]
-        twice the relative excess in the middle.
-
-    Returns
-    -------
-    dict
-        `spread` (inflow, cell, m) [-].
-    """
+    """q -> q (1 + a (1 - 3 s^2) / 2), s = -1 .. 1 across each inflow."""
     return {"spread": boundary.spread * (1.0 + excess * (1.0 - 3.0 * boundary.position**2) / 2.0)}
 
 
 def inflow_peak(boundary: BoundaryValues, excess: Array, middle: Array, width: Array) -> dict[str, Array]:
-    """q -> q (1 + a exp(-((s - c) / w)^2)), s = -1 .. 1 across each inflow.
-
-    Parameters
-    ----------
-    boundary : BoundaryValues
-    excess : (m,) [-]
-        relative excess a in the middle of that part.
-    middle : (m,) [-]
-        middle c of that part.
-    width : (m,) [-]
-        its half width w.
-
-    Returns
-    -------
-    dict
-        `spread` (inflow, cell, m) [-].
-    """
+    """q -> q (1 + a exp(-((s - c) / w)^2)), s = -1 .. 1 across each inflow."""
     return {"spread": boundary.spread * (1.0 + excess * np.exp(-(((boundary.position - middle) / width) ** 2)))}
 
 
@@ -89,23 +37,7 @@ MODES = 4
 def inflow_distribution(
     boundary: BoundaryValues, excess: Array, mode: Array, first_other: Array, second_other: Array, third_other: Array
 ) -> dict[str, Array]:
-    """q -> q exp(sum_k a_k cos(k pi (1 + s)/2) / k), k = 1 .. 4, s = -1 .. 1 across each inflow.
-
-    Parameters
-    ----------
-    boundary : BoundaryValues
-    excess : (m,) [-]
-        a_k of the mode k.
-    mode : (m,) [-]
-        that k, 1 to 4.
-    first_other, second_other, third_other : (m,) [-]
-        a_k of the other modes, in their order.
-
-    Returns
-    -------
-    dict
-        `spread` (inflow, cell, m) [-].
-    """
+    """q -> q exp(sum_k a_k cos(k pi (1 + s)/2) / k), k = 1 .. 4, s = -1 .. 1 across each inflow."""
     others, log, mode = (first_other, second_other, third_other), np.zeros((1, 1, 1)), np.rint(mode)
     for k in range(1, MODES + 1):
         of_others = np.where(mode > k, others[min(k, MODES - 1) - 1], others[max(k - 2, 0)])
@@ -115,36 +47,12 @@ def inflow_distribution(
 
 
 def lateral_inflow(boundary: BoundaryValues, share: Array) -> dict[str, Array]:
-    """q_lateral -> q_lateral + r Q, Q the sum of all inflows [m3/s].
-
-    Parameters
-    ----------
-    boundary : BoundaryValues
-    share : (m,) [-]
-        discharge that enters along the reach over that at the inflow.
-
-    Returns
-    -------
-    dict
-        `lateral` (m,) [m3/s].
-    """
+    """q_lateral -> q_lateral + r Q, Q the sum of all inflows [m3/s]."""
     return {"lateral": boundary.lateral + share * boundary.discharge.sum(axis=0)}
 
 
 def outlet_level(boundary: BoundaryValues, rise: Array) -> dict[str, Array]:
-    """z_out -> z_out + d.
-
-    Parameters
-    ----------
-    boundary : BoundaryValues
-    rise : (m,) [m]
-        true level less the one reported.
-
-    Returns
-    -------
-    dict
-        `level` (m,) [m].
-    """
+    """z_out -> z_out + d."""
     return {"level": boundary.level + rise}
 
 

@@ -3,17 +3,18 @@
 Each effect acts at one stage. Its function takes what is visible there (`surroundings`) and its parameters, (m,) each,
 and returns what it changes, by name:
 
-    site        act(geometry, ...)  -> {"bed"} [m], {"inflow"} [m/s]                      added
-    boundary    act(boundary, ...)  -> {"discharge", "level", "spread", "lateral"}        takes their place
-    plants      act(plants, ...)    -> {"phi", "canopy_height"}                           takes their place
-    resistance  act(cells, ...)     -> {"rate"}                                           takes its place [1/m]
-    exchange    act(cells, ...)     -> {"viscosity"} [m2/s], {"xx", "xy", "yy"} [m3/s2]   added
-    force       act(cells, ...)     -> {"x", "y"}                                         added [m/s2]
-    sensor      act(reading, ...)   -> {"value"}                                          takes its place
+    site        act(geometry, ...)  -> {"bed", "inflow"}                            added
+    boundary    act(boundary, ...)  -> {"discharge", "level", "spread", "lateral"}  takes their place
+    plants      act(plants, ...)    -> {"phi", "canopy_height"}                     takes their place
+    resistance  act(cells, ...)     -> {"rate"}                                     takes its place
+    exchange    act(cells, ...)     -> {"viscosity", "xx", "xy", "yy"}              added
+    force       act(cells, ...)     -> {"x", "y"}                                   added
+    sensor      act(reading, ...)   -> {"value"}                                    takes its place
 
 {"xx", "xy", "yy"} are momentum fluxes h T, so that the force on the water is -(1/h) div(h T).
 """
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -34,14 +35,21 @@ Need = Literal[
     "open air", "open ground", "banks", "plants", "gauges", "few heights", "one surface", "distributed inflow"
 ]
 STAGES: tuple[Stage, ...] = ("site", "boundary", "plants", "resistance", "exchange", "force", "sensor")
-# What each stage hands on, and whether an effect adds to it or takes its place.
-ADDED = {"site": ("bed", "inflow"), "exchange": ("viscosity", "xx", "xy", "yy"), "force": ("x", "y")}
-REPLACED = {
-    "boundary": ("discharge", "level", "spread", "lateral"),
-    "plants": ("phi", "canopy_height"),
-    "resistance": ("rate",),
-    "sensor": ("value",),
+# What each stage returns, and whether an effect adds to it or takes its place.
+ADDED = {
+    "site": {"bed": "(nx, ny, m) [m]", "inflow": "(nx, ny, m) [m/s]"},
+    "exchange": {"viscosity": "(nx, ny, m) [m2/s]", **dict.fromkeys(("xx", "xy", "yy"), "(nx, ny, m) [m3/s2]")},
+    "force": {"x": "(nx, ny, m) [m/s2]", "y": "(nx, ny, m) [m/s2]"},
 }
+REPLACED = {
+    "boundary": {
+        "discharge": "(inflow, m) [m3/s]", "level": "(m,) [m]", "spread": "(inflow, cell, m) [-]",
+        "lateral": "(m,) [m3/s]",
+    },
+    "plants": {"phi": "(cell, m) [-]", "canopy_height": "(cell, m) [m]"},
+    "resistance": {"rate": "(nx, ny, m) [1/m]"},
+    "sensor": {"value": "(station, m) [unit of the reading]"},
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -230,3 +238,17 @@ class Effect:
     def parameters(self) -> tuple[Amplitude | Shape, ...]:
         """The amplitude first, then the shapes; `act` takes them by name."""
         return (self.amplitude, *self.shapes)
+
+    @property
+    def docstring(self) -> str:
+        """That of `act`, with the parameters and what the stage returns, for `help`."""
+        surroundings = next(iter(inspect.signature(self.act).parameters.values()))
+        returned = (ADDED | REPLACED)[self.stage].items()
+        return "\n".join(
+            (
+                inspect.cleandoc(self.act.__doc__ or ""), "",
+                "Parameters", "----------", f"{surroundings.name} : {surroundings.annotation.__name__}",
+                *(f"{one.name} : (m,) [{one.unit}]\n    {one.meaning}" for one in self.parameters), "",
+                "Returns", "-------", "dict", "    " + " or ".join(f"`{name}` {kind}" for name, kind in returned),
+            )
+        )  # fmt: skip

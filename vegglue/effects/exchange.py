@@ -25,36 +25,12 @@ LARGEST_ROUGHNESS = 0.5
 
 
 def viscosity(cells: Cells, added: Array) -> dict[str, Array]:
-    """nu -> nu + nu_1.
-
-    Parameters
-    ----------
-    cells : Cells
-    added : (m,) [m2/s]
-        viscosity nu_1 added.
-
-    Returns
-    -------
-    dict
-        `viscosity` (nx, ny, m) [m2/s].
-    """
+    """nu -> nu + nu_1."""
     return {"viscosity": np.broadcast_to(added, cells.depth.shape)}
 
 
 def elder(cells: Cells, coefficient: Array) -> dict[str, Array]:
-    """nu -> nu + lambda h u*.
-
-    Parameters
-    ----------
-    cells : Cells
-    coefficient : (m,) [-]
-        lambda, some 0.07 to 0.5.
-
-    Returns
-    -------
-    dict
-        `viscosity` (nx, ny, m) [m2/s].
-    """
+    """nu -> nu + lambda h u*."""
     return {"viscosity": coefficient * cells.depth * cells.shear_velocity}
 
 
@@ -62,17 +38,6 @@ def smagorinsky(cells: Cells, coefficient: Array) -> dict[str, Array]:
     """nu -> nu + (C_s Delta)^2 (2 u_x^2 + 2 v_y^2 + (u_y + v_x)^2)^(1/2), Delta the width of the filter [m].
 
     Delta is that of the case's own cells, on the coarser and finer grids of a diagnosis, too.
-
-    Parameters
-    ----------
-    cells : Cells
-    coefficient : (m,) [-]
-        coefficient C_s, some 0.1 to 0.2.
-
-    Returns
-    -------
-    dict
-        `viscosity` (nx, ny, m) [m2/s].
     """
     strain = 2.0 * cells.u_x**2 + 2.0 * cells.v_y**2 + (cells.u_y + cells.v_x) ** 2
     seen = cells.geometry
@@ -80,19 +45,7 @@ def smagorinsky(cells: Cells, coefficient: Array) -> dict[str, Array]:
 
 
 def mixing_length(cells: Cells, length: Array) -> dict[str, Array]:
-    """nu -> nu + l^2 |du/dy|.
-
-    Parameters
-    ----------
-    cells : Cells
-    length : (m,) [m]
-        mixing length l.
-
-    Returns
-    -------
-    dict
-        `viscosity` (nx, ny, m) [m2/s].
-    """
+    """nu -> nu + l^2 |du/dy|."""
     return {"viscosity": length**2 * np.abs(cells.u_y)}
 
 
@@ -100,42 +53,13 @@ def edge_mixing(cells: Cells, coefficient: Array, width: Array) -> dict[str, Arr
     """nu -> nu + c d^2 |du/dy| exp(-(e / d)^2), e the distance from the side of a patch [m].
 
     d |du/dy| is the difference of speed across the layer of width d.
-
-    Parameters
-    ----------
-    cells : Cells
-    coefficient : (m,) [-]
-        c, viscosity over speed difference times width.
-    width : (m,) [m]
-        width d of the layer.
-
-    Returns
-    -------
-    dict
-        `viscosity` (nx, ny, m) [m2/s].
     """
     band = np.exp(-((cells.geometry.edge / width) ** 2))
     return {"viscosity": coefficient * width**2 * band * np.abs(cells.u_y)}
 
 
 def coherent_structures(cells: Cells, coefficient: Array, width: Array, mean_depth: Array) -> dict[str, Array]:
-    """nu -> nu + b^2 d^2 (h_m / h) |du/dy|, h at least h_m / 5, h_m the depth between the deep and the shallow part.
-
-    Parameters
-    ----------
-    cells : Cells
-    coefficient : (m,) [-]
-        b, some 0.07.
-    width : (m,) [m]
-        width d of the layer.
-    mean_depth : (m,) [m]
-        depth h_m between both.
-
-    Returns
-    -------
-    dict
-        `viscosity` (nx, ny, m) [m2/s].
-    """
+    """nu -> nu + b^2 d^2 (h_m / h) |du/dy|, h at least h_m / 5, h_m the depth between the deep and the shallow part."""
     shallow = mean_depth / np.maximum(cells.depth, LEAST_RELATIVE_DEPTH * mean_depth)
     return {"viscosity": coefficient**2 * width**2 * shallow * np.abs(cells.u_y)}
 
@@ -143,18 +67,8 @@ def coherent_structures(cells: Cells, coefficient: Array, width: Array, mean_dep
 def growing_shear_layer(cells: Cells, spreading: Array) -> dict[str, Array]:
     """nu -> nu + (b d)^2 |du/dy|, d = s (1 - exp(-2 k x)) / (2 k), x the distance from the inflow, k that of the bed.
 
-    A layer of width 0 at the inflow grows by s dx, until friction of the bed has used up the difference of speeds.
-
-    Parameters
-    ----------
-    cells : Cells
-    spreading : (m,) [-]
-        growth s of its width, some 0.085 times the difference of both speeds over their mean.
-
-    Returns
-    -------
-    dict
-        `viscosity` (nx, ny, m) [m2/s].
+    A layer of width 0 at the inflow grows by s dx, until friction of the bed has used up the difference of speeds; s is
+    some 0.085 times that difference over the mean of both speeds.
     """
     along = cells.geometry.x - cells.geometry.x[0] + 0.5 * cells.geometry.dx
     rate = np.maximum(2.0 * cells.bed_rate, LEAST_RATE)
@@ -163,56 +77,18 @@ def growing_shear_layer(cells: Cells, spreading: Array) -> dict[str, Array]:
 
 
 def wake_mixing(cells: Cells, coefficient: Array, length: Array) -> dict[str, Array]:
-    """nu -> nu + c |U| exp(-s / L) behind a patch, s the distance from its end [m].
-
-    Parameters
-    ----------
-    cells : Cells
-    coefficient : (m,) [m]
-        c, viscosity over speed at the end of the patch.
-    length : (m,) [m]
-        length L over which they fade.
-
-    Returns
-    -------
-    dict
-        `viscosity` (nx, ny, m) [m2/s].
-    """
+    """nu -> nu + c |U| exp(-s / L) behind a patch, s the distance from its end [m]."""
     return {"viscosity": coefficient * np.exp(-cells.geometry.wake / length) * cells.speed}
 
 
 def secondary_current(cells: Cells, strength: Array) -> dict[str, Array]:
-    """h T_xy = K h u^2, K = k sin(pi eta) exp(-(eta/1.5)^4), eta the distance from the axis over the half width.
-
-    Parameters
-    ----------
-    cells : Cells
-    strength : (m,) [-]
-        strength k of the cells.
-
-    Returns
-    -------
-    dict
-        `xy` (nx, ny, m) [m3/s2].
-    """
+    """h T_xy = K h u^2, K = k sin(pi eta) exp(-(eta/1.5)^4), eta the distance from the axis over the half width."""
     eta = cells.geometry.offset
     return {"xy": strength * (np.sin(np.pi * eta) * np.exp(-((eta / CURRENTS_END) ** 4))) * cells.depth * cells.u**2}
 
 
 def dispersion(cells: Cells, excess: Array) -> dict[str, Array]:
-    """h T = (beta - 1) h (u^2, u v, v^2).
-
-    Parameters
-    ----------
-    cells : Cells
-    excess : (m,) [-]
-        beta - 1, momentum coefficient less one.
-
-    Returns
-    -------
-    dict
-        `xx`, `xy`, `yy` (nx, ny, m) [m3/s2].
-    """
+    """h T = (beta - 1) h (u^2, u v, v^2)."""
     carried = excess * cells.depth
     return {"xx": carried * cells.u**2, "xy": carried * cells.u * cells.v, "yy": carried * cells.v**2}
 
@@ -233,17 +109,6 @@ def helical_flow(cells: Cells, share: Array) -> dict[str, Array]:
     """h T_sn = -s b h (h / R) |U|^2, b = 5 a - 15.6 a^2 + 37.5 a^3, a = (k_bed h)^(1/2) / kappa at most 1/2.
 
     It carries fast water to the outside of the bend; s is along the flow, n across it.
-
-    Parameters
-    ----------
-    cells : Cells
-    share : (m,) [-]
-        strength s, 1 for a spiral in balance.
-
-    Returns
-    -------
-    dict
-        `xx`, `xy`, `yy` (nx, ny, m) [m3/s2].
     """
     a = np.minimum(np.sqrt(cells.bed_rate * cells.depth) / KARMAN, LARGEST_ROUGHNESS)
     carried = share * (5.0 * a - 15.6 * a**2 + 37.5 * a**3) * cells.depth * curvature(cells)

@@ -15,60 +15,20 @@ LEAST_WINDY_DEPTH = 0.05  # over that of the site [-]; a stress on less water wo
 
 
 def wind(cells: Cells, speed: Array) -> dict[str, Array]:
-    """f_x = C_w (rho_air / rho) |W| W / h, C_w = 1.3e-3, h at least 0.05 of that of the site.
-
-    Parameters
-    ----------
-    cells : Cells
-    speed : (m,) [m/s]
-        wind speed W downstream.
-
-    Returns
-    -------
-    dict
-        `x` (nx, ny, m) [m/s2].
-    """
+    """f_x = C_w (rho_air / rho) |W| W / h, C_w = 1.3e-3, h at least 0.05 of that of the site."""
     stress = WIND_DRAG * AIR_OVER_WATER * np.abs(speed) * speed
     return {"x": stress / np.maximum(cells.depth, LEAST_WINDY_DEPTH * cells.geometry.depth_scale)}
 
 
 def panel_current(cells: Cells, strength: Array, slope: Array, bank_ratio: Array) -> dict[str, Array]:
-    """f = -k g S u / |U| on the floor, r times that on the banks; nothing at rest.
-
-    Parameters
-    ----------
-    cells : Cells
-    strength : (m,) [-]
-        strength k = Gamma / (rho g h S) on the floor.
-    slope : (m,) [-]
-        slope S that drives the flow.
-    bank_ratio : (m,) [-]
-        strength r on the banks over that on the floor.
-
-    Returns
-    -------
-    dict
-        `x`, `y` (nx, ny, m) [m/s2].
-    """
+    """f = -k g S u / |U| on the floor, r times that on the banks; nothing at rest."""
     bank = cells.geometry.bank
     held = -strength * GRAVITY * slope * (1.0 - bank + bank_ratio * bank) / cells.speed
     return {"x": held * cells.u, "y": held * cells.v}
 
 
 def turning_earth(cells: Cells, parameter: Array) -> dict[str, Array]:
-    """f_x = c v, f_y = -c u.
-
-    Parameters
-    ----------
-    cells : Cells
-    parameter : (m,) [1/s]
-        Coriolis parameter c.
-
-    Returns
-    -------
-    dict
-        `x`, `y` (nx, ny, m) [m/s2].
-    """
+    """f_x = c v, f_y = -c u."""
     return {"x": parameter * cells.v, "y": -parameter * cells.u}
 
 

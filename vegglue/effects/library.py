@@ -23,6 +23,8 @@ SHIPPED: tuple[Effect, ...] = (
     *sensor.EFFECTS,
     *unlisted.EFFECTS,
 )
+for _act, _effect in {effect.act: effect for effect in SHIPPED}.items():
+    _act.__doc__ = _effect.docstring
 
 
 @lru_cache

@@ -20,56 +20,18 @@ LEAST_REYNOLDS = 20.0
 
 
 def streamlining(plants: PlantCells, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
-    """phi -> phi (|U| / U_0)^chi, |U| at least 0.04 of that of the site.
-
-    Parameters
-    ----------
-    plants : PlantCells
-    vogel_exponent : (m,) [-]
-        Vogel exponent chi, 0 for rigid plants.
-    reference_speed : (m,) [m/s]
-        speed U_0 at which phi holds.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-].
-    """
+    """phi -> phi (|U| / U_0)^chi, |U| at least 0.04 of that of the site."""
     speed = np.maximum(plants.speed, LEAST_YIELDING_SPEED * plants.speed_scale)
     return {"phi": plants.phi * (speed / reference_speed) ** vogel_exponent}
 
 
 def canopy_height_error(plants: PlantCells, relative_error: Array) -> dict[str, Array]:
-    """h_d -> h_d (1 + e), phi in proportion.
-
-    Parameters
-    ----------
-    plants : PlantCells
-    relative_error : (m,) [-]
-        true over assumed height, less one.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-]; `canopy_height` (cell, m) [m].
-    """
+    """h_d -> h_d (1 + e), phi in proportion."""
     return {"phi": plants.phi * (1.0 + relative_error), "canopy_height": plants.canopy_height * (1.0 + relative_error)}
 
 
 def canopy_deflection(plants: PlantCells, rate: Array) -> dict[str, Array]:
-    """h_d -> h_d exp(-k |U|).
-
-    Parameters
-    ----------
-    plants : PlantCells
-    rate : (m,) [s/m]
-        share k of the height lost for each m/s.
-
-    Returns
-    -------
-    dict
-        `canopy_height` (cell, m) [m].
-    """
+    """h_d -> h_d exp(-k |U|)."""
     return {"canopy_height": plants.canopy_height * np.exp(-rate * plants.speed)}
 
 
@@ -90,25 +52,7 @@ def bent_blade(cauchy: Array, buoyancy: Array) -> tuple[Array, Array]:
 def canopy_bending(
     plants: PlantCells, share: Array, cauchy: Array, buoyancy: Array, reference_speed: Array
 ) -> dict[str, Array]:
-    """phi -> phi (1 - s (1 - l_e/l)), h_d -> h_d (1 - s (1 - h/l)) with Ca = Ca_0 (|U| / U_0)^2.
-
-    Parameters
-    ----------
-    plants : PlantCells
-    share : (m,) [-]
-        share s of the plants that bend.
-    cauchy : (m,) [-]
-        Cauchy number Ca_0 at U_0.
-    buoyancy : (m,) [-]
-        buoyancy number B.
-    reference_speed : (m,) [m/s]
-        speed U_0 at which phi holds.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-]; `canopy_height` (cell, m) [m].
-    """
+    """phi -> phi (1 - s (1 - l_e/l)), h_d -> h_d (1 - s (1 - h/l)) with Ca = Ca_0 (|U| / U_0)^2."""
     length, height = bent_blade(cauchy * (plants.speed / reference_speed) ** 2, buoyancy)
     return {
         "phi": plants.phi * (1.0 - share * (1.0 - length)),
@@ -117,156 +61,44 @@ def canopy_bending(
 
 
 def undergrowth(plants: PlantCells, drag: Array, height: Array) -> dict[str, Array]:
-    """phi -> phi + phi_u min(h / h_u, 1).
-
-    Parameters
-    ----------
-    plants : PlantCells
-    drag : (m,) [-]
-        drag phi_u of the lower layer.
-    height : (m,) [m]
-        height h_u of the lower layer.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-].
-    """
+    """phi -> phi + phi_u min(h / h_u, 1)."""
     return {"phi": plants.phi + drag * np.minimum(plants.depth / height, 1.0)}
 
 
 def foliage(plants: PlantCells, drag: Array, vogel_exponent: Array, reference_speed: Array) -> dict[str, Array]:
-    """phi -> phi + phi_F (|U| / U_0)^chi_F min(h / h_d, 1), |U| at least 0.04 of that of the site.
-
-    Parameters
-    ----------
-    plants : PlantCells
-    drag : (m,) [-]
-        drag phi_F of the leaves at U_0.
-    vogel_exponent : (m,) [-]
-        Vogel exponent chi_F of leaves.
-    reference_speed : (m,) [m/s]
-        speed U_0 at which phi holds.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-].
-    """
+    """phi -> phi + phi_F (|U| / U_0)^chi_F min(h / h_d, 1), |U| at least 0.04 of that of the site."""
     bent = (np.maximum(plants.speed, LEAST_YIELDING_SPEED * plants.speed_scale) / reference_speed) ** vogel_exponent
     return {"phi": plants.phi + drag * bent * np.minimum(plants.depth / plants.canopy_height, 1.0)}
 
 
 def emergent_part(plants: PlantCells, share: Array) -> dict[str, Array]:
-    """phi -> phi (1 - s (1 - min(h / h_d, 1))).
-
-    Parameters
-    ----------
-    plants : PlantCells
-    share : (m,) [-]
-        share s of the plants to which this applies.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-].
-    """
+    """phi -> phi (1 - s (1 - min(h / h_d, 1)))."""
     return {"phi": plants.phi * (1.0 - share * (1.0 - np.minimum(plants.depth / plants.canopy_height, 1.0)))}
 
 
 def slow_stems(plants: PlantCells, share: Array, diameter: Array) -> dict[str, Array]:
-    """phi -> phi (1 + s (C_D - 1)), C_D = 1 + 10 Re^(-2/3), Re = |U| D / nu at least 20.
-
-    Parameters
-    ----------
-    plants : PlantCells
-    share : (m,) [-]
-        share s of the excess of C_D over 1.
-    diameter : (m,) [m]
-        diameter D of the stems.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-].
-    """
+    """phi -> phi (1 + s (C_D - 1)), C_D = 1 + 10 Re^(-2/3), Re = |U| D / nu at least 20."""
     reynolds = np.maximum(plants.speed * diameter / WATER_VISCOSITY, LEAST_REYNOLDS)
     return {"phi": plants.phi * (1.0 + share * 10.0 * reynolds ** (-2 / 3))}
 
 
 def debris_screen(plants: PlantCells, excess: Array, length: Array) -> dict[str, Array]:
-    """phi -> phi (1 + a exp(-f / L)), f the distance from the front of the patch.
-
-    Parameters
-    ----------
-    plants : PlantCells
-    excess : (m,) [-]
-        relative excess a of drag at the front.
-    length : (m,) [m]
-        depth L of the screen.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-].
-    """
+    """phi -> phi (1 + a exp(-f / L)), f the distance from the front of the patch."""
     return {"phi": plants.phi * (1.0 + excess * np.exp(-plants.front / length))}
 
 
 def density_trend(plants: PlantCells, trend: Array, length: Array) -> dict[str, Array]:
-    """phi -> phi (1 + a tanh(f / L - 1)), f the distance from the front of the patch.
-
-    Parameters
-    ----------
-    plants : PlantCells
-    trend : (m,) [-]
-        relative excess a towards the end.
-    length : (m,) [m]
-        distance L from the front where phi holds.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-].
-    """
+    """phi -> phi (1 + a tanh(f / L - 1)), f the distance from the front of the patch."""
     return {"phi": plants.phi * (1.0 + trend * np.tanh(plants.front / length - 1.0))}
 
 
 def edge_thinning(plants: PlantCells, share: Array, width: Array) -> dict[str, Array]:
-    """phi -> phi (1 - a exp(-e / w)), e the distance inward from the sides of the patch.
-
-    Parameters
-    ----------
-    plants : PlantCells
-    share : (m,) [-]
-        share a missing at the very side, negative for more there.
-    width : (m,) [m]
-        width w of the thinner rim.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-].
-    """
+    """phi -> phi (1 - a exp(-e / w)), e the distance inward from the sides of the patch."""
     return {"phi": plants.phi * (1.0 - share * np.exp(np.minimum(plants.edge, 0.0) / width))}
 
 
 def patch_density(plants: PlantCells, excess: Array, patch: Array) -> dict[str, Array]:
-    """phi -> phi (1 + a) in one patch, the first of which is number 1.
-
-    Parameters
-    ----------
-    plants : PlantCells
-    excess : (m,) [-]
-        relative excess a of stems over those counted.
-    patch : (m,) [-]
-        number of the patch in the order of the config, from 1.
-
-    Returns
-    -------
-    dict
-        `phi` (cell, m) [-].
-    """
+    """phi -> phi (1 + a) in one patch, the first of which is number 1."""
     return {"phi": plants.phi * (1.0 + excess * (plants.patch == patch - 1.0))}
 
 

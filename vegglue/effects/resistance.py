@@ -15,223 +15,67 @@ LEAST_DEPTH_OF_POWER = 0.02
 
 
 def depth_dependent_bank(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
-    """k -> k (h / h_0)^e on the banks, h at least 0.02 of that of the site.
-
-    Parameters
-    ----------
-    cells : Cells
-    exponent : (m,) [-]
-        exponent e.
-    reference_depth : (m,) [m]
-        depth h_0 at which nothing changes.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k (h / h_0)^e on the banks, h at least 0.02 of that of the site."""
     depth = cells.depth.clip(LEAST_DEPTH_OF_POWER * cells.geometry.depth_scale)
     return {"rate": cells.rate * (depth / reference_depth) ** (exponent * cells.geometry.bank)}
 
 
 def depth_dependent_bed(cells: Cells, exponent: Array, reference_depth: Array) -> dict[str, Array]:
-    """k -> k (h / h_0)^e on the floor where no plants stand, h at least 0.02 of that of the site.
-
-    Parameters
-    ----------
-    cells : Cells
-    exponent : (m,) [-]
-        exponent e.
-    reference_depth : (m,) [m]
-        depth h_0 at which nothing changes.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k (h / h_0)^e on the floor where no plants stand, h at least 0.02 of that of the site."""
     depth = cells.depth.clip(LEAST_DEPTH_OF_POWER * cells.geometry.depth_scale)
     return {"rate": cells.rate * (depth / reference_depth) ** (exponent * cells.geometry.open_floor)}
 
 
 def bank_trend(cells: Cells, trend: Array) -> dict[str, Array]:
-    """k -> k exp(a (x - x_m) / L) on the banks, x_m the middle of the grid and L its length.
-
-    Parameters
-    ----------
-    cells : Cells
-    trend : (m,) [-]
-        logarithm a of k at the end over k at the beginning.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k exp(a (x - x_m) / L) on the banks, x_m the middle of the grid and L its length."""
     return {"rate": cells.rate * np.exp(trend * cells.geometry.bank * cells.geometry.share_along)}
 
 
 def bank_drag_trend(cells: Cells, drag: Array, direction: Array) -> dict[str, Array]:
-    """k -> k + c (1/2 + d (x - x_m) / L) on the banks.
-
-    Parameters
-    ----------
-    cells : Cells
-    drag : (m,) [1/m]
-        drag c that is added where there is most.
-    direction : (m,) [-]
-        d, 1 where it grows downstream, -1 upstream.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k + c (1/2 + d (x - x_m) / L) on the banks."""
     return {"rate": cells.rate + drag * (0.5 + direction * cells.geometry.share_along) * cells.geometry.bank}
 
 
 def bed_trend(cells: Cells, trend: Array) -> dict[str, Array]:
-    """k -> k exp(a (x - x_m) / L) on the floor where no plants stand.
-
-    Parameters
-    ----------
-    cells : Cells
-    trend : (m,) [-]
-        logarithm a of k at the end over k at the beginning.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k exp(a (x - x_m) / L) on the floor where no plants stand."""
     return {"rate": cells.rate * np.exp(trend * cells.geometry.open_floor * cells.geometry.share_along)}
 
 
 def bank_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
-    """k -> k exp(+-a / 2) on the banks, + on that of larger y.
-
-    Parameters
-    ----------
-    cells : Cells
-    log_ratio : (m,) [-]
-        logarithm a of the ratio of both.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k exp(+-a / 2) on the banks, + on that of larger y."""
     return {"rate": cells.rate * np.exp(0.5 * log_ratio * cells.geometry.bank * np.sign(cells.geometry.offset))}
 
 
 def bank_roughness(cells: Cells, log_ratio: Array) -> dict[str, Array]:
-    """k -> k exp(a) beyond the toe of the banks: another surface than the floor's.
-
-    Parameters
-    ----------
-    cells : Cells
-    log_ratio : (m,) [-]
-        logarithm a of friction there over that of the law.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k exp(a) beyond the toe of the banks: another surface than the floor's."""
     return {"rate": cells.rate * np.exp(log_ratio * cells.geometry.bank)}
 
 
 def floor_difference(cells: Cells, log_ratio: Array) -> dict[str, Array]:
-    """k -> k exp(+-a / 2) on the floor where no plants stand, + on the side of larger y.
-
-    Parameters
-    ----------
-    cells : Cells
-    log_ratio : (m,) [-]
-        logarithm a of the ratio of both.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k exp(+-a / 2) on the floor where no plants stand, + on the side of larger y."""
     return {"rate": cells.rate * np.exp(0.5 * log_ratio * cells.geometry.open_floor * np.sign(cells.geometry.offset))}
 
 
 def bed_stretch(cells: Cells, log_ratio: Array, middle: Array, share: Array) -> dict[str, Array]:
-    """k -> k exp(a g) on the floor where no plants stand, g = exp(-((x / L - c) / (s / 2))^4), x / L -1/2 .. 1/2.
-
-    Parameters
-    ----------
-    cells : Cells
-    log_ratio : (m,) [-]
-        logarithm a of friction there over that of the rest.
-    middle : (m,) [-]
-        its middle c over the length of the channel.
-    share : (m,) [-]
-        its share s of the length of the channel.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k exp(a g) on the floor where no plants stand, g = exp(-((x / L - c) / (s / 2))^4), x / L -1/2 .. 1/2."""
     within = np.exp(-(((cells.geometry.share_along - middle) / (0.5 * share)) ** 4))
     return {"rate": cells.rate * np.exp(log_ratio * cells.geometry.open_floor * within)}
 
 
 def steep_bank(cells: Cells, share: Array) -> dict[str, Array]:
-    """k -> k (1 + a ((1 + s^2)^(1/2) - 1)), s = |dz_b/dy|.
-
-    Parameters
-    ----------
-    cells : Cells
-    share : (m,) [-]
-        share a of the longer perimeter that counts, 1 for all of it.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k (1 + a ((1 + s^2)^(1/2) - 1)), s = |dz_b/dy|."""
     longer = np.sqrt(1.0 + cells.geometry.side_slope**2) - 1.0
     return {"rate": cells.rate * (1.0 + share * longer)}
 
 
 def bank_vegetation(cells: Cells, drag: Array, height: Array) -> dict[str, Array]:
-    """k -> k + phi_b min(h / h_b, 1) / (2 h) on the banks.
-
-    Parameters
-    ----------
-    cells : Cells
-    drag : (m,) [-]
-        drag phi_b of the plants.
-    height : (m,) [m]
-        height h_b of the plants.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k + phi_b min(h / h_b, 1) / (2 h) on the banks."""
     standing = np.minimum(1.0 / height, 1.0 / cells.depth)
     return {"rate": cells.rate + 0.5 * drag * standing * cells.geometry.bank}
 
 
 def stem_blockage(cells: Cells, share: Array) -> dict[str, Array]:
-    """k -> k / (1 - s)^2 among plants: what lies between stems runs at u / (1 - s).
-
-    Parameters
-    ----------
-    cells : Cells
-    share : (m,) [-]
-        share s of the volume that stems take up.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k / (1 - s)^2 among plants: what lies between stems runs at u / (1 - s)."""
     return {"rate": cells.rate * (1.0 - share * cells.geometry.planted) ** -2.0}
 
 

@@ -12,53 +12,17 @@ from vegglue.effects.surroundings import Reading
 
 
 def probe_gain(reading: Reading, gain: Array) -> dict[str, Array]:
-    """u -> u (1 + b), u what a probe measures: along x, across, or speed.
-
-    Parameters
-    ----------
-    reading : Reading
-    gain : (m,) [-]
-        relative error b of the probes.
-
-    Returns
-    -------
-    dict
-        `value` (station, m) [unit of the reading].
-    """
+    """u -> u (1 + b), u what a probe measures: along x, across, or speed."""
     return {"value": reading.value * (1.0 + gain * reading.velocity)}
 
 
 def zero_offset(reading: Reading, offset: Array) -> dict[str, Array]:
-    """u -> u + c, u what a probe measures [m/s].
-
-    Parameters
-    ----------
-    reading : Reading
-    offset : (m,) [m/s]
-        what the probes read in still water.
-
-    Returns
-    -------
-    dict
-        `value` (station, m) [unit of the reading].
-    """
+    """u -> u + c, u what a probe measures [m/s]."""
     return {"value": reading.value + offset * reading.velocity}
 
 
 def station_shift(reading: Reading, shift: Array) -> dict[str, Array]:
-    """u -> u + d du/dy, u what a probe measures [m/s]: to first order, what stands d further towards larger y.
-
-    Parameters
-    ----------
-    reading : Reading
-    shift : (m,) [m]
-        true less reported place.
-
-    Returns
-    -------
-    dict
-        `value` (station, m) [unit of the reading].
-    """
+    """u -> u + d du/dy, u what a probe measures [m/s]: to first order, what stands d further towards larger y."""
     return {"value": reading.value + shift * reading.component_y * reading.velocity}
 
 
@@ -67,17 +31,6 @@ def partial_depth(reading: Reading, excess: Array) -> dict[str, Array]:
 
     Under a log law a = -b ln b / (1 - b) when the lowest share b of the depth is left out (0.16 for 0.05), and
     a = ln(1 - t) when the highest share t is (-0.16 for 0.15).
-
-    Parameters
-    ----------
-    reading : Reading
-    excess : (m,) [-]
-        mean of the part sampled less that of the depth, in u*/kappa.
-
-    Returns
-    -------
-    dict
-        `value` (station, m) [unit of the reading].
     """
     open_water = reading.velocity * (1.0 - reading.canopy_share)
     shear = np.sqrt(np.maximum(reading.rate, 0.0) * reading.depth) / KARMAN
@@ -85,53 +38,17 @@ def partial_depth(reading: Reading, excess: Array) -> dict[str, Array]:
 
 
 def among_plants(reading: Reading, gain: Array) -> dict[str, Array]:
-    """u -> u (1 + a min(h_d / h, 1)) where plants stand.
-
-    Parameters
-    ----------
-    reading : Reading
-    gain : (m,) [-]
-        relative error a of a probe deep in the plants.
-
-    Returns
-    -------
-    dict
-        `value` (station, m) [unit of the reading].
-    """
+    """u -> u (1 + a min(h_d / h, 1)) where plants stand."""
     return {"value": reading.value * (1.0 + gain * reading.canopy_share * reading.velocity)}
 
 
 def gauge_datum(reading: Reading, shift: Array) -> dict[str, Array]:
-    """z_s -> z_s + d, z_s the level that a gauge shows [m].
-
-    Parameters
-    ----------
-    reading : Reading
-    shift : (m,) [m]
-        how much too high the gauges read.
-
-    Returns
-    -------
-    dict
-        `value` (station, m) [unit of the reading].
-    """
+    """z_s -> z_s + d, z_s the level that a gauge shows [m]."""
     return {"value": reading.value + shift * reading.level}
 
 
 def gauge_head(reading: Reading, share: Array) -> dict[str, Array]:
-    """z_s -> z_s + a u^2 / (2 g), z_s the level that a gauge shows [m].
-
-    Parameters
-    ----------
-    reading : Reading
-    share : (m,) [-]
-        share a of the velocity head that they show.
-
-    Returns
-    -------
-    dict
-        `value` (station, m) [unit of the reading].
-    """
+    """z_s -> z_s + a u^2 / (2 g), z_s the level that a gauge shows [m]."""
     return {"value": reading.value + share * reading.u**2 / (2.0 * GRAVITY) * reading.level}
 
 

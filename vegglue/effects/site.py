@@ -11,127 +11,39 @@ from vegglue.effects.surroundings import ChannelGeometry
 
 
 def floor_level(geometry: ChannelGeometry, rise: Array) -> dict[str, Array]:
-    """z_b -> z_b + dz on the floor.
-
-    Parameters
-    ----------
-    geometry : ChannelGeometry
-    rise : (m,) [m]
-        how much higher the floor lies than surveyed.
-
-    Returns
-    -------
-    dict
-        `bed` (nx, ny, m) [m].
-    """
+    """z_b -> z_b + dz on the floor."""
     return {"bed": rise * (1.0 - geometry.bank)}
 
 
 def bank_level(geometry: ChannelGeometry, rise: Array) -> dict[str, Array]:
-    """z_b -> z_b + dz on the banks.
-
-    Parameters
-    ----------
-    geometry : ChannelGeometry
-    rise : (m,) [m]
-        how much higher the banks lie than surveyed.
-
-    Returns
-    -------
-    dict
-        `bed` (nx, ny, m) [m].
-    """
+    """z_b -> z_b + dz on the banks."""
     return {"bed": rise * geometry.bank}
 
 
 def bed_slope(geometry: ChannelGeometry, slope: Array) -> dict[str, Array]:
-    """z_b -> z_b + s (x_end - x): the bed at the outlet stays.
-
-    Parameters
-    ----------
-    geometry : ChannelGeometry
-    slope : (m,) [-]
-        additional slope s along the channel.
-
-    Returns
-    -------
-    dict
-        `bed` (nx, ny, m) [m].
-    """
+    """z_b -> z_b + s (x_end - x): the bed at the outlet stays."""
     return {"bed": slope * (geometry.x[-1] - geometry.x) * np.ones_like(geometry.bed)}
 
 
 def cross_slope(geometry: ChannelGeometry, slope: Array) -> dict[str, Array]:
-    """z_b -> z_b + s (y - y_axis), y_axis that of the channel axis.
-
-    Parameters
-    ----------
-    geometry : ChannelGeometry
-    slope : (m,) [-]
-        slope s across the channel.
-
-    Returns
-    -------
-    dict
-        `bed` (nx, ny, m) [m].
-    """
+    """z_b -> z_b + s (y - y_axis), y_axis that of the channel axis."""
     return {"bed": slope * geometry.offset * geometry.half_width}
 
 
 def flank_scour(geometry: ChannelGeometry, depth: Array, width: Array) -> dict[str, Array]:
-    """z_b -> z_b - d exp(-((e - w) / w)^2) outside the sides of a patch, e the distance from them [m].
-
-    Parameters
-    ----------
-    geometry : ChannelGeometry
-    depth : (m,) [m]
-        depth d of the trench, negative for a ridge.
-    width : (m,) [m]
-        half width w, and how far off the trench is deepest.
-
-    Returns
-    -------
-    dict
-        `bed` (nx, ny, m) [m].
-    """
+    """z_b -> z_b - d exp(-((e - w) / w)^2) outside the sides of a patch, e the distance from them [m]."""
     # Columns without a patch count as inside one, where nothing is dug.
     beside = np.where(np.isfinite(geometry.edge), geometry.edge, -1e3)
     return {"bed": np.where(beside > 0.0, -depth * np.exp(-(((beside - width) / width) ** 2)), 0.0)}
 
 
 def patch_deposit(geometry: ChannelGeometry, rise: Array) -> dict[str, Array]:
-    """z_b -> z_b + dz where plants stand.
-
-    Parameters
-    ----------
-    geometry : ChannelGeometry
-    rise : (m,) [m]
-        thickness dz of the deposit.
-
-    Returns
-    -------
-    dict
-        `bed` (nx, ny, m) [m].
-    """
+    """z_b -> z_b + dz where plants stand."""
     return {"bed": rise * geometry.planted}
 
 
 def wake_deposit(geometry: ChannelGeometry, rise: Array, length: Array) -> dict[str, Array]:
-    """z_b -> z_b + dz exp(-s / L) behind a patch, s the distance from its end [m].
-
-    Parameters
-    ----------
-    geometry : ChannelGeometry
-    rise : (m,) [m]
-        height dz of the bar at the end of the patch.
-    length : (m,) [m]
-        length L over which it fades.
-
-    Returns
-    -------
-    dict
-        `bed` (nx, ny, m) [m].
-    """
+    """z_b -> z_b + dz exp(-s / L) behind a patch, s the distance from its end [m]."""
     return {"bed": rise * np.exp(-geometry.wake / length)}
 
 

@@ -19,19 +19,7 @@ def spot(geometry: ChannelGeometry, x: Array, y: Array, length: Array, width: Ar
 
 
 def unlisted_object(cells: Cells, drag: Array, **place: Array) -> dict[str, Array]:
-    """k -> k + c spot [1/m]; below 0 it pushes, as a jet does.
-
-    Parameters
-    ----------
-    cells : Cells
-    drag : (m,) [1/m]
-        drag c of the object per length of flow through it.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
-    """
+    """k -> k + c spot [1/m]; below 0 it pushes, as a jet does."""
     return {"rate": cells.rate + drag * spot(cells.geometry, **place)}
 
 
@@ -56,20 +44,7 @@ def unlisted_patch(cells: Cells, drag: Array, height: Array, proportional: Array
 
         (h k_v)^(-1/2) = (h k_b + phi/2)^(-1/2) + ln(max(h/H, 1)) / kappa
 
-    Parameters
-    ----------
-    cells : Cells
-    drag : (m,) [-]
-        drag phi = C_D m D H of the plants.
-    height : (m,) [m]
-        height H of the plants.
-    proportional : (m,) [-]
-        1 if phi h/H takes the place of phi where plants stand out of the water, see `numerics.emergent`; else 0.
-
-    Returns
-    -------
-    dict
-        `rate` (nx, ny, m) [1/m].
+    phi = C_D m D H, or phi h/H where plants stand out of the water if `proportional` is 1, see `numerics.emergent`.
     """
     depth, of_bed = cells.depth, cells.depth * cells.bed_rate
     emerged = np.minimum(depth / height, 1.0)
@@ -80,54 +55,18 @@ def unlisted_patch(cells: Cells, drag: Array, height: Array, proportional: Array
 
 
 def unlisted_bed(geometry: ChannelGeometry, rise: Array, **place: Array) -> dict[str, Array]:
-    """z_b -> z_b + dz spot [m].
-
-    Parameters
-    ----------
-    geometry : ChannelGeometry
-    rise : (m,) [m]
-        how much higher the bed lies there than surveyed.
-
-    Returns
-    -------
-    dict
-        `bed` (nx, ny, m) [m].
-    """
+    """z_b -> z_b + dz spot [m]."""
     return {"bed": rise * spot(geometry, **place)}
 
 
 def unlisted_inflow(geometry: ChannelGeometry, discharge: Array, **place: Array) -> dict[str, Array]:
-    """q -> q + Q spot / (pi l w) [m/s], without momentum.
-
-    Parameters
-    ----------
-    geometry : ChannelGeometry
-    discharge : (m,) [m3/s]
-        discharge Q that enters there.
-
-    Returns
-    -------
-    dict
-        `inflow` (nx, ny, m) [m/s].
-    """
+    """q -> q + Q spot / (pi l w) [m/s], without momentum."""
     area = np.pi * place["length"] * place["width"]
     return {"inflow": discharge * spot(geometry, **place) / (area * geometry.stretch)}
 
 
 def unlisted_viscosity(cells: Cells, viscosity: Array, **place: Array) -> dict[str, Array]:
-    """nu -> max(nu + n spot, 0) [m2/s].
-
-    Parameters
-    ----------
-    cells : Cells
-    viscosity : (m,) [m2/s]
-        additional viscosity n in the middle of it.
-
-    Returns
-    -------
-    dict
-        `viscosity` (nx, ny, m) [m2/s].
-    """
+    """nu -> max(nu + n spot, 0) [m2/s]."""
     added = viscosity * spot(cells.geometry, **place)
     return {"viscosity": np.maximum(added, -cells.viscosity)}
 
