@@ -152,7 +152,7 @@ def replaced(old: str, new: str) -> Callable[[Path], Any]:
 FULL, READ_ONLY = OSError(errno.ENOSPC, "No space left on device"), OSError(errno.EROFS, "Read-only file system")
 SIMULATE = "vegglue simulate brook.yaml"
 BEFORE, OLD, CHUNKS = "what was there before", "the older result", "every finished chunk"
-HEADING = "| what happens | command | code | message names | what is kept | chunks solved |"
+HEADING = "| what happens | command | code | what is kept |"
 FAULTS = (
     Fault("full disk, from the start", "simulate", 3, f"{PART}", BEFORE, failing(os, "fsync", FULL), 4, ready=False),
     Fault("full disk, half-way", "simulate", 3, f"{PART}", CHUNKS, failing(os, "fsync", FULL, after=6), 5, ready=False),
@@ -198,11 +198,8 @@ FAULTS = (
 
 def rows() -> str:
     """The table of the page."""
-    lines = [HEADING, "|---|---|---:|---|---|---:|"]
-    for one in FAULTS:
-        names = f"`{one.names}`" if one.names else "-"
-        lines.append(f"| {one.what} | `{one.command}` | {one.code} | {names} | {one.kept} | {one.solves} |")
-    return "\n".join(lines)
+    lines = [f"| {one.what} | `{one.command}` | {one.code} | {one.kept} |" for one in FAULTS]
+    return "\n".join([HEADING, "|---|---|---:|---|", *lines])
 
 
 def kills() -> str:
@@ -210,6 +207,7 @@ def kills() -> str:
     table = json.loads(KILLS.read_text(encoding="utf-8"))
     total, in_time = (sum(one[key] for one in table.values()) for key in ("kills", "in_time"))
     text = (
+        "`make faults` kills every command with signal 9 at random moments. "
         f"{total} kills of {len(table)} commands (`data/faults/kills.json`), {in_time} of them before the command had "
         "ended. Every time the same command then finished, and every file had the bits of an undisturbed run, except "
         "for the seconds that members took."
@@ -230,17 +228,14 @@ The tests cause each of these faults, and then run the same command again, undis
 ## Faults and their outcome
 
 With an [exit code](commands.md#what-is-kept-and-how-a-command-ends) other than 0, one sentence on standard error gives
-the file, the fault, and the command that repairs it. If a command continues, its numbers have the bits of an
-undisturbed run. The ensemble here has four chunks of members; the last column counts the chunks that the command and
-the next `simulate` solve together.
+the file, the fault, and the command that repairs it. Results that are continued have the bits of an undisturbed run.
+Members are kept in chunks.
 
 {rows}
 
 A hanging worker cannot be distinguished from a slow one: the command waits. Stop it with Ctrl-C; finished work is kept.
 
 ## Kills
-
-`make faults` kills every command with signal 9 at random moments; `make test` includes some of these kills.
 
 {kills}
 
@@ -250,31 +245,24 @@ A hanging worker cannot be distinguished from a slow one: the command waits. Sto
 - Results end with the SHA-256 of all bytes before it. A separate process reads every result first, because the HDF5
   library never finishes reading some damaged files.
 - Members are kept chunk by chunk in `ensemble.h5.part`; the next run reuses the chunks whose checksum is right.
-- A lock of the operating system allows one process at a time to write an ensemble. On some network disks locks do not
-  reach other machines; then the first of two runs stops with a message, and the second completes. Of two processes that
-  write a diagnosis, a posterior or a page, the later one wins.
+- A lock of the operating system allows one process at a time to write an ensemble. If locks of a network disk do not
+  reach other machines, the first of two runs stops with a message. Of two processes that write a diagnosis, a posterior
+  or a page, the later one wins.
 - A file with links or with data in other files is refused; a link in the folder of a run is replaced, not followed.
 - Configs of `import`, `extend` and `twin` that you edited are replaced only with `--force`.
 
 ## Damaged files from others
 
 `import` reads such a file and counts what it leaves out, or refuses it with exit code 2 and writes nothing. See also [how
-tables are read](own_files.md#how-tables-are-read).
+tables are read](own_files.md#how-tables-are-read) and [invalid predictions](own_engine.md#invalid-predictions) of a
+command.
 
-| content | result |
-|---|---|
-| a value marked as missing, in any format | read without its row or cell, or refused |
-| lost bottom track, ranges or ensembles of a boat | the ensemble has no position and is left out; a jump of the boat is refused |
-| raw ensembles with a wrong checksum or size, or cut short | only the ensemble is left out |
-| cells of two sizes; a lost beam of four | each cell keeps its position; three beams are used if the file allows it |
-| velocities relative to the boat (reference NONE) | refused |
-| -999, zeros or constants as predictions of a command | failed members; refused if none is left, or if no parameter has an effect |
-| another coordinate system, datum or unit of a map | refused |
-| scale and offset of a raster | applied |
-| codes of gauging offices (Ice, Eqp), a row of types, -999999 | no value |
-| 3.7D-01 | read as 0.37 |
-| missing-value codes in the site file, stems and corners | refused |
-| damaged MATLAB files, and files that unpack to more than 100 MB | refused, by a separate process |
+- **Left out**: values marked as missing, with their row or cell; codes of gauging offices (Ice, Eqp, -999999); raw
+  ensembles of a boat with a wrong checksum or size, cut short, or without bottom track or ranges.
+- **Used**: three of four beams if the file allows it; cells of two sizes; scale and offset of a raster; 3.7D-01.
+- **Refused**: velocities relative to the boat (reference NONE); a jump of the boat; another coordinate system, datum or
+  unit of a map; missing-value codes in the site file, stems and corners; damaged MATLAB files, and files that unpack to
+  more than 100 MB, by a separate process.
 
 ## Following a run
 
