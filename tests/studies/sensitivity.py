@@ -15,10 +15,11 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import vegglue
-from vegglue.decision_constants import DecisionConstants, Described, described, using
+from vegglue.decision_constants import DecisionConstants, Described, Provenance, described, using
 from vegglue.errors import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -81,7 +82,7 @@ def answer(record: Record) -> tuple[Any, ...]:
 
 
 def table(records: Sequence[Record]) -> str:
-    """One row for each constant that was run, with the cases whose verdict is another at half and twice of it."""
+    """One row for each constant with the cases whose verdict is another at half or twice of it; then the others."""
     of = {(one["case"], one["constant"], one["factor"]): one for one in records}
     as_is = {case: one for (case, constant, _), one in of.items() if constant == AS_IS}
 
@@ -97,16 +98,23 @@ def table(records: Sequence[Record]) -> str:
         return f"{len(other)} of {len(found)}" + (f": {', '.join(other)}" if other else "")
 
     rows = ["| constant | value | provenance | other verdicts at half | at twice |", "|---|---|---|---|---|"]
-    run = {constant for _, constant, _ in of}
+    run, alike, left = {constant for _, constant, _ in of}, [], []
     for one in _in_order(described()):
-        if one.name not in run:
-            continue
         unit = "" if one.unit == "-" else f" {one.unit}"
         half, twice = (changes(one.name, factor) for factor in FACTORS)
         name = f"**`{one.name}`**" if one.name in FIRST else f"`{one.name}`"
-        rows.append(f"| {name} | {one.value:g}{unit} | {one.provenance.value} | {half} | {twice} |")
-    left = ", ".join(f"`{one.name}`" for one in _in_order(described()) if one.name not in run)
-    return "\n".join([*rows, "", f"Not run: {left or 'none'}."])
+        if one.name not in run:
+            left.append(name)
+        elif half == twice == f"0 of {len(as_is)}":
+            origin = "" if one.provenance is Provenance.CHOSEN else f" ({one.provenance.value})"
+            alike.append(f"{name} {one.value:g}{unit}{origin}")
+        else:
+            rows.append(f"| {name} | {one.value:g}{unit} | {one.provenance.value} | {half} | {twice} |")
+    same = (
+        f"At half and at twice of these, no verdict of {len(as_is)} differs; all are chosen unless stated: "
+        f"{', '.join(alike) or 'none'}."
+    )
+    return "\n".join([*rows, "", fill(same, 120), "", fill(f"Not run: {', '.join(left) or 'none'}.", 120)])
 
 
 def _in_order(constants: Sequence[Described]) -> list[Described]:

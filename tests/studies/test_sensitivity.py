@@ -30,10 +30,11 @@ def test_a_constant_near_one_is_varied_by_its_distance_from_it(name: str, half: 
 
 def test_a_verdict_is_another_by_kind_or_set() -> None:
     made = [record(sensitivity.AS_IS, 1.0), record("field_odds", 0.5, effects=("bend",)), record("field_odds", 2.0),
-            record("set_chance", 0.5, "one-of")]  # fmt: skip
-    *lines, _, not_run = sensitivity.table(made).splitlines()[2:]
-    rows = {line.split("`")[1]: line.split("|")[-3:-1] for line in lines}
+            record("set_chance", 0.5, "one-of"), record("spot_drag", 0.5), record("spot_drag", 2.0)]  # fmt: skip
+    table, alike, not_run = sensitivity.table(made).split("\n\n")
+    rows = {line.split("`")[1]: line.split("|")[-3:-1] for line in table.splitlines()[2:]}
     assert set(rows) == {"field_odds", "set_chance"}
-    assert set(not_run.split("`")[1::2]) == set(BY_NAME) - set(rows)
+    assert alike.split("`")[1::2] == ["spot_drag"]
+    assert set(not_run.split("`")[1::2]) == set(BY_NAME) - {*rows, "spot_drag"}
     assert [cell.strip()[:6] for cell in rows["field_odds"]] == ["1 of 1", "0 of 1"]
     assert "identified → one-of" in rows["set_chance"][0]
