@@ -3,7 +3,7 @@
     python tests/installed.py dist/vegglue-0.3.0-py3-none-any.whl python3.13 FOLDER
     python tests/installed.py dist/vegglue-0.3.0-py3-none-any.whl python3.11 FOLDER --lowest
 
-Prints versions and outcomes, for docs/platforms.md. What an earlier call in FOLDER has done is not done
+Prints versions and outcomes, for docs/limits.md. What an earlier call in FOLDER has done is not done
 again. pip needs an index of packages.
 """
 

@@ -14,7 +14,7 @@ from vegglue.case.resolved_config import resolved_yaml
 from vegglue.errors import shell_line, shown_path
 from vegglue.parallel import no_ctrl_c_for_children
 
-# Hides what Windows lacks; the fast tests pass there, too (docs/platforms.md).
+# Hides what Windows lacks; the fast tests pass there, too (docs/limits.md).
 HIDDEN = Path(__file__).with_name("_without_posix")
 
 
