@@ -13,12 +13,13 @@ from vegglue.calibration.fit import at_point
 from vegglue.calibration.learned_bed import LearnedBed, bed_of_spots, learned_bed
 from vegglue.calibration.model_error import cell_responses, model_error_columns
 from vegglue.calibration.noise import noise_of, with_model_error
-from vegglue.case.bed import read_bed_survey, read_raster
-from vegglue.case.bed_error import bed_error_columns, surveyed_lines, without_surveys
+from vegglue.case.bed import cell_places, read_bed_survey, read_raster
+from vegglue.case.bed import surveyed as surveyed_points
+from vegglue.case.bed_error import SPACING, bed_error_columns, surveyed_lines, without_surveys
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import ModelError, Planned, PlannedErrors
 from vegglue.case.site_schema import BedLayer
-from vegglue.case.survey_error import BedSurvey, bed_survey_text, line_weights
+from vegglue.case.survey_error import BedSurvey, bed_survey_text, line_weights, root_of_covariance
 from vegglue.diagnosis.comparison import unseen_errors
 from vegglue.diagnosis.next_measurement import surveys
 from vegglue.diagnosis.refits import relevelled
@@ -48,6 +49,26 @@ def test_the_survey_adds_its_error_and_a_case_without_one_has_none(surveyed: tup
     alone = bed_error_columns(model.case, replace(grid, x=grid.x[[column]]))
     among = columns.reshape(*stated.shape, -1)[column]
     assert np.linalg.norm(alone.sum(axis=0)) == pytest.approx(np.linalg.norm(among.sum(axis=0)), rel=0.02)
+
+
+def test_cells_finer_than_the_bed_varies_have_its_error_from_places_between(surveyed: tuple[Model, Point]) -> None:
+    """Means over Gaussians of 1 m half width have the standard deviation that all their cells together give."""
+    case, grid = surveyed[0].case, surveyed[0].site.grid
+    (west, east), (south, north), size = case.grid.x, case.grid.y, 0.25
+    fine = replace(grid, x=np.arange(west, east, size), y=np.arange(south, north, size), dx=size, dy=size)
+    columns, places = bed_error_columns(case, fine), cell_places(fine)
+    survey = case.bed[-1].survey
+    assert survey is not None
+    assert size < 0.5 * SPACING * OF_BED.across
+    stated, dense = [], []
+    for x in np.linspace(west + 8.0, east - 8.0, 7):
+        near = np.hypot(places[:, 0] - x, places[:, 1]) < 3.0
+        weight = np.exp(-0.5 * ((places[near, 0] - x) ** 2 + places[near, 1] ** 2))
+        root = root_of_covariance(surveyed_points(survey), survey.covariances, places[near])
+        stated.append(np.linalg.norm(weight @ columns[near, 1:]))  # the first is how far the bed is off the mean
+        dense.append(np.linalg.norm(weight @ root))
+    assert stated == pytest.approx(dense, rel=0.04)
+    assert np.linalg.norm(stated) == pytest.approx(np.linalg.norm(dense), rel=0.01)
 
 
 def test_the_flow_finds_a_bed_that_was_drawn(surveyed: tuple[Model, Point]) -> None:

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from vegglue.arrays import Array
-from vegglue.case import survey_error
 from vegglue.case.bed import read_bed_survey
 from vegglue.case.site_schema import CovarianceOfBed
 from vegglue.case.survey_error import (
     BedSurvey,
     bed_survey_text,
-    conditional,
     correlation_of_bed,
     covariances_beside_wrong_line,
     evidence_of_lines,
@@ -23,6 +21,7 @@ from vegglue.case.survey_error import (
     line_weights,
     lines_left_out,
     mean_level,
+    root_of_covariance,
     stands_out,
 )
 from vegglue.errors import InputError
@@ -78,47 +77,24 @@ def test_mean_and_covariance_are_those_of_universal_kriging(one: CovarianceOfBed
     system, right = np.block([[readings, basis], [basis.T, zero]]), np.vstack([between, there.T])
     weights = np.linalg.solve(system, right)
     covariance = one.sd**2 * correlation_of_bed(MIDDLE, MIDDLE, one.along, one.across, one.rough) - right.T @ weights
-    found = conditional(survey, [one], MIDDLE)
-    assert found.mean == pytest.approx(weights[:n].T @ points[:, 2], abs=1e-6)
-    assert found.mean == pytest.approx(mean_level(survey, [one], MIDDLE), abs=1e-8)
-    left = covariance - found.columns @ found.columns.T
+    found = root_of_covariance(survey, [one], MIDDLE)
+    assert mean_level(survey, [one], MIDDLE) == pytest.approx(weights[:n].T @ points[:, 2], abs=1e-6)
+    left = covariance - found @ found.T
     assert np.abs(left).max() < 0.05 * np.diag(covariance).max()
     assert 0.0 <= np.trace(left) <= 0.0101 * np.trace(covariance)
 
 
 def test_several_covariances_average_and_hold_how_far_their_means_lie_apart() -> None:
     survey, _ = drawn(12.0, SMOOTH, seed=2)
-    mixed, parts = conditional(survey, BOTH, MIDDLE), [conditional(survey, [one], MIDDLE) for one in ALONE]
-    mean = sum(one.chance * part.mean for one, part in zip(BOTH, parts, strict=True))
+    mean, means = mean_level(survey, BOTH, MIDDLE), [mean_level(survey, [one], MIDDLE) for one in ALONE]
+    assert mean == pytest.approx(sum(one.chance * part for one, part in zip(BOTH, means, strict=True)), abs=1e-9)
+    mixed = root_of_covariance(survey, BOTH, MIDDLE)
+    parts = [root_of_covariance(survey, [one], MIDDLE) for one in ALONE]
     variance = sum(
-        one.chance * ((part.columns**2).sum(axis=1) + (part.mean - mean) ** 2)
-        for one, part in zip(BOTH, parts, strict=True)
+        one.chance * ((part**2).sum(axis=1) + (own - mean) ** 2)
+        for one, part, own in zip(BOTH, parts, means, strict=True)
     )
-    assert mixed.mean == pytest.approx(mean, abs=1e-9)
-    assert (mixed.columns**2).sum(axis=1) == pytest.approx(variance, rel=0.1)
-    # Other levels that are taken for the bed are wrong by their distance from the mean, too.
-    used = conditional(survey, BOTH, MIDDLE, mean + 0.05)
-    assert (used.columns**2).sum() == pytest.approx(variance.sum() + 0.05**2 * len(MIDDLE), rel=0.02)
-
-
-def test_of_many_places_every_nth_decides_on_the_columns_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The whole covariance, but for LEFT_OUT, with columns chosen among a quarter of the places, in parts."""
-    survey, _ = drawn(12.0, SMOOTH, seed=3)
-    places = np.array([[x, y] for x in np.arange(24.0, 36.0, 0.5) for y in np.arange(-5.0, 5.1, 0.25)])
-    used = mean_level(survey, BOTH, places) + 0.02 * np.sin(places[:, 0])
-    monkeypatch.setattr(survey_error, "LEFT_OUT", 1e-7)
-    dense = conditional(survey, BOTH, places, used)
-    monkeypatch.setattr(survey_error, "LEFT_OUT", 0.01)
-    monkeypatch.setattr(survey_error, "PLACES_FOLLOWED", len(places) // 4)
-    monkeypatch.setattr(survey_error, "PLACES_AT_A_TIME", 100)
-    found = conditional(survey, BOTH, places, used)
-    assert found.mean == pytest.approx(dense.mean, abs=1e-12)
-    whole = dense.columns @ dense.columns.T
-    left = whole - found.columns @ found.columns.T
-    assert found.columns.shape[1] < 0.5 * dense.columns.shape[1]
-    assert 0.0 <= np.trace(left) <= 0.02 * np.trace(whole)
-    assert np.linalg.eigvalsh(left).min() >= -1e-5 * np.trace(whole)
-    assert np.abs(left).max() < 0.1 * np.diag(whole).max()
+    assert (mixed**2).sum(axis=1) == pytest.approx(variance, rel=0.1)
 
 
 @pytest.mark.parametrize("one", [SMOOTH, ROUGH])
@@ -126,8 +102,8 @@ def test_ninety_five_per_cent_lie_within_two_standard_errors(one: CovarianceOfBe
     within = []
     for seed in range(30):
         survey, bed = drawn(12.0, one, seed)
-        found = conditional(survey, [one], MIDDLE)
-        within.append(np.abs(bed - found.mean) <= 1.96 * np.linalg.norm(found.columns, axis=1))
+        stated = np.linalg.norm(root_of_covariance(survey, [one], MIDDLE), axis=1)
+        within.append(np.abs(bed - mean_level(survey, [one], MIDDLE)) <= 1.96 * stated)
     assert np.mean(within) == pytest.approx(0.95, abs=0.02)
 
 
@@ -136,10 +112,11 @@ def test_so_they_do_by_the_covariance_fitted_to_the_survey() -> None:
     within, ratios = [], []
     for seed in range(12):
         survey, bed = drawn(9.0, SMOOTH, seed)
-        found = conditional(survey, fitted_covariances(survey), MIDDLE)
-        stated = np.linalg.norm(found.columns, axis=1)
-        within.append(np.abs(bed - found.mean) <= 1.96 * stated)
-        ratios.append(np.mean(stated**2) / np.mean((bed - found.mean) ** 2))
+        fitted = fitted_covariances(survey)
+        stated = np.linalg.norm(root_of_covariance(survey, fitted, MIDDLE), axis=1)
+        off = bed - mean_level(survey, fitted, MIDDLE)
+        within.append(np.abs(off) <= 1.96 * stated)
+        ratios.append(np.mean(stated**2) / np.mean(off**2))
     assert 0.92 <= np.mean(within) <= 0.99
     assert 0.8 <= np.mean(ratios) <= 2.0
 
@@ -170,9 +147,9 @@ def test_what_is_left_out_is_predicted_as_if_it_had_not_been_surveyed() -> None:
     rest = BedSurvey(np.delete(survey.points, rows, axis=0), np.delete(survey.line, rows))
     means, variances = [], []
     for one in ALONE:
-        found = conditional(rest, [one], survey.points[rows, :2])
-        means.append(found.mean)
-        variances.append((found.columns**2).sum(axis=1) + one.point_error**2)
+        means.append(mean_level(rest, [one], survey.points[rows, :2]))
+        found = root_of_covariance(rest, [one], survey.points[rows, :2])
+        variances.append((found**2).sum(axis=1) + one.point_error**2)
     mean = 0.7 * means[0] + 0.3 * means[1]
     variance = sum(w * (v + (m - mean) ** 2) for w, v, m in zip((0.7, 0.3), variances, means, strict=True))
     assert error[rows] == pytest.approx(survey.points[rows, 2] - mean, abs=1e-6)

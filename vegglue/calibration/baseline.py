@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from scipy.special import ndtri
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import NEGLIGIBLE_DECREASE, MapEstimate, at_point, fit, log_evidence_under, objective
@@ -105,7 +106,7 @@ def baseline(model: Model, known: Array | None = None, noise: Noise | None = Non
     near: Point | None
     if known is not None:
         near = linearise(coarse, known)
-    elif (coarsest := coarser(coarse)) is None:
+    elif (coarsest := coarser(coarse) or on_half_as_many_cells(coarse)) is None:
         near = _best_from_prior(coarse, noise)
     else:
         there = _best_from_prior(coarsest, noise)
@@ -153,12 +154,17 @@ def _best_from_prior(model: Model, noise: Noise) -> Point:
 
 
 def places_of_prior(parameters: int) -> Array:
-    """The middle of the prior, and Sobol' points around it, z (PRIOR_POINTS, p)."""
-    from scipy.stats import norm, qmc  # late: a command that only checks a case need not wait for it
+    """The middle of the prior, and points spread around it by the golden ratio's sequence, z (PRIOR_POINTS, p).
 
-    places = norm.ppf(qmc.Sobol(parameters, seed=1).random(PRIOR_POINTS))
-    places[0] = 0.0
-    return np.asarray(START_SPREAD * places)
+        u_nj = frac(1/2 + n g^-j),   g^(p + 1) = g + 1
+
+    Source: Roberts (2018), The Unreasonable Effectiveness of Quasirandom Sequences; not checked against it.
+    """
+    golden = 2.0
+    for _ in range(40):
+        golden = (1.0 + golden) ** (1.0 / (parameters + 1))
+    turns = np.outer(np.arange(PRIOR_POINTS), golden ** -np.arange(1.0, parameters + 1))
+    return np.asarray(START_SPREAD * ndtri((0.5 + turns) % 1.0))
 
 
 def under_error_of_grid(trial: Baseline) -> Baseline:

@@ -4,7 +4,7 @@ import csv
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +13,20 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array
 from vegglue.case.grid import Grid, centres, places_on_map
 from vegglue.case.schema import Case
-from vegglue.case.site_schema import BedLayer, SurveyOfBed
+from vegglue.case.site_schema import BedLayer, CovarianceOfBed, SurveyOfBed
 from vegglue.case.size_limits import LARGEST_DATA
 from vegglue.case.survey_error import FEWEST_SURVEYED, MOST_SURVEYED, BedSurvey, mean_level
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
+from vegglue.memoised import memoised
 
 FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")  # 3.7D-01
 # Keys of the header of an ESRI ASCII grid, in lower case.
 HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
 # Words for no level, as some programs write into the header and among the values.
 WORDS_FOR_NO_LEVEL = re.compile(r"\b(null|nodata|na|nan)\b", re.IGNORECASE)
+# Changes of a bed that are kept in memory, one for each grid of a calibration.
+MOST_CHANGES_KEPT = 8
 
 
 @dataclass(frozen=True)
@@ -232,12 +235,20 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
     else:
         return np.full((grid.x.size, grid.y.size), np.nan)
     if (survey := layer.survey) is not None and survey.relevelled:
-        as_made = read_bed_survey(survey.file, survey.loose)
-        without, before = (
-            mean_level(one, survey.covariances, cell_places(grid)) for one in (surveyed(survey), as_made)
-        )
-        level = level + (without - before).reshape(level.shape)
+        change = _change_without_levels(surveyed(survey), survey.loose, survey.covariances, cell_places(grid))
+        level = level + change.reshape(level.shape)
     return level
+
+
+@memoised(MOST_CHANGES_KEPT)
+def _change_without_levels(
+    survey: BedSurvey, loose: tuple[int, ...], covariances: tuple[CovarianceOfBed, ...], places: Array
+) -> Array:
+    """By how much the kriged mean at places (m, 2) changes (m,) [m] from a survey with `loose` lines to one with its
+    own.
+    """
+    without, before = (mean_level(one, covariances, places) for one in (survey, replace(survey, loose=loose)))
+    return without - before
 
 
 def surveyed(survey: SurveyOfBed) -> BedSurvey:

@@ -58,8 +58,6 @@ LEFT_OUT, MOST_OF_SQUARE_ROOT = 0.01, 400
 PLACES_AT_ONCE = 16
 # Places whose correlations and mean are computed at a time.
 PLACES_AT_A_TIME = 5000
-# Places among which those of the square root are chosen: chosen. Cells of a wide grid lie closer than a bed varies.
-PLACES_FOLLOWED = 15_000
 
 
 @dataclass(frozen=True)
@@ -103,14 +101,6 @@ class BedSurvey:
         knots = np.r_[[low] * 3, np.linspace(low, high, count - 2), [high] * 3]
         across = BSpline.design_matrix(np.clip(places[:, 1], low, high), knots, 3).toarray()
         return np.column_stack([(places[:, 0] - x.mean()) / max(np.ptp(x), 1e-9), across])
-
-
-@dataclass(frozen=True)
-class Conditional:
-    """Mean (m,) [m] of the bed and columns B (m, k) [m], with B B' the covariance of its error."""
-
-    mean: Array
-    columns: Array
 
 
 def correlation_of_bed(places: Array, others: Array, along: float, across: float, rough: bool) -> Array:
@@ -284,8 +274,8 @@ def stands_out(found: LinesLeftOut) -> bool:
 def mean_level(
     survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array, levels: Array | None = None
 ) -> Array:
-    """The mean (m,) [m] of `conditional` alone, at any number of places (m, 2) [m]; levels (n, k): its columns (m, k)
-    had the points these levels [m].
+    """The mean (m,) [m] of the bed at places (m, 2) [m], given a survey; levels (n, k): its columns (m, k) had the
+    points these levels [m].
     """
     basis = survey.basis(survey.points)
     z = survey.points[:, 2:] if levels is None else levels
@@ -319,18 +309,17 @@ def _rms(values: Array) -> float:
 
 @dataclass(frozen=True)
 class _Seen:
-    """What a survey says at places (m, 2) [m]: the mean (m,) [m], by how much the mean of each covariance is off it,
-    weighed, and whitened covariances with its points and with its mean section, for each covariance.
+    """What a survey says at places (m, 2) [m]: by how much the mean of each covariance is off that of all, weighed, and
+    whitened covariances with its points and with its mean section, for each covariance.
     """
 
     places: Array
-    mean: Array
     apart: Array
     parts: list[tuple[Array, Array]]
 
     def some(self, of: NDArray[np.int64]) -> "_Seen":
         parts = [(near[:, of], of_mean[:, of]) for near, of_mean in self.parts]
-        return _Seen(self.places[of], self.mean[of], self.apart[:, of], parts)
+        return _Seen(self.places[of], self.apart[:, of], parts)
 
 
 @dataclass(frozen=True)
@@ -341,8 +330,8 @@ class _Kriging:
     covariances: Sequence[CovarianceOfBed]
     parts: list[tuple[Array, Array, Array, Array]]
 
-    def seen(self, places: Array, used: Array | None) -> _Seen:
-        """What the survey says at places (m, 2) [m]; used: as of `conditional`."""
+    def seen(self, places: Array) -> _Seen:
+        """What the survey says at places (m, 2) [m]."""
         there, chance = self.survey.basis(places), np.array([one.chance for one in self.covariances])
         means, parts = [], []
         for one, (lower, white, shape, beta) in zip(self.covariances, self.parts, strict=True):
@@ -350,11 +339,8 @@ class _Kriging:
             of_mean = solve_triangular(shape, there.T - white[:, :-1].T @ near, lower=True)
             means.append(there @ beta + near.T @ (white[:, -1] - white[:, :-1] @ beta))
             parts.append((near, of_mean))
-        mean = chance @ np.array(means)
-        apart = np.sqrt(chance)[:, None] * (np.array(means) - mean)
-        if used is not None:
-            apart, mean = np.vstack([apart, used - mean]), used
-        return _Seen(places, mean, apart, parts)
+        apart = np.sqrt(chance)[:, None] * (np.array(means) - chance @ np.array(means))
+        return _Seen(places, apart, parts)
 
     def variance(self, at: _Seen) -> Array:
         """(m,) [m2]."""
@@ -382,46 +368,26 @@ def _kriging(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> _Krig
     return _Kriging(survey, covariances, parts)
 
 
-def conditional(
-    survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array, used: Array | None = None
-) -> Conditional:
-    """The bed at places (m, 2) [m], given a survey. used: levels (m,) [m] that are taken for the bed instead of the
-    mean; then B B' holds their distance from it, too. Of more than PLACES_FOLLOWED places every n-th decides how many
-    columns B has: LEFT_OUT is then the share at these.
-    """
-    kriging = _kriging(survey, covariances)
-
-    def seen(some: NDArray[np.int64]) -> _Seen:
-        return kriging.seen(places[some], None if used is None else used[some])
-
+def root_of_covariance(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array) -> Array:
+    """Columns B (m, k) [m], with B B' the covariance of the bed at places (m, 2) [m] around `mean_level`."""
     # Cholesky's square root B by the largest variance left, of several places apart at once: their columns are one
     # product of matrices, which takes a tenth of the time of one by one.
-    followed = np.arange(0, len(places), max(-(-len(places) // PLACES_FOLLOWED), 1))
-    at_followed = seen(followed)
-    left = kriging.variance(at_followed)
+    kriging = _kriging(survey, covariances)
+    seen = kriging.seen(places)
+    left = np.maximum(kriging.variance(seen), 0.0)
     nearest = 0.5 * min(one.along for one in covariances), 0.5 * min(one.across for one in covariances)
-    left, columns = np.maximum(left, 0.0), np.zeros((min(MOST_OF_SQUARE_ROOT, followed.size), followed.size))
-    enough, chosen = LEFT_OUT * left.sum(), list[int]()
-    while len(chosen) < len(columns) and left.sum() > enough:
-        open_, of, rank = left.copy(), list[int](), len(chosen)
+    columns, rank = np.zeros((min(MOST_OF_SQUARE_ROOT, len(places)), len(places))), 0
+    enough = LEFT_OUT * left.sum()
+    while rank < len(columns) and left.sum() > enough:
+        open_, of = left.copy(), list[int]()
         while len(of) < min(PLACES_AT_ONCE, len(columns) - rank) and open_.max() > 0.5 * left.max():
             of.append(int(open_.argmax()))
-            open_[(np.abs(at_followed.places[:, :2] - at_followed.places[of[-1], :2]) < nearest).all(axis=1)] = 0.0
-        rest = kriging.covariance(at_followed, at_followed.some(np.array(of))) - columns[:rank].T @ columns[:rank, of]
-        lower = cholesky(rest[of], lower=True)
-        columns[rank : rank + len(of)] = solve_triangular(lower, rest.T, lower=True)
+            open_[(np.abs(places[:, :2] - places[of[-1], :2]) < nearest).all(axis=1)] = 0.0
+        rest = kriging.covariance(seen, seen.some(np.array(of))) - columns[:rank].T @ columns[:rank, of]
+        columns[rank : rank + len(of)] = solve_triangular(cholesky(rest[of], lower=True), rest.T, lower=True)
         left = np.maximum(left - (columns[rank : rank + len(of)] ** 2).sum(axis=0), 0.0)
-        chosen += of
-    if followed.size == len(places):
-        return Conditional(at_followed.mean, columns[: len(chosen)].T)
-    # The rows of B at the chosen places are Cholesky's L of their covariance: at all places B = C L^-T.
-    at_chosen, lower = at_followed.some(np.array(chosen, dtype=np.int64)), columns[: len(chosen), chosen].T
-    del at_followed, columns
-    mean, root = np.empty(len(places)), np.empty((len(places), len(chosen)), "float32")  # 1 % is left out
-    for part in np.array_split(np.arange(len(places)), len(places) // PLACES_AT_A_TIME + 1):
-        here = seen(part)
-        mean[part], root[part] = here.mean, solve_triangular(lower, kriging.covariance(at_chosen, here), lower=True).T
-    return Conditional(mean, root)
+        rank += len(of)
+    return columns[:rank].T
 
 
 def _between(places: Array, others: Array, one: CovarianceOfBed) -> Array:
