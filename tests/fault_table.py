@@ -152,7 +152,7 @@ def replaced(old: str, new: str) -> Callable[[Path], Any]:
 FULL, READ_ONLY = OSError(errno.ENOSPC, "No space left on device"), OSError(errno.EROFS, "Read-only file system")
 SIMULATE = "vegglue simulate brook.yaml"
 BEFORE, OLD, CHUNKS = "what was there before", "the older result", "every finished chunk"
-HEADING = "| what happens | command | code | what is kept |"
+HEADING = "| exit code | what is kept | after |\n|---:|---|---|"
 FAULTS = (
     Fault("full disk, from the start", "simulate", 3, f"{PART}", BEFORE, failing(os, "fsync", FULL), 4, ready=False),
     Fault("full disk, half-way", "simulate", 3, f"{PART}", CHUNKS, failing(os, "fsync", FULL, after=6), 5, ready=False),
@@ -178,12 +178,12 @@ FAULTS = (
     Fault("a foreign file that links to another", "infer", 3, f"{ENSEMBLE}", "every other file: no link is followed",
           done_to(ENSEMBLE, leading_out), 4),
     Fault("a stopped run", "simulate", 0, NOTHING, CHUNKS, half_solved, 2, ready=False),
-    Fault("the same, one bit of a member flipped", "simulate", 0, NOTHING, "every other chunk",
+    Fault("a stopped run with one bit of a member flipped", "simulate", 0, NOTHING, "every other chunk",
           lambda folder: half_solved(folder, damaged_member), 3, ready=False),
-    Fault("the same, the file cut short", "simulate", 0, NOTHING, "the broken file, as ensemble.h5.part.old",
+    Fault("a stopped run, its file cut short", "simulate", 0, NOTHING, "the broken file, as ensemble.h5.part.old",
           lambda folder: half_solved(folder, cut_short), 4, ready=False),
-    Fault("the same, the file links to another", "simulate", 0, NOTHING, "the foreign file, as ensemble.h5.part.old",
-          lambda folder: half_solved(folder, leading_out), 4, ready=False),
+    Fault("a stopped run, its file links to another", "simulate", 0, NOTHING,
+          "the foreign file, as ensemble.h5.part.old", lambda folder: half_solved(folder, leading_out), 4, ready=False),
     Fault("a stopped run", "infer", 2, SIMULATE, CHUNKS, half_solved, 2, ready=False),
     Fault("the clock jumps by twenty years", "simulate", 0, NOTHING, "everything: times of files do not count",
           done_to(ENSEMBLE, lambda path: os.utime(path, (2.5e9, 2.5e9))), 0),
@@ -197,9 +197,16 @@ FAULTS = (
 
 
 def rows() -> str:
-    """The table of the page."""
-    lines = [f"| {one.what} | `{one.command}` | {one.code} | {one.kept} |" for one in FAULTS]
-    return "\n".join([HEADING, "|---|---|---:|---|", *lines])
+    """The table of the page: faults by their outcome."""
+    after: dict[tuple[int, str], dict[str, str]] = {}
+    for one in FAULTS:
+        faults = after.setdefault((one.code, one.kept), {})
+        faults[one.what] = ", ".join([*filter(None, [faults.get(one.what)]), f"`{one.command}`"])
+    lines = []
+    for (code, kept), faults in sorted(after.items(), key=lambda one: one[0][0]):
+        listed = "; ".join(f"{what} ({commands})" for what, commands in faults.items())
+        lines.append(f"| {code} | {kept} | {listed} |")
+    return "\n".join([HEADING, *lines])
 
 
 def kills() -> str:

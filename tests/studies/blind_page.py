@@ -50,7 +50,7 @@ def write_page(
         lines=lines, met=met, sets=len(sets["second"]), table=_table(sets["second"], told["second"]),
         twin=len(made(records, "second", "twin")), campaign=len(made(records, "second", "campaign")),
         own=len(sets["own"]), left_out=_left_out(records), kept=_kept(sets["second"]),
-        data_limits=_data_limits(lengths, limits, ideal),
+        data_limits=_data_limits(lengths, limits, ideal), few=FEW_SETS,
     )  # fmt: skip
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "blind.md").write_text(text, encoding="utf-8")
@@ -70,7 +70,7 @@ def wanted_of(line: Line) -> str:
 
 
 def _table(records: Sequence[Record], told: Sequence[Told]) -> str:
-    """Every line that has data, the field campaign beside all."""
+    """Every line that has data, beside all the field campaign if it has more than a few."""
     campaign = [one for one in records if one["case"] == "campaign"]
     rows = ["| | target | data sets | share (95 % interval) | field campaign only |", "|---|---|---:|---:|---:|"]
     for line in LINES:
@@ -82,7 +82,7 @@ def _table(records: Sequence[Record], told: Sequence[Told]) -> str:
         answer = "**missed**" if not reached else "met" if size >= FEW_SETS else "too few"
         target = "-" if reached is None else f"{wanted_of(line)}, {answer}"
         there, of = counts(campaign, line)
-        beside = f"{percent(there / of)} of {of}" if of else "-"
+        beside = f"{percent(there / of)} of {of}" if of >= FEW_SETS else "-"
         share = f"{percent(good / size)} ({100 * low:.0f} to {100 * high:.0f})"
         rows.append(f"| {line.label} | {target} | {size} | {share} | {beside} |")
     if told:
@@ -215,8 +215,8 @@ its 95 % interval (Clopper and Pearson), in at least 20 data sets. All {sets} da
   allowed; what `extend --auto` keeps is counted by an earlier rule in all but 170. `make blind` computes the rest.
 - **Dependence.** True parameters lie at eight points of the prior, 0.3 to 1 standard deviations from its middle. `own
   equations` in the figures ({own} data sets) have the model's own equations as truth, an easier test.
-- **Few data sets** of a campaign with something hidden, of pairs and of bad readings; none with water that enters
-  locally, none with the side of a patch within a cell.
+- **Few data sets** of a campaign with something hidden (shares of fewer than {few} are not shown), of pairs and of bad
+  readings; none with water that enters locally, none with the side of a patch within a cell.
 {kept}
 {data_limits}
 {left_out}
