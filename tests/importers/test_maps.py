@@ -260,6 +260,16 @@ def test_a_bed_by_design_has_no_error_between_its_lines(tmp_path: Path) -> None:
     assert case.bed[0].survey is None
 
 
+@pytest.mark.parametrize(("first", "wide"), [(-2.0, 5.0), (0.0, 4.0)])
+def test_a_design_known_by_many_points_has_no_error_between_them(tmp_path: Path, first: float, wide: float) -> None:
+    """Its mean cross-section predicts all of them to rounding, or their covariance is singular to rounding."""
+    x, y = (one.ravel() for one in np.meshgrid(np.arange(first, 32.0 - first), np.arange(-wide, wide + 0.1, 0.5)))
+    z = -0.001 * x + 0.5 * np.maximum(np.abs(y) - 1.5, 0.0)
+    bed = "\n".join(["x,y,z", *(f"{a:g},{b:g},{c:.3f}" for a, b, c in zip(x, y, z, strict=True))])
+    case = import_of(tmp_path, f"bed: {{file: s.csv}}\n{JUNE}", s__csv=bed, u__csv="x,y,u\n12,0,0.5\n").case
+    assert case.bed[0].survey is None
+
+
 @pytest.mark.parametrize(("names", "spread"), [(True, 0.2), (True, 0.0), (False, 0.0)])
 def test_sections_of_a_flume_stay_apart(tmp_path: Path, names: bool, spread: float) -> None:
     """Sections within a metre of one another were made one, and the slope between them was lost."""

@@ -32,6 +32,7 @@ def rising(interval: tuple[float, float]) -> tuple[float, float]:
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
 Interval = Annotated[tuple[Number, Number], AfterValidator(rising)]
 Polygon = Annotated[tuple[tuple[Number, Number], ...], Field(min_length=3)]
 Value = Annotated[Number | str, BeforeValidator(_number_or_name)]
@@ -219,13 +220,13 @@ class LinesLeftOut(Part):
     """How well lines of a survey are predicted from all others."""
 
     count: Annotated[int, Field(strict=True, gt=0)] = Field(description="how many lines, or points in no line")
-    error: Positive = Field(description="root mean square error of their prediction from all others [m]")
+    error: NotNegative = Field(description="root mean square error of their prediction from all others [m]")
     stated: Positive = Field(description="the same as the covariance states it [m]")
-    straight: Positive = Field(description="the same of straight lines between the neighbours [m]")
-    most: Positive = Field(description="largest error of a line over its stated one [-]")
+    straight: NotNegative = Field(description="the same of straight lines between the neighbours [m]")
+    most: NotNegative = Field(description="largest error of a line over its stated one [-]")
     most_at: Number = Field(description="x of that line [m]")
     offset: Number = Field(default=0.0, description="by how much the line that is furthest off lies too high [m]")
-    offset_error: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="its standard error [m]")
+    offset_error: NotNegative = Field(default=0.0, description="its standard error [m]")
     offset_at: Number = Field(default=0.0, description="x of that line [m]")
 
 

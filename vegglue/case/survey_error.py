@@ -395,10 +395,16 @@ def _between(places: Array, others: Array, one: CovarianceOfBed) -> Array:
 
 
 def _precision_beside_mean(survey: BedSurvey, one: CovarianceOfBed) -> Array:
-    """Q = K^-1 - K^-1 X (X' K^-1 X)^-1 X' K^-1 (n, n) [1/m2]."""
+    """Q = K^-1 - K^-1 X (X' K^-1 X)^-1 X' K^-1 (n, n) [1/m2].
+
+    LinAlgError if K is singular to rounding, as on an even bed known by many points: 1 / Q_ii are variances.
+    """
     basis, inverse = survey.basis(survey.points), np.linalg.inv(_of_readings(survey, one))
     projected = inverse @ basis
-    return np.asarray(inverse - projected @ np.linalg.solve(basis.T @ projected, projected.T))
+    precision = np.asarray(inverse - projected @ np.linalg.solve(basis.T @ projected, projected.T))
+    if (np.diag(precision) <= 0.0).any():
+        raise np.linalg.LinAlgError("variances below 0")
+    return precision
 
 
 def _of_readings(survey: BedSurvey, one: CovarianceOfBed) -> Array:

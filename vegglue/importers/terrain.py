@@ -76,8 +76,8 @@ MOST_LEVELS = 10 * MOST_CELLS  # of some eight bytes each; a case reads no large
 BED_FILES = (("raster", "bed.asc"), ("points", "bed.csv"))
 # Most points in no line of which each is left out in turn.
 MOST_LEFT_OUT = 100
-# Standard deviation of a bed around its mean cross-section [m] below which it is a design and has no error of a survey.
-# Chosen: no staff is read to it.
+# Standard deviation of a bed around its mean cross-section, or error of what is left out of its survey [m], below which
+# it is a design and has no error of a survey. Chosen: no staff is read to it.
 LEAST_BED_ERROR = 1e-4
 BANK = "bank"
 TAKEN_NAMES = ("n_b", "n_w")  # parameters of the bed and of walls
@@ -387,6 +387,8 @@ def _between_points(terrain: Terrain, survey: BedSurvey, without: Callable[[NDAr
             return terrain
         left_out = lines_left_out(survey, covariances, straight)
     except np.linalg.LinAlgError:  # points too much alike for a covariance
+        return terrain
+    if left_out.error < LEAST_BED_ERROR:
         return terrain
     fitted = FittedSurvey(survey, covariances, left_out)
     if left_out.error > left_out.straight:
