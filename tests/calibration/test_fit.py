@@ -94,3 +94,21 @@ def test_steps_follow_the_bend_of_a_valley(monkeypatch: pytest.MonkeyPatch) -> N
     other = fit(model_of(rosenbrock, straight), noise, start, steps=100)
     assert found.objective == pytest.approx(other.objective, abs=NEGLIGIBLE_DECREASE)
     assert len(bent) <= 2 / 3 * len(straight)
+
+
+def test_a_search_that_stalls_ends() -> None:
+    """Slopes promise what steps hardly keep, as where an outline crosses cells."""
+
+    def stair(z: Array) -> Point:
+        value = 0.9 + 1e-5 * z[0]
+        return Point(z, np.array([value, value, 0.3]), np.array([[0.05, 0.0], [0.05, 0.0], [0.0, 0.5]]), {})
+
+    asked: list[Array] = []
+
+    def counted(z: Array) -> Point:
+        asked.append(z)
+        return stair(z)
+
+    found = fit(model_of(counted), NOISE, stair(np.zeros(2)), 100)
+    assert len(asked) < 15
+    assert found.objective <= objective(NOISE, stair(np.zeros(2)))
