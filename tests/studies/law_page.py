@@ -28,12 +28,6 @@ LINES: tuple[tuple[str, str, float | None, Callable[[Record], bool | None]], ...
     ("law", "nothing else is in the credible set", 0.5, quantity_alone),
     ("law", "held-out RMSE at most 1.25 times that with the true law", 0.7, near_truth),
     ("law", "the same with the most probable hypothesis added, law or not", None, told_near_truth),
-    (
-        "law",
-        "the same with a law, with the error of a probe of 0.01 m/s",
-        None,
-        lambda record: near_truth(record, 0.01),
-    ),
     ("nothing", "no law is written", 0.95, is_silent),
     ("listed", "no unlisted law is preferred", 0.95, is_silent),
 )
