@@ -82,7 +82,7 @@ faults: $(TESTABLE)  # every command killed at random moments, counted in docs/f
 	$(BIN)/python tests/kills.py $(KILLS)
 	$(BIN)/python tests/fault_table.py
 
-confluence: $(TESTABLE)  # the numbers of docs/confluence.md, from the published set in the folder DATA
+confluence: $(TESTABLE)  # the numbers of the confluence in docs/measured.md, from the published set in the folder DATA
 	$(BIN)/python tests/studies/confluence.py "$(DATA)" --jobs $(JOBS)
 
 measured: $(TESTABLE)  # the numbers of docs/measured.md, from copies of the published repositories in the folder DATA

@@ -198,7 +198,7 @@ def test_on_the_published_set_the_surveyed_bed_halves_the_error(tmp_path: Path) 
     a part of it is the hole that was dug there, 0.15 m deep.
 
     With the surveyed bed mixing 2 m downstream leads three readings side by side by 5 to 1, the odds by which it has to
-    lead: none of these is right, and cannot tell. What is true there nobody knows (docs/confluence.md).
+    lead: none of these is right, and cannot tell. What is true there nobody knows (docs/measured.md).
     """
     target = tmp_path / "confluence.yaml"
     import_command(PUBLISHED, target)

@@ -1,4 +1,4 @@
-"""The published confluence set through the whole loop, from a plane and from the surveyed bed: docs/confluence.md.
+"""The published confluence set through the whole loop, from a plane and from the surveyed bed: docs/measured.md.
 
 `make confluence DATA=folder`, the folder as R.B. Canelas published it. Nothing of it is kept but errors of the models.
 """
@@ -21,7 +21,7 @@ from vegglue.workflow.diagnose import diagnose
 from vegglue.workflow.extend import extend_stepwise
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "confluence.md"
+PAGE = ROOT / "docs" / "measured.md"
 BEGIN, END = "<!-- numbers by make confluence -->", "<!-- end of numbers -->"
 
 
@@ -111,7 +111,8 @@ def main() -> None:
     rows = climb(plane, "a plane", given.runs, given.jobs)
     rows += climb(surveyed, "the surveyed bed", given.runs, given.jobs)
     text = PAGE.read_text(encoding="utf-8")
-    before, after = text[: text.index(BEGIN) + len(BEGIN)], text[text.index(END) :]
+    begin = text.index(BEGIN) + len(BEGIN)
+    before, after = text[:begin], text[text.index(END, begin) :]
     PAGE.write_text(f"{before}\n\n{page(rows)}\n\n{after}", encoding="utf-8")
     print(f"Written to {PAGE.relative_to(ROOT)}")
 
