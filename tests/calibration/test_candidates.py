@@ -24,7 +24,7 @@ from vegglue.calibration.candidates import (
     with_effect,
 )
 from vegglue.case.schema import Case, EffectEntry, Observation, Parameter
-from vegglue.case.site_schema import FrictionClass, Plants, Value
+from vegglue.case.site_schema import FrictionClass, Plants, Value, Zone
 from vegglue.diagnosis.child_config import candidate_named, child_tree
 from vegglue.effects.library import SHIPPED, library
 from vegglue.errors import InputError
@@ -135,6 +135,21 @@ def test_what_cannot_be_is_no_candidate() -> None:
     of_plants = {one.name for one in SHIPPED if "plants" in one.needs}
     assert not of_plants & {one.effect.name for one in candidates_of(bare, STATION)}
     assert not {"gauge_datum", "gauge_head"} & {one.effect.name for one in candidates_of(CASE, without_gauges)}
+
+
+def test_a_shear_layer_needs_two_streams() -> None:
+    """On an even floor of one surface none grows; between two surfaces, or from an inflow of two speeds, one may."""
+
+    def grows(case: Case) -> bool:
+        return "growing_shear_layer" in {one.effect.name for one in candidates_of(case, STATION)}
+
+    bed = CASE.friction.classes[CASE.friction.default]
+    left = Zone.model_validate({"class": "grass", "y": (0.0, 1.5)})
+    friction = {"classes": {**CASE.friction.classes, "grass": bed}, "zones": (*CASE.friction.zones, left)}
+    two = CASE.model_copy(update={"friction": CASE.friction.model_copy(update=friction)})
+    assert not grows(CASE)
+    assert grows(two)
+    assert grows(case_with("inflow_skew", {}))
 
 
 def readings(*rows: tuple[str, str, float, float]) -> pd.DataFrame:

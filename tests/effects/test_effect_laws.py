@@ -182,7 +182,7 @@ ROWS = {
     ),
     "growing_shear_layer": (  # 2.25 m from the inflow, where 2 k = 0.1 1/m
         cells(u=shear, on=geometry(x=np.arange(1.0, 6.0)[:, None, None])),
-        {"spreading": 0.2},
+        {"spreading": 0.2, "rate": 0.05},
         {"viscosity": (0.07 * 0.2 * (1.0 - exp(-0.225)) / 0.1) ** 2 * 0.2},
     ),
     "wake_mixing": (

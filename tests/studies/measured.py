@@ -344,7 +344,7 @@ SETS = (
         f"{HYDROBAYES}: {COMPOUND}",
         compound_channel(2),
         "a shear layer with large eddies, cells of secondary current (Proust and Nikora 2020)",
-        ("coherent_structures",),
+        ("coherent_structures", "growing_shear_layer"),
         (
             "mixing_length",
             "smagorinsky",

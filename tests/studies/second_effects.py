@@ -176,6 +176,12 @@ def _eddies(s: State, coefficient: float, width: float, mean_depth: float) -> Fi
     return (coefficient * width) ** 2 * mean_depth / np.maximum(s.h, 0.2 * mean_depth) * shear(s)
 
 
+def _growing(s: State, spreading: float, rate: float) -> Field:
+    """van Prooijen and Uijttewaal (2002): a layer that widens from x = 0 on."""
+    width = spreading * (1.0 - np.exp(-2.0 * rate * s.lie.x)) / (2.0 * rate)
+    return (0.07 * width) ** 2 * shear(s)
+
+
 # Viscosity added [m2/s].
 MIXING: dict[str, Effect] = {
     "viscosity": lambda s, added: added + 0.0 * s.h,
@@ -184,6 +190,7 @@ MIXING: dict[str, Effect] = {
     "mixing_length": lambda s, length: length**2 * shear(s),
     "edge_mixing": _layer,
     "coherent_structures": _eddies,
+    "growing_shear_layer": _growing,
     "wake_mixing": lambda s, coefficient, length: coefficient * s.speed * np.exp(-s.lie.wake / length),
 }
 

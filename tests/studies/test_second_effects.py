@@ -14,8 +14,8 @@ from vegglue.workflow.hidden_effect import Hidden, candidate_of, case_hiding, tr
 
 # One of each kind: bed, inflow, plants, drag, mixing, momentum flux, force, instrument, and something in no list.
 SOME = (
-    "flank_scour", "inflow_skew", "canopy_deflection", "bank_vegetation", "edge_mixing", "elder", "secondary_current",
-    "panel_current", "partial_depth", "unlisted:fallen_tree",
+    "flank_scour", "inflow_skew", "canopy_deflection", "bank_vegetation", "edge_mixing", "elder", "growing_shear_layer",
+    "secondary_current", "panel_current", "partial_depth", "unlisted:fallen_tree",
 )  # fmt: skip
 
 

@@ -199,6 +199,9 @@ def chezy(case: Case, of: FrictionClass, coefficient: float, depth: float) -> fl
 
 # Share of a prior without bounds that lies beyond what counts as its end [-].
 TAIL = 1e-3
+# Share of the even ground under water from which on a floodplain, or a second surface, carries a stream of its own [-].
+# Chosen, not measured.
+LEAST_STREAM = 0.1
 # Cases whose scales are kept: one, its children and those of held-out experiments.
 SCALES_KEPT = 16
 _kept: OrderedDict[tuple[int, ...], tuple[tuple[object, ...], SiteScales]] = OrderedDict()
@@ -226,11 +229,13 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
 
 def _scales_of_site(case: Case, site: Site) -> SiteScales:
     depths, means, speeds, discharges = [], [], [], []
-    banks = beyond_floor(site)
+    banks, kinds = beyond_floor(site), np.zeros(2 * len(site.class_names))
     for name, experiment in case.experiments.items():
         here = in_experiment(site, name)
         of_cells = np.maximum(expected_depth(case, here, experiment), 0.0)
-        floor = np.where(beyond_floor(here), 0.0, of_cells)
+        beyond, even = beyond_floor(here), (_side_slope(here) <= BANK_SLOPE) & (of_cells > 0.0)
+        kinds += np.bincount((2 * here.friction_class + beyond)[even], minlength=kinds.size)
+        floor = np.where(beyond, 0.0, of_cells)
         wet = (of_cells > 0.0).sum(axis=1)
         area, columns = of_cells.sum(axis=1) * site.grid.dy, wet > 0
         on_floor = floor[floor > 0.0]
@@ -273,4 +278,5 @@ def _scales_of_site(case: Case, site: Site) -> SiteScales:
         patch_length=float(np.median(lengths)) if lengths else 2.0 * width,
         patch_width=float(np.median(widths)) if widths else width,
         banks=bool(banks.any()),
+        two_streams=bool(np.sort(kinds)[-2] >= LEAST_STREAM * max(kinds.sum(), 1.0)),
     )

@@ -30,10 +30,8 @@ Each = Literal["case", "experiment", "section", "device", "patch"]
 EACH: tuple[Each, ...] = ("case", "experiment", "section", "device", "patch")
 # What a site has to have for an effect to act there: wind, and water that seeps in, need a channel without walls of a
 # laboratory; partial sampling needs verticals that were sampled at too few heights; a layer that grows from the inflow
-# needs an inflow of two speeds, which an effect that distributes it gives.
-Need = Literal[
-    "open air", "open ground", "banks", "plants", "gauges", "few heights", "one surface", "distributed inflow"
-]
+# needs two streams side by side: an inflow of two speeds, which an effect that distributes it gives, or `SiteScales`.
+Need = Literal["open air", "open ground", "banks", "plants", "gauges", "few heights", "one surface", "two streams"]
 STAGES: tuple[Stage, ...] = ("site", "boundary", "plants", "resistance", "exchange", "force", "sensor")
 # What each stage returns, and whether an effect adds to it or takes its place.
 ADDED = {

@@ -18,8 +18,6 @@ CURRENTS_END = 1.5
 STILL = 0.1
 # Mixing length over the width of a shear layer [-] (van Prooijen et al. 2005).
 MIXING_OF_LAYER = 0.07
-# Least rate at which a difference of speeds fades [1/m]: below, over a thousand kilometres, none does.
-LEAST_RATE = 1e-6
 # a [-] at which b of `helical_flow` is held: the formula is for smoother beds.
 LARGEST_ROUGHNESS = 0.5
 
@@ -64,15 +62,27 @@ def coherent_structures(cells: Cells, coefficient: Array, width: Array, mean_dep
     return {"viscosity": coefficient**2 * width**2 * shallow * np.abs(cells.u_y)}
 
 
-def growing_shear_layer(cells: Cells, spreading: Array) -> dict[str, Array]:
-    """nu -> nu + (b d)^2 |du/dy|, d = s (1 - exp(-2 k x)) / (2 k), x the distance from the inflow, k that of the bed.
+def growing_shear_layer(cells: Cells, spreading: Array, rate: Array) -> dict[str, Array]:
+    """nu -> nu + (b d)^2 |du/dy|, d = s (1 - exp(-2 k x)) / (2 k), x the distance from the inflow.
 
-    A layer of width 0 at the inflow grows by s dx, until friction of the bed has used up the difference of speeds; s is
-    some 0.085 times that difference over the mean of both speeds.
+    A layer of width 0 at the inflow grows by s dx, until friction of the bed has used up the difference of speeds. Its
+    eddies reach into both streams: k is c_f / h of the whole section, not that of a cell.
+
+    Parameters
+    ----------
+    cells : Cells
+    spreading : (m,) [-]
+        growth s of its width, some 0.085 times the difference of both speeds over their mean.
+    rate : (m,) [1/m]
+        k, friction of the section over its depth.
+
+    Returns
+    -------
+    dict
+        `viscosity` (nx, ny, m) [m2/s].
     """
     along = cells.geometry.x - cells.geometry.x[0] + 0.5 * cells.geometry.dx
-    rate = np.maximum(2.0 * cells.bed_rate, LEAST_RATE)
-    width = spreading * -np.expm1(-rate * along) / rate
+    width = spreading * -np.expm1(-2.0 * rate * along) / (2.0 * rate)
     return {"viscosity": (MIXING_OF_LAYER * width) ** 2 * np.abs(cells.u_y)}
 
 
@@ -218,7 +228,7 @@ EFFECTS = (
     Effect(
         name="growing_shear_layer",
         stage="exchange",
-        title="A shear layer that grows from the inflow: water of two speeds meets where it enters",
+        title="A shear layer that grows from the inflow, between fast and slow water side by side",
         equation="nu -> nu + (0.07 d)^2 |du/dy|, d = s (1 - exp(-2 k x))/(2 k), x the distance from the inflow",
         act=growing_shear_layer,
         amplitude=Amplitude(
@@ -231,9 +241,10 @@ EFFECTS = (
             power=2,
             basis="0.085 of its source for speeds that differ by their mean, to one digit up",
         ),
+        shapes=(Shape("rate", "1/m", "c_f / h of the section k", 1.0, 0.05, 20.0, (0.5, 1.0, 2.0), "friction"),),
         source="after van Prooijen and Uijttewaal (2002)",
         doi="10.1063/1.1514660",
-        needs=("distributed inflow",),
+        needs=("two streams",),
     ),
     Effect(
         name="wake_mixing",

@@ -42,6 +42,8 @@ class SiteScales:
         Of the patches along and across [m], the medians; of the floor without any.
     banks
         Whether cells lie beyond the toe of banks.
+    two_streams
+        Whether even ground under water is of two kinds: floor and floodplain, or two surfaces.
     """
 
     depth: float
@@ -56,6 +58,7 @@ class SiteScales:
     patch_length: float
     patch_width: float
     banks: bool = True
+    two_streams: bool = False
 
     def of(self, name: str) -> float:
         """A scale by the name that `of` of an amplitude or a shape gives, in its unit; those that are made of others:
