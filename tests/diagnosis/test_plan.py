@@ -182,8 +182,8 @@ def test_a_set_is_worth_at_least_what_equally_spaced_transects_are(model: Model,
     assert [len(some) for some in x] == list(range(1, len(x) + 1))
     assert x[1] == pytest.approx(np.array([1, 2]) * model.case.grid.x[1] / 3.0, abs=1.0)
     assert all(search.worth(chosen) >= search.worth(some) for some in spaced)
-    squares = search.with_each(search.base, [(j,) for j in chosen])
-    alone = [[one.squares for one in search.with_pieces([j])] for j in chosen]
+    squares = search.with_each([(j,) for j in chosen])
+    alone = [search.base.made(search.rows_of([j])).squares for j in chosen]
     assert squares == pytest.approx(np.moveaxis(np.array(alone), 1, 0))
 
 

@@ -167,8 +167,8 @@ def own_and_shared(own_variance: Array, shared: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class PossibleMeasurements:
-    """Measurements at some places, given those that are made: squares (c,) of |S_perp| of those that are made;
-    nuisances (N, q) and traces (N, c) of each, over its own error.
+    """Measurements at some places, given those that are made: squares (..., c) of |S_perp| of those that are made;
+    nuisances (..., N, q) and traces (..., N, c) of each, over its own error.
     """
 
     squares: Array
@@ -177,32 +177,41 @@ class PossibleMeasurements:
 
     @property
     def lengths(self) -> Array:
-        """|S_perp| of each trace (c,) [standard errors per unit of gain]."""
+        """|S_perp| of each trace (..., c) [standard errors per unit of gain]."""
         return np.asarray(np.sqrt(np.maximum(self.squares, 0.0)))
 
-    def made(self, rows: np.ndarray) -> "PossibleMeasurements":
-        """With some of them made, by the singular values of their nuisances: a product for each of them."""
-        left, strength, right = np.linalg.svd(self.nuisances[rows], full_matrices=False)
-        of_traces, shrunk = self.traces[rows], 1.0 / (1.0 + strength**2)
-        mixed, along = left.T @ of_traces, self.nuisances @ right.T
-        squares = (of_traces**2).sum(axis=0) - (strength**2 * shrunk) @ mixed**2
+    def made(self, rows: np.ndarray, kept: np.ndarray | None = None) -> "PossibleMeasurements":
+        """Those that are kept, all if None, with some of them made, by K = N_r N_r' = V k V' of their nuisances:
+
+            N - N N_r' V f V' N_r,   S - N N_r' (1 + K)^-1 S_r,   f = [1 - (1 + k)^(-1/2)] / k
+        """
+        of_errors, of_traces = self.nuisances[..., rows, :], self.traces[..., rows, :]
+        nuisances, traces = (
+            (self.nuisances, self.traces) if kept is None else (self.nuisances[..., kept, :], self.traces[..., kept, :])
+        )
+        between = nuisances @ of_errors.swapaxes(-1, -2)
+        strength, vectors = np.linalg.eigh(of_errors @ of_errors.swapaxes(-1, -2))
+        root = np.sqrt(1.0 + np.maximum(strength, 0.0))[..., None]
+        back = vectors.swapaxes(-1, -2)
+        mixed = back @ of_traces / root
         return PossibleMeasurements(
-            self.squares + squares,
-            self.nuisances - (along * (1.0 - np.sqrt(shrunk))) @ right,
-            self.traces - along @ ((strength * shrunk)[:, None] * mixed),
+            self.squares + (mixed**2).sum(axis=-2),
+            nuisances - between @ (vectors @ (back @ of_errors / (root * (1.0 + root)))),
+            traces - between @ (vectors @ (mixed / root)),
         )
 
     def with_each(self, pieces: np.ndarray) -> Array:
-        """Squares of |S_perp| with one of some pieces made, each of as many measurements: rows (m, n); (m, c)."""
-        of_errors, of_traces = self.nuisances[pieces], self.traces[pieces]
-        covariance = of_errors @ of_errors.swapaxes(1, 2) + np.eye(pieces.shape[1])
-        return np.asarray(self.squares + (of_traces * np.linalg.solve(covariance, of_traces)).sum(axis=1))
+        """Squares of |S_perp| with one of some pieces made, each of as many measurements: rows (m, n); (..., m, c)."""
+        of_errors, of_traces = self.nuisances[..., pieces, :], self.traces[..., pieces, :]
+        covariance = of_errors @ of_errors.swapaxes(-1, -2) + np.eye(pieces.shape[1])
+        return np.asarray(self.squares[..., None, :] + (of_traces * np.linalg.solve(covariance, of_traces)).sum(axis=-2))
 
 
 def possible_measurements(own_variance: Array, nuisances: Array, traces: Array) -> PossibleMeasurements:
-    """None of them made: own_variance (N,), nuisances (N, q) and traces (N, c) in the unit of a station."""
-    error = np.sqrt(own_variance)[:, None]
-    return PossibleMeasurements(np.zeros(traces.shape[1]), nuisances / error, traces / error)
+    """None of them made: own_variance (..., N), nuisances (..., N, q) and traces (..., N, c) in the unit of a station."""
+    error = np.sqrt(own_variance)[..., None]
+    nothing = np.zeros((*traces.shape[:-2], traces.shape[-1]))
+    return PossibleMeasurements(nothing, nuisances / error, traces / error)
 
 
 def trace_lengths(own_variance: Array, nuisances: Array, traces: Array) -> Array:

@@ -27,7 +27,7 @@ from vegglue.case.schema import Planned
 from vegglue.compilation import compiled
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import tempering
-from vegglue.diagnosis.plan_model import PlanDraw, PlanModel, bending_of, place_along, ratios_of_lengths
+from vegglue.diagnosis.plan_model import PlanModel, bending_of, place_along, ratios_of_lengths
 from vegglue.effects.definition import Amplitude
 from vegglue.measurements.kinds import STREAMWISE
 from vegglue.measurements.observations import section_places
@@ -205,13 +205,6 @@ LEAST_PLAN_GAIN = 1e-3
 # counts, and a share of the answer. Chosen: with 1 to 8, and 0.1 to 1, sets of the sites of docs/plan.md are as good.
 NEARLY_TESTABLE, SHARE_OF_ANSWER = 4.0, 0.3
 
-# The measurements that are possible at each draw of the priors.
-AtDraws = tuple[PossibleMeasurements, ...]
-
-
-def _squares(known: AtDraws) -> Array:
-    return np.array([one.squares for one in known])
-
 
 @dataclass(frozen=True)
 class PlanAnswer:
@@ -316,19 +309,19 @@ class PlanSearch:
     present, another
         Flows that are measured in anyhow, and hours of another one [h].
     base
-        Given the plan as it is.
+        Given the plan as it is, at each draw of the priors (draw, ...).
     """
 
     wide: PlanModel
     criterion: DesignCriterion
     present: frozenset[str]
     another: float
-    base: AtDraws
+    base: PossibleMeasurements
 
     @cached_property
     def start(self) -> PlanAnswer:
         """The answer without a further piece."""
-        return self.criterion.answer(self.criterion.sizes(_squares(self.base)))
+        return self.criterion.answer(self.criterion.sizes(self.base.squares))
 
     @cached_property
     def sections(self) -> frozenset[float]:
@@ -339,26 +332,15 @@ class PlanSearch:
 
     def worth(self, pieces: Sequence[int]) -> float:
         """What is maximised, with some pieces added."""
-        return float(self.criterion.worths(self.with_each(self.base, [pieces]))[0])
+        return float(self.criterion.worths(self.with_each([pieces]))[0])
 
-    def with_pieces(self, pieces: Sequence[int]) -> AtDraws:
-        """Given the plan and some pieces more, at each draw."""
-        rows = np.concatenate([np.zeros(0, dtype=int), *(self.wide.rows[j] for j in pieces)])
-        return tuple(one.made(rows) for one in self.base)
+    def rows_of(self, pieces: Sequence[int]) -> np.ndarray:
+        """Of the stations and bed levels of some pieces."""
+        return np.concatenate([np.zeros(0, dtype=int), *(self.wide.rows[j] for j in pieces)])
 
-    def with_each(self, known: AtDraws, moves: Sequence[Sequence[int]]) -> Array:
+    def with_each(self, moves: Sequence[Sequence[int]]) -> Array:
         """Squares of lengths with one of some moves made (draw, move, c)."""
-        rows = [np.concatenate([np.zeros(0, dtype=int), *(self.wide.rows[j] for j in move)]) for move in moves]
-        numbers = {some.size for some in rows}
-        alike = [[k for k, some in enumerate(rows) if some.size == number] for number in sorted(numbers)]
-
-        def of_draw(one: PossibleMeasurements) -> Array:
-            found = np.empty((len(moves), one.squares.size))
-            for which in alike:
-                found[which] = one.with_each(np.array([rows[k] for k in which]))
-            return found
-
-        return np.array([of_draw(one) for one in known])
+        return _with_each(self.base, [self.rows_of(move) for move in moves])
 
     def hours(self, pieces: Sequence[int], present: frozenset[str]) -> float:
         """Of some pieces together, beside flows that are measured in anyhow."""
@@ -387,7 +369,7 @@ class PlanSearch:
         found = []
         moves = self.moves()
         # A flow that the case does not have is known in the middle of the priors: elsewhere traces keep their ratio.
-        size = self.criterion.sizes(self.with_each(self.base, moves))
+        size = self.criterion.sizes(self.with_each(moves))
         for k, move in enumerate(moves):
             after = self.criterion.answer(size[:, k])
             if after.mean - self.start.mean > LEAST_PLAN_GAIN:
@@ -404,7 +386,7 @@ class PlanSearch:
     def extended(self, budget: float) -> ProposedPieces | None:
         """The best set to add for so many hours; None if nothing fits."""
         chosen = self.best_set(budget)
-        after = self.criterion.answer(self.criterion.sizes(self.with_each(self.base, [chosen])[:, 0]))
+        after = self.criterion.answer(self.criterion.sizes(self.with_each([chosen])[:, 0]))
         return self._proposed(chosen, after) if chosen else None
 
     def best_set(self, budget: float) -> list[int]:
@@ -412,8 +394,8 @@ class PlanSearch:
         best, flows = self._best_in(budget, self.present), self.present
         while True:
             others = [flows | {one} for one in self.wide.case.experiments if one not in flows]
-            sets = [(self._best_in(budget, more), more) for more in others]
-            found, more = max(sets, key=lambda one: self.worth(one[0]), default=(best, flows))
+            sets = in_threads(self._best_in, [(budget, more) for more in others])
+            found, more = max(zip(sets, others, strict=True), key=lambda one: self.worth(one[0]), default=(best, flows))
             if self.worth(found) <= self.worth(best) + LEAST_PLAN_GAIN:
                 return self._exchanged(budget, best, flows)
             best, flows = found, more
@@ -459,24 +441,34 @@ class PlanSearch:
 
     def _filled(self, budget: float, chosen: list[int], flows: Flows[str]) -> list[int]:
         """More pieces in some flows, or of none, by gain per hour."""
-        pieces = self.wide.pieces
-        known = self.with_pieces(chosen)
+        pieces, left = self.wide.pieces, self._left(budget, chosen, flows)
+        # A flow that the case does not have cannot be ordered: it is shown, and not planned.
+        possible = [j for j, one in enumerate(pieces) if one.hours <= left and not one.new
+                    and one.experiment in {*flows, ""}]  # fmt: skip
+        kept = np.unique(self.rows_of(possible))
+        rows = {j: np.searchsorted(kept, self.wide.rows[j]) for j in possible}
+        known = self.base.made(self.rows_of(chosen), kept)
         while True:
             left, taken = self._left(budget, chosen, flows), {pieces[j].place for j in chosen}
-            # A flow that the case does not have cannot be ordered: it is shown, and not planned.
-            possible = [j for j, one in enumerate(pieces) if one.hours <= left and not one.new
-                        and one.experiment in {*flows, ""} and one.place not in taken]  # fmt: skip
+            possible = [j for j in possible if pieces[j].hours <= left and pieces[j].place not in taken]
             if not possible:
                 return chosen
-            now = float(self.criterion.worths(_squares(known)))
-            gain = self.criterion.worths(self.with_each(known, [(j,) for j in possible])) - now
+            now = float(self.criterion.worths(known.squares))
+            gain = self.criterion.worths(_with_each(known, [rows[j] for j in possible])) - now
             rate = gain / np.array([pieces[j].hours for j in possible])
-            best = int(np.argmax(rate))
-            if rate[best] <= LEAST_PLAN_GAIN / budget:
+            best = possible[int(np.argmax(rate))]
+            if rate.max() <= LEAST_PLAN_GAIN / budget:
                 return chosen
-            chosen = [*chosen, possible[best]]
-            rows = self.wide.rows[possible[best]]
-            known = tuple(one.made(rows) for one in known)
+            chosen, known = [*chosen, best], known.made(rows[best])
+
+
+def _with_each(known: PossibleMeasurements, rows: Sequence[np.ndarray]) -> Array:
+    """Squares of lengths with the measurements of one of some rows made (draw, move, c)."""
+    found = np.empty((len(known.squares), len(rows), known.squares.shape[1]))
+    for number in sorted({some.size for some in rows}):
+        which = [k for k, some in enumerate(rows) if some.size == number]
+        found[:, which] = known.with_each(np.array([rows[k] for k in which]))
+    return found
 
 
 def plan_search(
@@ -494,18 +486,16 @@ def plan_search(
     amplitudes = tuple(wide.candidates[j].amplitude for j in kept)
     bending = bending_of(wide)[kept]
     gains = np.array([one.plausible_gain for one in amplitudes]) / (1.0 + bending)
-    measured = np.concatenate([wide.known, wide.surveyed])
-
-    def at(draw: PlanDraw) -> PossibleMeasurements:
-        traces = draw.values[:, kept] * gains
-        if isinstance(question, TwoEffects):
-            traces = np.column_stack([traces, traces.sum(axis=1)])
-        return possible_measurements(*draw.errors, traces).made(measured)
-
+    traces = np.array([draw.values[:, kept] * gains for draw in wide.draws])
+    if isinstance(question, TwoEffects):
+        traces = np.concatenate([traces, traces.sum(axis=2, keepdims=True)], axis=2)
+    most = max(draw.errors[1].shape[1] for draw in wide.draws)
+    nuisances = np.array([np.pad(draw.errors[1], ((0, 0), (0, most - draw.errors[1].shape[1]))) for draw in wide.draws])
+    none = possible_measurements(np.array([draw.errors[0] for draw in wide.draws]), nuisances, traces)
     return PlanSearch(
         wide=wide,
         criterion=DesignCriterion(question, len(wide.candidates), level, amplitudes, beyond[kept], bending),
         present=present,
         another=planned.costs.discharge,
-        base=tuple(in_threads(at, [(draw,) for draw in wide.draws])),
+        base=none.made(np.concatenate([wide.known, wide.surveyed])),
     )
