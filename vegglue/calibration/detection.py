@@ -181,9 +181,9 @@ class PossibleMeasurements:
         return np.asarray(np.sqrt(np.maximum(self.squares, 0.0)))
 
     def made(self, rows: np.ndarray, kept: np.ndarray | None = None) -> "PossibleMeasurements":
-        """Those that are kept, all if None, with some of them made, by K = N_r N_r' = V k V' of their nuisances:
+        """Those that are kept, all if None, with some of them made, by K = N_r N_r' = V k V' of their nuisances.
 
-            N - N N_r' V f V' N_r,   S - N N_r' (1 + K)^-1 S_r,   f = [1 - (1 + k)^(-1/2)] / k
+        N - N N_r' V f V' N_r,   S - N N_r' (1 + K)^-1 S_r,   f = [1 - (1 + k)^(-1/2)] / k
         """
         of_errors, of_traces = self.nuisances[..., rows, :], self.traces[..., rows, :]
         nuisances, traces = (
@@ -204,11 +204,12 @@ class PossibleMeasurements:
         """Squares of |S_perp| with one of some pieces made, each of as many measurements: rows (m, n); (..., m, c)."""
         of_errors, of_traces = self.nuisances[..., pieces, :], self.traces[..., pieces, :]
         covariance = of_errors @ of_errors.swapaxes(-1, -2) + np.eye(pieces.shape[1])
-        return np.asarray(self.squares[..., None, :] + (of_traces * np.linalg.solve(covariance, of_traces)).sum(axis=-2))
+        added = (of_traces * np.linalg.solve(covariance, of_traces)).sum(axis=-2)
+        return np.asarray(self.squares[..., None, :] + added)
 
 
 def possible_measurements(own_variance: Array, nuisances: Array, traces: Array) -> PossibleMeasurements:
-    """None of them made: own_variance (..., N), nuisances (..., N, q) and traces (..., N, c) in the unit of a station."""
+    """None of them made: own_variance (..., N), nuisances (..., N, q), traces (..., N, c) in the unit of a station."""
     error = np.sqrt(own_variance)[..., None]
     nothing = np.zeros((*traces.shape[:-2], traces.shape[-1]))
     return PossibleMeasurements(nothing, nuisances / error, traces / error)
