@@ -135,13 +135,12 @@ def _data_limits(
         some = sorted(lengths.values())
         parts.append(
             f"An object sized to 6 s.e. in the model has a signal of {some[0]:.1f} to {some[-1]:.1f} s.e. in the "
-            f"second solver (median {float(np.median(some)):.1f} of {len(some)}; `tests/studies/blind_lengths.py`)."
+            f"second solver (median {float(np.median(some)):.1f} of {len(some)})."
         )
     if limits:
         parts.append(
             f"In a model that is right but for an object of known kind and width, the most probable place lies within "
-            f"1.5 m in {percent(float(np.mean(list(limits.values()))))} of draws of the errors ({len(limits)} objects; "
-            "`tests/studies/place_limits.py`)."
+            f"1.5 m in {percent(float(np.mean(list(limits.values()))))} of draws of the errors ({len(limits)} objects)."
         )
     groups = {
         group: [one for key, one in ideal.items() if f"/{group}/" in key]
@@ -155,14 +154,15 @@ def _data_limits(
         parts.append(
             f"If the kind is unknown and all hypotheses compete to first order by the rules of a diagnosis, "
             f"`none-of-these` is reported for {mean('told')} of {len(groups['unlisted'])} objects and a local anomaly "
-            f"within 1.5 m for {mean('near')} (`tests/studies/object_limits.py`). Reporting an anomaly at even odds "
-            f"would give {mean('evenly')}, but also `none-of-these` for {mean('evenly', 'listed6')} of listed effects "
+            f"within 1.5 m for {mean('near')}. Reporting an anomaly at even odds would "
+            f"give {mean('evenly')}, but also `none-of-these` for {mean('evenly', 'listed6')} of listed effects "
             f"of 6 s.e. and {mean('evenly', 'listed3')} of 3 s.e., instead of {mean('told', 'listed6')} and "
             f"{mean('told', 'listed3')}."
         )
     if not parts:
         return ""
-    return fill("- **What the data allow at most.** " + " ".join(parts), WIDTH, subsequent_indent="  ")
+    heading = "- **What the data allow at most** (`blind_lengths.py`, `place_limits.py` and `object_limits.py`). "
+    return fill(heading + " ".join(parts), WIDTH, subsequent_indent="  ")
 
 
 PAGE = """# How often the diagnosis is right
