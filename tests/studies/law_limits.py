@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,9 @@ from law_answers import Record, Said, causes, is_true
 
 # Ways to weigh in records of `law_angles`, and in words.
 WAYS = {
-    "as it is": "a model that is right but for the law, weighted as by `discover`",
-    "whole evidence": "the same, without an error of the fingerprints",
-    "true law tried": "the same, with the hidden law itself among the candidates",
+    "as it is": "with a model that is right but for the law",
+    "whole evidence": "without an error of the fingerprints",
+    "true law tried": "if the hidden law itself is among the candidates, too",
 }
 # Ends of the bins of the chance of the likeliest quantity [-].
 BINS = (0.0, 0.6, 0.8, 0.95, 1.0)
@@ -21,12 +22,15 @@ BINS = (0.0, 0.6, 0.8, 0.95, 1.0)
 def told_at_most(made: Sequence[Record], angles: Sequence[Mapping[str, Any]]) -> str:
     """Shares in the set and alone for each way to weigh, of the laws that were hidden, each as often as it was."""
     hidden = [record["hide"] for record in made if record["group"] == "law"]
-    rows = []
+    told = []
     for way, words in WAYS.items():
         found = [[one for one in angles if one["hide"] == name] for name in hidden]
         shares = [np.mean([_mean(some, way, what) for some in found if some]) for what in ("in set", "alone")]
-        rows.append(f"| {words} | {' | '.join(f'{100 * share:.0f} %' for share in shares)} |")
-    return "\n".join(rows)
+        told.append(f"{100 * shares[0]:.0f} % and {100 * shares[1]:.0f} % {words}")
+    return fill(
+        "At most, to first order, the right quantity is in the credible set, and alone in it, in "
+        f"{'; '.join(told)} (`tests/studies/law_angles.py`).", 120, break_on_hyphens=False
+    )  # fmt: skip
 
 
 def chance_lines(made: Sequence[Record]) -> str:

@@ -73,9 +73,5 @@ planned; {left_out} were left out, mostly as no plausible size is visible. A sea
 |---|---:|---:|---:|
 {chances}
 
-What the data allow at most, to first order (`tests/studies/law_angles.py`):
-
-| | right quantity in the credible set | alone |
-|---|---:|---:|
 {at_most}
 """
