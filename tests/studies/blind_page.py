@@ -72,7 +72,7 @@ def wanted_of(line: Line) -> str:
 def _table(records: Sequence[Record], told: Sequence[Told]) -> str:
     """Every line that has data, beside all the field campaign if it has more than a few."""
     campaign = [one for one in records if one["case"] == "campaign"]
-    rows = ["| | target | data sets | share (95 % interval) | field campaign only |", "|---|---|---:|---:|---:|"]
+    rows = ["| | target | data sets | share (95 % interval); of the field campaign alone |", "|---|---|---:|---:|"]
     for line in LINES:
         good, size = counts(records, line)
         if not size:
@@ -82,15 +82,15 @@ def _table(records: Sequence[Record], told: Sequence[Told]) -> str:
         answer = "**missed**" if not reached else "met" if size >= FEW_SETS else "too few"
         target = "-" if reached is None else f"{wanted_of(line)}, {answer}"
         there, of = counts(campaign, line)
-        beside = f"{percent(there / of)} of {of}" if of >= FEW_SETS else "-"
+        beside = f"; {percent(there / of)} of {of}" if of >= FEW_SETS else ""
         share = f"{percent(good / size)} ({100 * low:.0f} to {100 * high:.0f})"
-        rows.append(f"| {line.label} | {target} | {size} | {share} | {beside} |")
+        rows.append(f"| {line.label} | {target} | {size} | {share}{beside} |")
     if told:
         away = distance(told)
         rows.append(
             f"| Stated probabilities: distance from the true share | at most {100 * DISTANCE:.0f} points, "
             f"{'met' if away <= DISTANCE else '**missed**'} | {sum(one.count for one in told)} hypotheses | "
-            f"{100 * away:.1f} points ({100 * distance_by_chance(told):.1f} if all were right) | - |"
+            f"{100 * away:.1f} points ({100 * distance_by_chance(told):.1f} if all were right) |"
         )
     return "\n".join(rows)
 

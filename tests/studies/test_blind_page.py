@@ -296,7 +296,7 @@ def test_the_page_has_the_numbers_of_its_records(tmp_path: Path) -> None:
     ]  # fmt: skip
     write_page(records, tmp_path, {"pier0": 5.0}, {"pier0": 0.9, "pier1": 0.7}, {})
     page = (tmp_path / "blind.md").read_text(encoding="utf-8")
-    row = "Listed effect, 6 s.e.: in the credible set | at least 90 %, **missed** | 5 | 80 % (28 to 99) | -"
+    row = "Listed effect, 6 s.e.: in the credible set | at least 90 %, **missed** | 5 | 80 % (28 to 99)"
     assert f"| {row} |" in page, "one data set of the campaign makes no share"
     assert "3 s.e.: in the credible set" not in page, "lines without data are left out"
     assert "`sun`" not in page
