@@ -25,7 +25,7 @@ from vegglue.case.grid import Grid
 from vegglue.case.gridded_site import build_site
 from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
-from vegglue.case.site_schema import FrictionClass
+from vegglue.case.site_schema import FrictionClass, Inflow
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, linearise
 
@@ -342,6 +342,10 @@ def test_a_probe_within_a_cell_of_a_wall_errs_by_the_profile_over_it() -> None:
     beside_it = np.arange(len(model.station)) == 3
     station = model.station.assign(y=np.where(beside_it, south + 0.4 * width, model.station["y"]))
     cells = cell_responses(model, point, ("friction",))
+    here = float(station["x"][3])
+    brook = Inflow(side="south", range=(here - 1.0, here + 1.0))
+    with_brook = between.model_copy(update={"inflows": {**between.inflows, "brook": brook}})
+    assert not beside_walls(replace(model, case=with_brook, station=station)).any(), "no wall where water enters"
     for case, beside in ((between, [3]), (model.case, [])):
         there = replace(model, case=case, station=station)
         assert np.flatnonzero(beside_walls(there)).tolist() == beside

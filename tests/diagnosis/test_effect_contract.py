@@ -14,7 +14,7 @@ from vegglue.effects.library import SHIPPED, library
 from vegglue.flow.march import march
 from vegglue.flow.newton import newton
 from vegglue.flow.problem import ALONG, take
-from vegglue.flow.problem_setup import build_problem
+from vegglue.flow.problem_setup import build_problem, share_under_water
 from vegglue.flow.starts import backwater
 
 # Weather and the turn of the earth are as large at every site.
@@ -39,6 +39,16 @@ def test_no_effect_holds_a_length_or_a_speed_of_its_own():
                     continue
                 size = then.scale / here.scale if isinstance(here, Amplitude) else then.default / here.default
                 assert size == pytest.approx(scale ** powers[here.unit], rel=0.12), (effect.name, here.name)
+
+
+def test_water_enters_at_the_same_share_of_the_depth_at_three_scales():
+    """From 0.2 m of depth on, as it was, all of it entered in no cell of a flume."""
+    shares = []
+    for scale in CHANNEL_SCALES.values():
+        there = trial(SHIPPED[0], scale=scale)
+        shares.append(share_under_water(there.case, there.site, there.case.experiments["flow"]))
+    assert shares[0].max() == 1.0
+    assert all(share == pytest.approx(shares[0], abs=1e-6) for share in shares)
 
 
 def test_the_library_covers_all_stages():

@@ -42,6 +42,7 @@ from vegglue.case.channel_geometry import half_width, patches_present
 from vegglue.case.grid import Grid
 from vegglue.case.parameter_space import theta_at
 from vegglue.case.schema import Case, EffectEntry, ModelError, Parameter
+from vegglue.case.zones import centres_within
 from vegglue.decision_constants import constants
 from vegglue.effects.physical_constants import KARMAN
 from vegglue.engine.interface import Cause, Model, Point, responses, responses_to_cells
@@ -290,10 +291,15 @@ def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: C
 
 
 def beside_walls(model: Model) -> Mask:
-    """Which stations (n,) lie within a cell of a wall."""
-    (south, north), width, y = model.case.grid.y, model.case.grid.cell[1], model.station["y"].to_numpy(float)
-    near = np.minimum(np.abs(y - south), np.abs(north - y)) <= width
-    return np.asarray(near & (model.case.friction.walls is not None))
+    """Which stations (n,) lie within a cell of a wall; where water enters through a side there is none."""
+    width, (x, y) = model.case.grid.cell[1], model.station[["x", "y"]].to_numpy(float).T
+    beside = np.zeros(y.size, dtype=bool)
+    for side, end in zip(("south", "north"), model.case.grid.y, strict=True):
+        near = np.abs(y - end) <= width
+        for inflow in (one for one in model.case.inflows.values() if one.side == side):
+            near &= ~centres_within(inflow.range, x)
+        beside |= near
+    return beside & (model.case.friction.walls is not None)
 
 
 def _cause(case: Case, effect: str, *experiments: str) -> Cause:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vegglue.arrays import Array
 from vegglue.case.case_effects import Theta, active_effects, value_of
-from vegglue.case.channel_geometry import channel_geometry, expected_depth, patches_present
+from vegglue.case.channel_geometry import channel_geometry, expected_depth, patches_present, site_scales
 from vegglue.case.grid import Grid, cell_stretch, curvature_of
 from vegglue.case.gridded_site import Site, in_experiment, rims
 from vegglue.case.schema import Case, Experiment
@@ -30,7 +30,8 @@ from vegglue.flow.problem import (
     VegetatedCells,
 )
 
-# Depth [m] from which on all of what enters somewhere does so; less of it where it is shallower. Chosen, not measured.
+# Depth over that on the floor [-] from which on all of what enters somewhere does so; less of it where it is shallower.
+# Chosen, not measured.
 WHERE_WATER_ENTERS = 0.2
 # Rise of the bed between two rows over their distance [-] from which it is a step with a wall, between walls: chosen as
 # what no bank of earth has, after the compound channel A2 of docs/measured.md.
@@ -179,9 +180,9 @@ def _site_changes(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry, 
 
 def share_under_water(case: Case, site: Site, setting: Experiment) -> Array:
     """How much of what enters somewhere does so in each cell, (nx, ny) [-]: 1 in water expected to be deeper than
-    WHERE_WATER_ENTERS, 0 on land, over which it would have no steady way down.
+    WHERE_WATER_ENTERS of that on the floor, 0 on land, over which it would have no steady way down.
     """
-    return np.clip(expected_depth(case, site, setting) / WHERE_WATER_ENTERS, 0.0, 1.0)
+    return np.clip(expected_depth(case, site, setting) / (WHERE_WATER_ENTERS * site_scales(case, site).depth), 0.0, 1.0)
 
 
 def bend_of(grid: Grid) -> Bend | None:
