@@ -260,9 +260,8 @@ A hanging worker cannot be distinguished from a slow one: the command waits. Sto
 
 ## Damaged files from others
 
-`import` reads such a file and counts what it leaves out, or refuses it with exit code 2 and writes nothing. See also [how
-tables are read](own_files.md#how-tables-are-read) and [invalid predictions](own_engine.md#invalid-predictions) of a
-command.
+`import` reads such a file and counts what it leaves out, or refuses it with exit code 2 and writes nothing. See also
+[how tables are read](own_files.md#how-tables-are-read) and [invalid predictions](own_engine.md#invalid-predictions).
 
 - **Left out**: values marked as missing, with their row or cell; codes of gauging offices (Ice, Eqp, -999999); raw
   ensembles of a boat with a wrong checksum or size, cut short, or without bottom track or ranges.
@@ -284,7 +283,7 @@ with h5py.File("runs/brook/ensemble.h5.part") as file:
     solved = members["status"][:] >= 0
     print(solved.sum(), "of", solved.size, "members", members["prediction"][:][solved].mean(axis=0))
 ```
-"""  # noqa: E501  (rows of tables)
+"""
 
 
 def main() -> None:
