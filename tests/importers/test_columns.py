@@ -76,7 +76,9 @@ def test_words_in_round_brackets_are_no_units(tmp_path: Path, heading: str) -> N
 @pytest.mark.parametrize(
     ("heading", "quantity", "unit"),
     [
-        ("x (US survey feet)", "length", "ft"), ("level (ft, NAVD88)", "length", "ft"),
+        ("x (US survey feet)", "length", "us-ft"), ("level (ft, NAVD88)", "length", "ft"),
+        ("Easting (ftUS)", "length", "us-ft"), ("N (US ft, NAD83)", "length", "us-ft"), ("x (sft)", "length", "us-ft"),
+        ("x_ft", "length", "ft"), ("x (ift)", "length", "ft"),
         ("Q (gpm)", "discharge", "gal/min"),
         ("WL (above datum, in cm)", "length", "cm"), ("direction (gon)", "angle", "gon"),
         ("x (in the channel)", "length", None),
@@ -84,6 +86,40 @@ def test_words_in_round_brackets_are_no_units(tmp_path: Path, heading: str) -> N
 )  # fmt: skip
 def test_a_unit_is_known_among_other_words(heading: str, quantity: str, unit: str | None) -> None:
     assert unit_stated(heading, quantity) == unit
+
+
+def test_a_foot_of_the_survey_is_longer(tmp_path: Path) -> None:
+    """`ftUS` was no unit, and a map in State Plane feet was read as one in metres."""
+    taken = rows_of(tmp_path, "Easting (ftUS),Northing (ft),V\n2000000,500000,0.4\n2000030,500010,0.5\n")
+    assert taken.numbers["x"].tolist() == pytest.approx([609601.2192, 609610.3632], abs=1e-4)
+    assert taken.numbers["y"].tolist() == pytest.approx([152400.0, 152403.048], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("table", "row", "roles"),
+    [
+        ("# velocities in cm/s\nx,y,u\n8,0,40\n9,0,41\n", 1, ["u"]),
+        ("Survey of June\nUnit: ft\n\nx,y,level\n8,0,3.1\n9,0,3.2\n", 2, ["x", "y", "level"]),
+        ("Place;;Velocity (cm/s)\nx [m];y [m];u\n8;0;40\n9;0;41\n", 1, ["u"]),
+        ("m;m;mm/s\nx;y;u\n8;0;400\n9;0;410\n", 1, ["u"]),
+        ("x [m],y [m],level,unit\n8,0,3.1,ft\n9,0,3.2,ft\n", 2, ["level"]),
+    ],
+)
+def test_a_unit_beside_the_headings_is_refused_until_it_is_stated(
+    tmp_path: Path, table: str, row: int, roles: list[str]
+) -> None:
+    with pytest.raises(InputError) as refused:
+        rows_of(tmp_path, table)
+    assert (refused.value.kind, refused.value.values["row"], refused.value.values["roles"]) == (
+        "unit_elsewhere", row, roles,
+    )  # fmt: skip
+    units = {role: "cm/s" if role == "u" else "ft" for role in roles}
+    assert rows_of(tmp_path, table, units=units).units == {"x": "m", "y": "m"} | units
+
+
+@pytest.mark.parametrize("line", ["# propeller of 5 cm, 40 s each", "Rhine at km 12.3", "# u in m/s", "in June"])
+def test_a_value_in_a_title_is_no_unit(tmp_path: Path, line: str) -> None:
+    assert rows_of(tmp_path, f"{line}\nx,y,u\n8,0,0.40\n9,0,0.41\n").units["u"] == "m/s"
 
 
 @pytest.mark.parametrize(

@@ -154,9 +154,10 @@ def test_rows_that_fit_are_read(tmp_path: Path, lines: list[str], headings: tupl
         ["A;1;2;-;-;", "B;-;-;4,5;-", "A;2;155048,39;463051,12;14,3;70,4;", "A;3;155048,2;463051,5;2,5;69;",
          "A;3;1;2;3;"],
         ["A;left;bank;3,5;;;dry", "A;2;155048,39;463051,12;14,3;70,4;", "A;3;155048,2;463051,5;2,5;69;"],
+        ["A;-;-;-;-", "A;2;155048,39;463051,12;14,3;70,4;", "A;3;155048,2;463051,5;2,5;69;"],
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("units", [[], ["-;1;m;m;-;-;"]])
+@pytest.mark.parametrize("units", [[], ["-;1;m;m;-;-;"], ["-;(m);(m2/s2);(ft/ft);(ft);(sq ft);"]])
 def test_remarks_and_dry_rows_are_rows(tmp_path: Path, rows: list[str], units: list[str]) -> None:
     """A remark in two of six rows had them parted by their decimal commas, and a dry first row became the heading."""
     table = parse_table(table_of(tmp_path, "raai;x;q;level;u;direction;note", *units, *rows))

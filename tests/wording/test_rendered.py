@@ -477,6 +477,7 @@ REFUSED = [
     InputError("no_number", **AT_ROW, column="u", got="x", why="no number"),
     InputError("no_number", **AT_ROW, column="u", got="0,5", why="point"),
     *(InputError("no_number", **AT_ROW, column="u", got=got, why="") for got in ("u", "")),
+    *(InputError("unit_elsewhere", **AT_ROW, roles=roles, unit="ft") for roles in (["level"], ["x", "y", "level"])),
     InputError("no_name", **AT_ROW, column="case", got=""),
     InputError("unprintable_name", **AT_ROW, column="case", got="\x1b"),
     InputError("unknown_name", **AT_ROW, column="experiment", known=["low", "high"], got="mid"),

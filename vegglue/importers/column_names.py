@@ -3,16 +3,19 @@
 import math
 import re
 import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from vegglue.case.messages import nearest
 from vegglue.errors import InputError
 
-_FOOT = 0.3048  # m, the international foot
+_FOOT, _SURVEY_FOOT = 0.3048, 1200.0 / 3937.0  # m, the international foot and that of the U.S. survey
 # SI value of one of each unit, by quantity; the SI unit comes first.
 UNITS: dict[str, dict[str, float]] = {
     "length": {
         "m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": _FOOT, "in": _FOOT / 12.0, "yd": 3.0 * _FOOT,
+        "us-ft": _SURVEY_FOOT,
     },
     "velocity": {
         "m/s": 1.0, "dm/s": 0.1, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1.0 / 3.6, "ft/s": _FOOT, "in/s": _FOOT / 12.0,
@@ -28,7 +31,8 @@ UNITS: dict[str, dict[str, float]] = {
 }  # fmt: skip
 # Other spellings, after `_plain` has done its work.
 SPELLINGS = {
-    "metre": "m", "metres": "m", "meter": "m", "meters": "m", "feet": "ft", "foot": "ft", "usft": "ft", "inch": "in",
+    "metre": "m", "metres": "m", "meter": "m", "meters": "m", "feet": "ft", "foot": "ft", "ift": "ft", "sft": "us-ft",
+    "inch": "in",
     "fps": "ft/s", "kmh": "km/h", "kph": "km/h", "knots": "kn", "cfs": "ft3/s", "cumecs": "m3/s", "cms": "m3/s",
     "deg": "degrees", "degree": "degrees", "°": "degrees", "graden": "degrees",
     "graad": "degrees", "grad": "degrees", "degré": "degrees", "degrés": "degrees", "degres": "degrees",
@@ -37,6 +41,8 @@ SPELLINGS = {
     "lps": "l/s", "gpm": "gal/min", "m3/day": "m3/d", "yards": "yd", "stems/m2": "1/m2", "m-2": "1/m2", "cbm/s": "m3/s",
     "qm3/s": "m3/s",
 }  # fmt: skip
+# The foot of the U.S. survey, `US ft`, `ftUS`, `survey feet`: 4 mm in 2 km of a State Plane, and 1.2 m in 600 km.
+OF_SURVEY = re.compile(r"(?=.*(us|u\.s\.|survey))(us|u\.s\.)?[\s/-]*(survey)?[\s/-]*(ft|foot|feet)[\s/-]*(\(?us\)?)?")
 # What stands behind the unit of a level and says of which datum it is: `m a.s.l.`, `m+NAP`, `m ü. NN`.
 OF_A_DATUM = re.compile(
     r"(m|dm|cm|mm|ft)[\s+]*(a\.?\s?s\.?\s?l\.?|above sea level|aod|nap|(ü\.?\s?)?nh?n|ahd|navd88|ngvd29|ngf|taw|dvr90)"
@@ -47,7 +53,7 @@ def unit_named(word: str, quantity: str) -> str | None:
     """The unit of a quantity that a word means, `cm/s` for `cm s^-1`; None if it means none."""
     plain = _plain_unit(word)
     plain = of_datum[1] if (of_datum := OF_A_DATUM.fullmatch(plain)) else plain
-    plain = SPELLINGS.get(plain, plain)
+    plain = "us-ft" if OF_SURVEY.fullmatch(plain) else SPELLINGS.get(plain, plain)
     return plain if plain in UNITS[quantity] else None
 
 
@@ -55,6 +61,30 @@ def is_unit(word: str) -> bool:
     """Whether a word can stand in a row of units: a unit of any quantity, a dash, or nothing."""
     others = ("", "-", "1", "db", "degc", "%", "*d", "cnt", "counts", "hpa", "dbar", "m2", "ft2")
     return _plain_unit(word) in others or any(unit_named(word, quantity) for quantity in UNITS)
+
+
+def is_row_of_units(fields: Sequence[str]) -> bool:
+    """Whether fields are the units of the columns below: all of them, or half of those that hold something, one of a
+    quantity known here, if no other is the name of a column: `-;m;(ft/s);(sq ft)`.
+    """
+    others = [field for field in fields if not is_unit(field)]
+    units = [field for field in fields if field.strip() and is_unit(field)]
+    known = any(unit_named(field, quantity) for field in units for quantity in UNITS)
+    return not others or (known and len(others) <= len(units) and not any(map(role_of, others)))
+
+
+def unit_in_words(text: str) -> tuple[str, str] | None:
+    """A unit other than that of the SI that a line states, and its quantity: `Unit: ft`, `all velocities in cm/s`.
+
+    None stands behind a number, which is a value, and inches and kilometres are as a rule other words.
+    """
+    words = re.findall(r"[^\s,;:=\[\]()\"']+", text)
+    for before, word in pairwise(["", *words]):
+        for quantity in ("velocity", "length", "discharge") if not re.search(r"\d", before) else ():
+            unit = unit_named(word, quantity)
+            if unit not in (None, "in", "km", next(iter(UNITS[quantity]))):
+                return word, quantity
+    return None
 
 
 def is_like_unit(word: str) -> bool:
@@ -243,7 +273,7 @@ def unit_stated(heading: str, quantity: str) -> str | None:
     `V_cm_s`, also among other words, `(m above datum)` and `(US survey feet)`; None where it states none.
     """
     bare, unit = _name_and_brackets(heading)
-    among = [word for word in re.findall(r"[^\s,;]+", unit) if word != "in"]
+    among = [word for word in (*re.split(r"[,;]", unit), *re.findall(r"[^\s,;]+", unit)) if word != "in"]
     words = [unit, *among, *(word for _, word in _suffixed(bare))]
     return next((said for word in words if (said := unit_named(word, quantity))), None)
 

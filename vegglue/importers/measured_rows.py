@@ -11,7 +11,7 @@ from vegglue.arrays import Array, Mask
 from vegglue.case.grid import Centreline, along_and_across, heading_at, on_map
 from vegglue.case.site_schema import Frame
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, known_name
+from vegglue.importers.column_names import ROLES, known_name, unit_in_words
 from vegglue.importers.column_roles import (
     NAMES_OF_BED,
     columns_of_table,
@@ -210,6 +210,7 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
             "measurements out of the folder."
         )
     unread = [place for place in range(len(table.headings)) if place not in columns.values()]
+    _refuse_unit_elsewhere(path, table, assumed, unread)
     return MeasuredRows(
         numbers=numbers,
         texts={role: table.texts(place) for role, place in columns.items() if not ROLES[role].quantity},
@@ -219,6 +220,16 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
         others={table.headings[place]: table.texts(place) for place in unread},
         lines=table.row_numbers,
     )
+
+
+def _refuse_unit_elsewhere(path: Path, table: ParsedTable, assumed: Sequence[str], unread: Sequence[int]) -> None:
+    """InputError if a column is taken for SI and a line above the heading, a comment or an unread column has a unit."""
+    columns = [set(filter(None, table.texts(place))) for place in unread]
+    of_columns = [(table.row_numbers[0], next(iter(texts))) for texts in columns if len(texts) == 1]
+    for row, text in (*table.beside, *of_columns):
+        unit, quantity = unit_in_words(text) or ("", "")
+        if roles := [role for role in assumed if ROLES[role].quantity == quantity]:
+            raise InputError("unit_elsewhere", file=path, row=row, roles=roles, unit=unit)
 
 
 def read_placed_rows(path: Path, options: FileOptions) -> MeasuredRows:

@@ -16,7 +16,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.errors import InputError
-from vegglue.importers.column_names import is_unit, role_of
+from vegglue.importers.column_names import is_row_of_units, is_unit, role_of
 from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_larger
 
@@ -110,7 +110,8 @@ def numbers_of(texts: Sequence[str]) -> Array | None:
 @dataclass(frozen=True)
 class ParsedTable:
     """Headings (columns,), units (columns,) with '' if none is stated, rows of texts (rows, columns) and the number of
-    each in the file (rows,). decimal_comma: whether numbers have one; form: notes on how the table was read.
+    each in the file (rows,). decimal_comma: whether numbers have one; form: notes on how the table was read; beside:
+    number and text of each line above the heading, and of each comment.
     """
 
     headings: tuple[str, ...]
@@ -119,6 +120,7 @@ class ParsedTable:
     row_numbers: tuple[int, ...]
     decimal_comma: bool
     form: tuple[FileNote, ...]
+    beside: tuple[tuple[int, str], ...] = ()
 
     def texts(self, column: int) -> list[str]:
         """The fields of a column (rows,)."""
@@ -170,17 +172,19 @@ def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
         for number, text in there
         if not text.lstrip().startswith(COMMENTS) or FORMULA_IN_FRONT.match(text)
     ]
-    comments = len(there) - len(lines)
+    kept = {number for number, _ in lines}
+    comments = tuple(line for line in there if line[0] not in kept)
     typed = next((number for number, text in lines if OF_TYPES.fullmatch(text)), 0)
     lines = [line for line in lines if line[0] != typed]
     separator = _separator([text for _, text in lines])
     fields = [(number, _fields(text, separator)) for number, text in lines]
     comma = separator != "," and has_decimal_comma(field for _, row in fields for field in row)
     form: list[FileNote] = [SEPARATORS[separator], *([ImportNote(Noted.DECIMAL_COMMA)] if comma else [])]
-    form += [ImportNote(Noted.COMMENTS, comments)] if comments else []
+    form += [ImportNote(Noted.COMMENTS, len(comments))] if comments else []
     form += [ImportNote(Noted.TYPES)] if typed else []
     quoted = all(text.lstrip().startswith('"') for _, text in lines)
-    return _without_summaries(_table(path, fields, form, separator, comma, quoted, typed))
+    table = _table(path, fields, form, separator, comma, quoted, typed)
+    return _without_summaries(replace(table, beside=(*table.beside, *comments)))
 
 
 def _separator(lines: Sequence[str]) -> str:
@@ -246,7 +250,7 @@ def _table(
     if begin > 0 and len(lines[begin - 1][1]) > 1:  # below words, first rows may lack or have a field
         first = begin
     head, of_units = first - 1, False
-    if head > 0 and not numeric[head] and all(map(is_unit, lines[head][1])):
+    if head > 0 and not numeric[head] and is_row_of_units(lines[head][1]):
         form, head, of_units = [*form, ImportNote(Noted.UNITS)], head - 1, True
     named = head >= 0 and len(lines[head][1]) >= min(width, 2) and not numeric[head]
     rows = [line for line in lines[first:] if len(line[1]) > 1]
@@ -275,6 +279,7 @@ def _table(
         row_numbers=tuple(number for number, _ in rows),
         decimal_comma=decimal_comma,
         form=tuple(form),
+        beside=tuple((number, " ".join(fields)) for number, fields in lines[: head if named else first]),
     )
 
 
@@ -312,7 +317,7 @@ def _rows_of_numbers(lines: Sequence[Line], separator: str) -> list[bool]:
 
     Marks for no value count as numbers beside two of these. Words behind the last number are a remark, and not counted
     below the heading; above it they are the unit of what a title says, as between spaces they may be those of a title.
-    A line below names of columns is a row if it holds a number and no name.
+    A line below names of columns is a row if it holds a number, or a mark for none, and no name.
     """
     found = []
     for _, fields in lines:
@@ -328,10 +333,11 @@ def _rows_of_numbers(lines: Sequence[Line], separator: str) -> list[bool]:
     )
     heading = max(of_names, default=-1)
     for i, (_, fields) in enumerate(lines[heading + 1 :], heading + 1):
-        if found[i] or all(map(is_unit, fields)):
+        if found[i] or is_row_of_units(fields):
             continue
         has_remark = separator != " " and _is_half_numbers(fields)
-        is_thin = len(fields) > 1 and any(map(is_number, fields)) and not any(map(role_of, fields))
+        has_value = any(is_number(field) or field.lower() in MISSING_WORDS[1:] for field in fields)
+        is_thin = len(fields) > 1 and has_value and not any(map(role_of, fields))
         found[i] = has_remark or (heading >= 0 and is_thin)
     return found
 
