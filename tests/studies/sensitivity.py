@@ -19,18 +19,18 @@ from textwrap import fill
 from typing import Any
 
 import vegglue
-from vegglue.decision_constants import DecisionConstants, Described, Provenance, described, using
+from vegglue.decision_constants import DecisionConstants, Described, described, using
 from vegglue.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 CASES, RECORDS, PAGE = ROOT / "data/open_cases", ROOT / "data/sensitivity/records.jsonl", ROOT / "docs/sensitivity.md"
 BEGIN, END = "<!-- numbers by sensitivity.py -->", "<!-- end of numbers -->"
 FACTORS = (0.5, 2.0)
-# The ten that matter most: every stated probability depends on the first.
+# Those that matter most: every stated probability depends on the first, all sizes of effects on the last.
 FIRST = (
     "fingerprint_error", "grid_error_share", "grid_error_correlation", "shape_error", "spot_drag", "spot_rise",
     "spot_inflow", "spot_viscosity", "known_first_odds", "field_odds", "instrument_errors", "mostly_elsewhere",
-    "held_out_ratio",
+    "held_out_ratio", "effect_sizes",
 )  # fmt: skip
 AS_IS = "as it is"
 Record = dict[str, Any]
@@ -106,13 +106,12 @@ def table(records: Sequence[Record]) -> str:
         if one.name not in run:
             left.append(name)
         elif half == twice == f"0 of {len(as_is)}":
-            origin = "" if one.provenance is Provenance.CHOSEN else f" ({one.provenance.value})"
-            alike.append(f"{name} {one.value:g}{unit}{origin}")
+            alike.append(f"{name} {one.value:g}{unit} ({one.provenance.value})")
         else:
             rows.append(f"| {name} | {one.value:g}{unit} | {one.provenance.value} | {half} | {twice} |")
     same = (
-        f"At half and at twice of these, no verdict of {len(as_is)} differs; all are chosen unless stated: "
-        f"{', '.join(alike) or 'none'}."
+        f"At half and at twice of {len(alike)} others no verdict of {len(as_is)} differs: "
+        f"{', '.join([one for one in alike if '**' in one]) or 'none that matters most'}, and more."
     )
     return "\n".join([*rows, "", fill(same, 120), "", fill(f"Not run: {', '.join(left) or 'none'}.", 120)])
 

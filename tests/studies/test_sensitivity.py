@@ -34,6 +34,7 @@ def test_a_verdict_is_another_by_kind_or_set() -> None:
     table, alike, not_run = sensitivity.table(made).split("\n\n")
     rows = {line.split("`")[1]: line.split("|")[-3:-1] for line in table.splitlines()[2:]}
     assert set(rows) == {"field_odds", "set_chance"}
+    assert "of 1 others no verdict of 1 differs" in alike
     assert alike.split("`")[1::2] == ["spot_drag"]
     assert set(not_run.split("`")[1::2]) == set(BY_NAME) - {*rows, "spot_drag"}
     assert [cell.strip()[:6] for cell in rows["field_odds"]] == ["1 of 1", "0 of 1"]
