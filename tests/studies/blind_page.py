@@ -96,7 +96,7 @@ def _table(records: Sequence[Record], told: Sequence[Told]) -> str:
 
 
 def _left_out(records: Sequence[Record]) -> str:
-    """Names of effects that no size makes visible, and other reasons with their counts."""
+    """How many effects no size makes visible, and other reasons with their counts."""
     names: set[str] = set()
     others: Counter[str] = Counter()
     for record in records:
@@ -104,10 +104,8 @@ def _left_out(records: Sequence[Record]) -> str:
             found = re.match(r"(?:--hide )?(\S+): at no plausible size", record["left_out"])
             names.update(found[1].split(",") if found else ())
             others.update([] if found else [record["left_out"].partition(":")[0]])
-    listed = ", ".join(sorted(names)) or "none"
-    text = f"- **Left out of a channel, as not visible there at any plausible size:** {listed}."
-    if others:
-        text += " Left out for other reasons: " + "; ".join(f"{why} ({size})" for why, size in others.items()) + "."
+    text = f"- **Left out of a channel**: {len(names)} effects that are not visible there at any plausible size"
+    text += "".join(f"; {why} ({size})" for why, size in others.items()) + "."
     return fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 
 
@@ -162,7 +160,7 @@ def _data_limits(
     if not parts:
         return ""
     heading = "- **What the data allow at most** (`blind_lengths.py`, `place_limits.py` and `object_limits.py`). "
-    return fill(heading + " ".join(parts), WIDTH, subsequent_indent="  ")
+    return fill(heading + " ".join(parts), WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 
 
 PAGE = """# How often the diagnosis is right
@@ -187,14 +185,12 @@ Causes were hidden in synthetic measurements, and each data set was diagnosed on
   or two of these, with a signal of 3 or 6 standard errors (s.e.): the norm of the change of the predictions that
   calibration cannot absorb, in standard errors of data, grid, model and site together.
 
-| term | meaning |
-|---|---|
-| name | a cause in a verdict that names one; causes found before a verdict of `cannot-tell` do not count |
-| false | neither hidden nor an imperfection of the site (of the right sign); an anomaly over 1.5 m from every object |
-| in the credible set | among the hypotheses of the verdict or, with nothing false named, among what is not excluded |
-| groups | effects that the data cannot distinguish |
-| not inspected | without objects that were looked at, or changed, while rules were chosen |
-| held-out error | at sections without measurements, against the truth, with the error of a probe added |
+- **Name**: a cause in a verdict that names one; causes found before a verdict of `cannot-tell` do not count. **False**:
+  neither hidden nor an imperfection of the site (of the right sign); an anomaly over 1.5 m from every object.
+- **In the credible set**: among the hypotheses of the verdict or, with nothing false named, among what is not excluded.
+  **Groups**: effects that the data cannot distinguish.
+- **Not inspected**: without objects that were looked at, or changed, while rules were chosen.
+- **Held-out error**: at sections without measurements, against the truth, with the error of a probe added.
 
 ## Result
 

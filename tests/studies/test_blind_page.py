@@ -301,7 +301,7 @@ def test_the_page_has_the_numbers_of_its_records(tmp_path: Path) -> None:
     assert "3 s.e.: in the credible set" not in page, "lines without data are left out"
     assert "`sun`" not in page
     flat = " ".join(page.split())
-    for number in ("plausible size:** sun.", "no steady flow (1)", "-20 % (median of 3 data sets)",
+    for number in ("1 effects that are not visible there", "no steady flow (1)", "-20 % (median of 3 data sets)",
                    "rise: by 10 % (median)", "80 % of draws of the errors (2 objects", "5.0 to 5.0 s.e."):  # fmt: skip
         assert number in flat, number
     for name in ("chances", "held-out"):
