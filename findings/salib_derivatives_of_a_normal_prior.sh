@@ -3,9 +3,9 @@
 #
 # Guess:      finite_diff moves each set by one per cent, and dgsm bounds the total index from above in each unit, for
 #             normal and uniform priors alike ("dists" is read by both).
-# Seen:       n = 0.030 +- 0.003 and Q = 3.0 +- 0.3 m3/s: the moved n is clipped to 0.003 to 0.030, so that each set above
-#             the mean is moved back to it, and the range is "0.003 minus 0.030": dgsm is 4.1, with uniform priors 0.61
-#             (total index 0.50). With lognormal priors dgsm of the roughness is 73,000. No error, no warning.
+# Seen:       for n = 0.030 +- 0.003 and Q = 3.0 +- 0.3 m3/s the moved value is always the mean itself (larger than
+#             0.003 is "outside"), and the width of the range is "0.003 minus 0.030": dgsm is 4.1, with uniform priors
+#             0.61 (total index 0.50). With lognormal priors dgsm of the roughness is 73,000. No error, no warning.
 #             dgsm_conf is not scaled at all: 1.9 beside an index of 0.61, and for Q 10,000 times smaller.
 # Matters:    a screening of roughness and discharge that ranks them by their unit, with an interval of another number.
 # Documented: the sampler and the analysis say nothing about "dists"; the manual gives the meaning of bounds by dists.
