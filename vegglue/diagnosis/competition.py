@@ -437,10 +437,12 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
         line = of_kind.what.line if isinstance(of_kind.what, Instrument) else None
         if line is None or not _within_reach(of_kind.log_evidence, best):
             continue
+        lines = kind_named(screening.kinds, of_kind.kind)
+        by_score = float(lines.log_evidence[of_kind.column] - lines.log_prior[of_kind.column])
+        if by_score < 0.0:  # an offset acts linearly: where its score speaks against it, so does the calibration
+            continue
         watch(Progress(COMPARING_LINE.format(line.x)))
         if (without := relevelled(screening.base, line)) is not None:
-            lines = kind_named(screening.kinds, of_kind.kind)
-            by_score = float(lines.log_evidence[of_kind.column] - lines.log_prior[of_kind.column])
             refitted = of_kind.log_evidence + without.log_factor - by_score
             found[j] = replace(of_kind, log_evidence=refitted, without=without)
     tried: set[str] = set()
