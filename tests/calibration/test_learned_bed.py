@@ -13,9 +13,9 @@ from vegglue.calibration.fit import at_point
 from vegglue.calibration.learned_bed import LearnedBed, bed_of_spots, learned_bed
 from vegglue.calibration.model_error import cell_responses, model_error_columns
 from vegglue.calibration.noise import noise_of, with_model_error
-from vegglue.case.bed import cell_places, read_bed_survey, read_raster
+from vegglue.case.bed import SPACING, cell_places, read_bed_survey, read_raster
 from vegglue.case.bed import surveyed as surveyed_points
-from vegglue.case.bed_error import SPACING, bed_error_columns, surveyed_lines, without_surveys
+from vegglue.case.bed_error import bed_error_columns, surveyed_lines, without_surveys
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import ModelError, Planned, PlannedErrors
 from vegglue.case.site_schema import BedLayer
@@ -216,7 +216,7 @@ def test_ninety_five_of_a_hundred_unseen_values_lie_within_their_bands(surveyed:
     error = model.station["standard_error"].to_numpy(float)
     noise = with_model_error(noise_of(seen.station), alike[:, point.z.size :])
     within, ratios = [], []
-    for _ in range(25):
+    for _ in range(200):
         off = alike @ random.standard_normal(alike.shape[1]) - point.slope @ point.z
         value = point.prediction + off + error * random.standard_normal(error.size)
         its_noise = replace(noise, value=value[noise.rows])

@@ -25,6 +25,11 @@ FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")  # 3.7D-01
 HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
 # Words for no level, as some programs write into the header and among the values.
 WORDS_FOR_NO_LEVEL = re.compile(r"\b(null|nodata|na|nan)\b", re.IGNORECASE)
+# Distance at most of places between which what a survey says of the bed follows cubic splines, over the shortest
+# length of its covariances [-]. On 150 x 50 cells, lengths from 2.8 and 2.3 m, lines every 12 m, the mean error over
+# a Gaussian of 1 m (0.5 m) half width has a standard deviation 0.3 % (1.5 %) below that of the whole covariance, and
+# 1.1 % (2.4 %) with a place in each cell: there MOST_OF_SQUARE_ROOT columns are spent on what no station sees.
+SPACING = 0.5
 # Changes of a bed that are kept in memory, one for each grid of a calibration.
 MOST_CHANGES_KEPT = 8
 
@@ -235,8 +240,9 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
     else:
         return np.full((grid.x.size, grid.y.size), np.nan)
     if (survey := layer.survey) is not None and survey.relevelled:
-        change = _change_without_levels(surveyed(survey), survey.loose, survey.covariances, cell_places(grid))
-        level = level + change.reshape(level.shape)
+        x, y = spline_places(grid, survey.covariances)
+        change = _change_without_levels(surveyed(survey), survey.loose, survey.covariances, all_places(x, y))
+        level = level + to_cells(change[:, None], x, y, grid).reshape(level.shape)
     return level
 
 
@@ -256,9 +262,42 @@ def surveyed(survey: SurveyOfBed) -> BedSurvey:
     return read_bed_survey(survey.file, (*survey.loose, *survey.relevelled))
 
 
+def all_places(x: Array, y: Array) -> Array:
+    """x along and y across (nx ny, 2) [m] of all places with x (nx,) and y (ny,)."""
+    return np.column_stack([part.ravel() for part in np.meshgrid(x, y, indexing="ij")])
+
+
 def cell_places(grid: Grid) -> Array:
     """x along and y across of cell centres (nx ny, 2) [m]."""
-    return np.column_stack([part.ravel() for part in np.meshgrid(grid.x, grid.y, indexing="ij")])
+    return all_places(grid.x, grid.y)
+
+
+def spline_places(grid: Grid, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array]:
+    """x (a,) and y (b,) [m] of places from edge to edge of a grid, SPACING of the shortest length apart or as many as
+    there are cells: from these `to_cells` follows a bed of such covariances.
+    """
+
+    def places(centres: Array, size: float, lengths: Sequence[float]) -> Array:
+        low, high = centres[0] - 0.5 * size, centres[-1] + 0.5 * size
+        count = min(math.ceil((high - low) / (SPACING * min(lengths))) + 1, centres.size)
+        return np.linspace(low, high, max(count, 2)).round(9)
+
+    along, across = ([getattr(one, axis) for one in covariances] for axis in ("along", "across"))
+    return places(grid.x, grid.dx, along), places(grid.y, grid.dy, across)
+
+
+def to_cells(values: Array, x: Array, y: Array, grid: Grid) -> Array:
+    """Values (a b, k) at places x (a,) and y (b,) carried to all cells (nx ny, k) by cubic splines, in the single
+    precision that a bed has.
+    """
+    from scipy.interpolate import make_interp_spline  # late: a case without a survey need not wait for it
+
+    along, across = (
+        make_interp_spline(there, np.eye(there.size), min(3, there.size - 1))(centres).astype("float32")
+        for there, centres in ((x, grid.x), (y, grid.y))
+    )
+    field = values.reshape(x.size, y.size, -1).astype("float32")
+    return np.einsum("xa,yb,abk->xyk", along, across, field, optimize=True).reshape(grid.x.size * grid.y.size, -1)
 
 
 def bed_levels(case: Case, grid: Grid, experiment: str = "") -> Array:

@@ -1,13 +1,13 @@
 """How wrong the bed of each cell may be between the points of its surveys, on any grid."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from vegglue.arrays import Array, Mask
-from vegglue.case.bed import cell_places, layer_levels, surveyed
+from vegglue.case.bed import all_places, cell_places, layer_levels, spline_places, surveyed, to_cells
 from vegglue.case.grid import Grid
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import BedLayer, CovarianceOfBed
@@ -16,11 +16,6 @@ from vegglue.memoised import memoised
 
 # Beds whose errors and lines are kept in memory, most of them of one column of cells.
 MOST_BEDS_KEPT = 48
-# Distance at most of places between which the error of a bed follows cubic splines, over the shortest length of its
-# covariances [-]. On 150 x 50 cells, lengths from 2.8 and 2.3 m, lines every 12 m, the mean error over a Gaussian of
-# 1 m (0.5 m) half width has a standard deviation 0.3 % (1.5 %) below that of the whole covariance, and 1.1 % (2.4 %)
-# with a place in each cell: there MOST_OF_SQUARE_ROOT columns are spent on what no station sees.
-SPACING = 0.5
 
 
 def beds_of(case: Case) -> list[BedLayer]:
@@ -73,24 +68,13 @@ def bed_error_columns(case: Case, grid: Grid, experiment: str = "") -> Array:
 
 @memoised(MOST_BEDS_KEPT)
 def _error_columns_of(one: SurveyedLayer, grid: Grid) -> Array:
-    from scipy.interpolate import make_interp_spline  # late: a case without a survey need not wait for it
-
-    lengths = ((min(getattr(each, axis) for each in one.covariances)) for axis in ("along", "across"))
-    axes = ((grid.x, grid.dx), (grid.y, grid.dy))
-    places = [
-        np.union1d(centres[:: max(int(SPACING * length / size), 1)], centres[-1])
-        for (centres, size), length in zip(axes, lengths, strict=True)
-    ]
-    columns = root_of_covariance(one.read, one.covariances, cell_places(replace(grid, x=places[0], y=places[1])))
-    field = columns.reshape(places[0].size, places[1].size, -1).astype("float32")  # what it leaves out is far more
-    # (cell, place): by how much each cell has what is at each place.
-    along, across = (
-        make_interp_spline(there, np.eye(there.size), min(3, there.size - 1))(centres).astype("float32")
-        for (centres, _), there in zip(axes, places, strict=True)
-    )
-    error = np.einsum("xa,yb,abk->xyk", along, across, field, optimize=True).reshape(one.level.size, -1)
+    x, y = spline_places(grid, one.covariances)
+    error = to_cells(_root_of_covariance(one.read, one.covariances, all_places(x, y)), x, y, grid)
     off = one.level.ravel() - mean_level(one.read, one.covariances, cell_places(grid))
     return one.in_cells(np.column_stack([off.astype("float32"), error])[one.there])
+
+
+_root_of_covariance = memoised(MOST_BEDS_KEPT)(root_of_covariance)  # grids of one reach share their places
 
 
 @dataclass(frozen=True)
