@@ -13,7 +13,7 @@ from vegglue.calibration.fit import MapEstimate, chi2, covariance, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
-from vegglue.cli.loop_commands import compare_command
+from vegglue.cli.commands import compare_command
 from vegglue.diagnosis.child_config import candidate_named
 from vegglue.diagnosis.comparison import excluded_by, excluding, exclusion_in_words
 from vegglue.engine.interface import Model, Point

@@ -10,7 +10,7 @@ from scipy.io import savemat
 import vegglue
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
-from vegglue.cli.loop_commands import import_command
+from vegglue.cli.commands import import_command
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import linearise
 from vegglue.errors import InputError

@@ -16,7 +16,7 @@ from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case, ModelError
 from vegglue.case.site_schema import Frame
 from vegglue.case.zones import area_of, in_polygon
-from vegglue.cli.loop_commands import import_command
+from vegglue.cli.commands import import_command
 from vegglue.errors import InputError
 from vegglue.importers.coordinate_systems import system_of_wkt
 from vegglue.importers.file_options import FileOptions

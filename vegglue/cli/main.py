@@ -10,28 +10,9 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from vegglue.cli.ensemble_commands import (
-    check_command,
-    demo_command,
-    infer_command,
-    report_command,
-    run_command,
-    simulate_command,
-)
-from vegglue.cli.library_commands import effects_command, export_command, new_command, reveal_command, twin_command
-from vegglue.cli.loop_commands import (
-    compare_command,
-    diagnose_command,
-    discover_command,
-    extend_command,
-    import_command,
-    next_command,
-    overview_command,
-    plan_command,
-)
+from vegglue.cli import commands
 from vegglue.cli.terminal import FLAG
 from vegglue.errors import InputError, StorageError
-from vegglue.version import VERSION
 from vegglue.wording.commands import HELP, LAST_WORDS
 
 MISTAKE, MACHINE, STOPPED = 2, 3, 130  # exit codes
@@ -41,7 +22,12 @@ def ending_well(command: Callable[[], object]) -> None:
     """Run a command: errors a user can mend are one sentence and exit code 2, what the machine refuses (a full disk, a
     lock, no memory) 3, Ctrl-C or a plain kill 130.
     """
-    _make_printable()
+    for name in ("stdout", "stderr"):  # output that is closed goes nowhere
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
+    reconfigure = getattr(sys.stdout, "reconfigure", None)
+    if reconfigure is not None:  # a terminal that knows fewer letters shows what it can
+        reconfigure(errors="replace")
     # A plain kill, with which queues of clusters end a job at its time, is as Ctrl-C: what was started ends, too.
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -76,16 +62,6 @@ def _end(sentence: str, code: int) -> None:
     sys.exit(code)
 
 
-def _make_printable() -> None:
-    """Output that is closed goes nowhere, and a terminal that knows fewer letters shows what it can."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
-    reconfigure = getattr(sys.stdout, "reconfigure", None)
-    if reconfigure is not None:
-        reconfigure(errors="replace")
-
-
 def _flush() -> None:
     """Print what waits, now, while a full disk can still be reported."""
     try:
@@ -99,14 +75,9 @@ def _flush() -> None:
 app = typer.Typer(rich_markup_mode="rich", no_args_is_help=True, pretty_exceptions_enable=False)
 
 
-def version_command() -> None:
-    """Print the version."""
-    print(VERSION)
-
-
 def _print_version(asked: bool) -> None:
     if asked:
-        version_command()
+        commands.version_command()
         raise typer.Exit
 
 
@@ -124,39 +95,15 @@ def about(
 
 
 # By group, in the order in which they are used.
-COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
-    "Begin": {
-        "demo": demo_command,
-        "new": new_command,
-        "plan": plan_command,
-        "import": import_command,
-        "check": check_command,
-        "run": run_command,
-    },
-    "The loop": {
-        "diagnose": diagnose_command,
-        "discover": discover_command,
-        "extend": extend_command,
-        "compare": compare_command,
-        "next": next_command,
-    },
-    "Ensemble": {
-        "simulate": simulate_command,
-        "infer": infer_command,
-        "report": report_command,
-        "overview": overview_command,
-    },
-    "More": {
-        "export": export_command,
-        "effects": effects_command,
-        "twin": twin_command,
-        "reveal": reveal_command,
-        "version": version_command,
-    },
+COMMANDS = {
+    "Begin": ("demo", "new", "plan", "import", "check", "run"),
+    "The loop": ("diagnose", "discover", "extend", "compare", "next"),
+    "Ensemble": ("simulate", "infer", "report", "overview"),
+    "More": ("export", "effects", "twin", "reveal", "version"),
 }
-for _group, _commands in COMMANDS.items():
-    for _name, _command in _commands.items():
-        app.command(name=_name, rich_help_panel=_group)(_command)
+for _group, _names in COMMANDS.items():
+    for _name in _names:
+        app.command(name=_name, rich_help_panel=_group)(getattr(commands, f"{_name}_command"))
 
 
 # What typer raises for a command line that it cannot read; its own copy of click's, or that of click.
@@ -168,9 +115,7 @@ def run_app() -> None:
     try:
         code = app(standalone_mode=False)
     except UsageError as error:
-        problems: list[dict[str, Any]] = getattr(
-            error.__cause__, "errors", list
-        )()  # newer ones read values by pydantic
+        problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()  # newer typer reads by pydantic
         if problems and error.param is not None:
             from vegglue.case.messages import expected_in_words
 

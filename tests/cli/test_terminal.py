@@ -6,7 +6,7 @@ import sys
 import pytest
 from rich.console import Console
 
-from vegglue.cli.reporting import moving_line, progress_reporter
+from vegglue.cli.terminal import moving_line, progress_reporter
 from vegglue.progress import Progress, Watch, counted, now_and_then, pace_in_words
 
 
