@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from marching_engine import marching
 
 from vegglue.calibration.model_error import cell_responses
 from vegglue.case.gridded_site import build_site
@@ -14,7 +15,6 @@ from vegglue.case.resolved_config import dumped
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import GridExtent
 from vegglue.engine.interface import Model, linearise, predict, relinearised
-from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.problem_setup import build_problem
 

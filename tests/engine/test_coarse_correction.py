@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from marching_engine import marching
 
 from vegglue.arrays import Array
 from vegglue.calibration.candidates import Candidate, with_effect
 from vegglue.case.config import load_case
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse
-from vegglue.engine.marching import marching
 from vegglue.engine.model import coarser
 from vegglue.flow.starts import on_grid
 from vegglue.flow.wet_band import widen

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from marching_engine import marching
 
 from vegglue.calibration.candidates import candidates_of, cause_of, with_effect
 from vegglue.calibration.fit import fit
@@ -15,7 +16,6 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, flow_at_centres, linearise, predict, responses, responses_to_cells
-from vegglue.engine.marching import marching
 from vegglue.engine.newton import NEWTON
 from vegglue.flow.local_changes import TERMS, Term
 

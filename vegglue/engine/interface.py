@@ -92,7 +92,7 @@ def always(prediction: Array) -> bool:
 
 @dataclass(frozen=True)
 class Engine:
-    """How a flow is computed. A new engine is one value of this kind, see `newton` and `marching`.
+    """How a flow is computed. A new engine is one value of this kind, see `newton`.
 
     Parameters
     ----------

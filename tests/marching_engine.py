@@ -1,7 +1,7 @@
 """An engine without derivatives: flows marched in time until they rest, slopes and responses by differences.
 
 It shares the equations with `newton` and nothing of how they are solved, and shows what another engine has to give.
-Slow: for tests, on small channels.
+Slow: for small channels.
 """
 
 from collections.abc import Sequence
