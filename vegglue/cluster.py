@@ -127,10 +127,6 @@ def processes_here(where: str) -> int:
     return count
 
 
-def _first_line(error: BaseException) -> str:
-    return (str(error) or type(error).__name__).splitlines()[0].rstrip(".")
-
-
 @cache
 def versions_here() -> Mapping[str, str]:
     """Versions of this process: Python, vegglue and the libraries that decide the last digits."""
@@ -143,8 +139,9 @@ def refuse_other_versions(client: "Client") -> None:
     try:
         found = client.run(versions_here)
     except (ImportError, AttributeError) as error:
+        got = (str(error) or type(error).__name__).splitlines()[0].rstrip(".")
         raise InputError(
-            f"--cluster: expected vegglue {VERSION} on every worker, got {_first_line(error)}; install it there."
+            f"--cluster: expected vegglue {VERSION} on every worker, got {got}; install it there."
         ) from None
     for worker, there in found.items():
         refuse_version(versions_here(), there, worker)

@@ -220,14 +220,7 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
     key = tuple(map(id, parts))
     if kept := _kept.get(key):
         return kept[1]
-    found = _scales_of_site(case, build_site(case) if site is None else site)
-    _kept[key] = (parts, found)  # with the parts, whose identities are theirs as long as they are kept
-    while len(_kept) > SCALES_KEPT:
-        _kept.popitem(last=False)
-    return found
-
-
-def _scales_of_site(case: Case, site: Site) -> SiteScales:
+    site = build_site(case) if site is None else site
     depths, means, speeds, discharges = [], [], [], []
     banks, kinds = beyond_floor(site), np.zeros(2 * len(site.class_names))
     for name, experiment in case.experiments.items():
@@ -265,7 +258,7 @@ def _scales_of_site(case: Case, site: Site) -> SiteScales:
     patches = [site.patch == index for index in np.unique(site.patch[site.patch >= 0])]
     lengths = [float(one.any(axis=1).sum() * site.grid.dx) for one in patches]
     widths = [float(one.any(axis=0).sum() * site.grid.dy) for one in patches]
-    return SiteScales(
+    found = SiteScales(
         depth=depth,
         mean_depth=float(np.mean(means)) if means else depth,
         half_width=width,
@@ -280,3 +273,7 @@ def _scales_of_site(case: Case, site: Site) -> SiteScales:
         banks=bool(banks.any()),
         two_streams=bool(np.sort(kinds)[-2] >= LEAST_STREAM * max(kinds.sum(), 1.0)),
     )
+    _kept[key] = (parts, found)  # with the parts, whose identities are theirs as long as they are kept
+    while len(_kept) > SCALES_KEPT:
+        _kept.popitem(last=False)
+    return found

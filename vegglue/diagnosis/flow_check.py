@@ -409,8 +409,17 @@ def remarks_on_turned_velocities(case: Case, observations: Observations) -> Iter
     odd directions besides.
     """
     odd = misdirected(case, observations)
-    by = {name: rows for name, rows in _by_experiment(case, observations).items() if name not in odd}
-    angles = {name: _section_angles(rows) for name, rows in by.items()}
+    angles: dict[str, pd.Series[float]] = {}  # atan(sum v / sum u) to the left [degrees], by section with enough places
+    for name, rows in _by_experiment(case, observations).items():
+        if name not in odd:
+            along, across = (
+                rows.loc[rows["kind"] == kind, ["section", "x", "y", "value"]] for kind in (STREAMWISE, TRANSVERSE)
+            )
+            both = along.merge(across, on=["section", "x", "y"], suffixes=("_along", "_across"))
+            sums = both.groupby("section")[["value_along", "value_across"]].agg(["sum", "size"])
+            wide = sums[sums[("value_along", "size")] >= FEWEST_OF_A_MEAN]
+            v, u = (wide[(f"value_{part}", "sum")].to_numpy(float) for part in ("across", "along"))
+            angles[name] = pd.Series(np.degrees(np.arctan2(v, u)), index=wide.index)
     sure = SURE_OF_AN_ANGLE, MOST_ON_ONE_SIDE
     turned = {name: one for name, one in angles.items() if to_one_side(one.to_numpy(), *sure)}
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -424,15 +433,3 @@ def remarks_on_turned_velocities(case: Case, observations: Observations) -> Iter
         if ones:
             means = tuple(abs(float(one.mean())) for one in ones.values())
             yield VelocitiesTurned(side, tuple(ones), means, len(sections), others)
-
-
-def _section_angles(rows: pd.DataFrame) -> "pd.Series[float]":
-    """atan(sum v / sum u) to the left of the channel [degrees], by each section with enough places of both."""
-    along, across = (
-        rows.loc[rows["kind"] == kind, ["section", "x", "y", "value"]] for kind in (STREAMWISE, TRANSVERSE)
-    )
-    both = along.merge(across, on=["section", "x", "y"], suffixes=("_along", "_across"))
-    sums = both.groupby("section")[["value_along", "value_across"]].agg(["sum", "size"])
-    wide = sums[sums[("value_along", "size")] >= FEWEST_OF_A_MEAN]
-    angles = np.arctan2(wide[("value_across", "sum")].to_numpy(float), wide[("value_along", "sum")].to_numpy(float))
-    return pd.Series(np.degrees(angles), index=wide.index)

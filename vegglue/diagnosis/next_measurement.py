@@ -196,7 +196,19 @@ def _ideas(
     low, high = model.case.grid.x
     places = np.linspace(low, high, SECTIONS + 2)[1:-1]
     near = AS_MEASURED * float(places[1] - places[0])
-    taken = _measured_sections(velocity, at_hand, near)
+    # Sections and their verticals, as in the experiment with most of them: in others a boat lay beside it, by `near` at
+    # most. Where as many, in the order of the case: that of the rows of a table means nothing.
+    verticals = velocity.groupby(["experiment", "x"], sort=False)["y"].unique()
+    found: list[tuple[list[str], float, Array]] = []
+    for (experiment, x), there in sorted(
+        verticals.items(), key=lambda one: (-one[1].size, at_hand.index(one[0][0]), one[0][1])
+    ):
+        same = [of for of, other, _ in found if abs(other - x) <= near and experiment not in of]
+        if same:
+            same[0].append(experiment)
+        else:
+            found.append(([experiment], float(x), np.sort(there.astype(float))))
+    taken = [(x, there) for _, x, there in sorted(found, key=lambda one: one[1])]
     new = [float(x) for x in places if taken and min(abs(x - there) for there, _ in taken) > near]
     sections = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, 0.0) for x in new]
     for x, here in taken:
@@ -217,24 +229,6 @@ def _ideas(
     return ideas + [
         (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), middle, WATER_LEVEL, costs.gauge) for x in places[::2]
     ]
-
-
-def _measured_sections(velocity: pd.DataFrame, experiments: Sequence[str], near: float) -> list[tuple[float, Array]]:
-    """x and verticals y [m] of each section, as in the experiment with most of them: in others a boat lay beside it, by
-    `near` at most [m].
-    """
-    verticals = velocity.groupby(["experiment", "x"], sort=False)["y"].unique()
-    found: list[tuple[list[str], float, Array]] = []
-    # Where as many, in the order of the case: that of the rows of a table means nothing.
-    for (experiment, x), y in sorted(
-        verticals.items(), key=lambda one: (-one[1].size, experiments.index(one[0][0]), one[0][1])
-    ):
-        same = [of for of, there, _ in found if abs(there - x) <= near and experiment not in of]
-        if same:
-            same[0].append(experiment)
-        else:
-            found.append(([experiment], float(x), np.sort(y.astype(float))))
-    return [(x, y) for _, x, y in sorted(found, key=lambda one: one[1])]
 
 
 def with_other_discharges(model: Model, lower: Sequence[float]) -> Case:

@@ -80,40 +80,35 @@ def effects_of(path: Path) -> tuple[Effect, ...]:
         got = None if found is None else type(others[0]).__name__ if others else ""
         raise InputError("no_effects_in_file", file=path, got=got)
     for effect in found:
-        _refuse_unusable(effect, shown)
-    return tuple(replace(effect, from_file=True) for effect in found)
-
-
-def _refuse_unusable(effect: Effect, shown: str) -> None:
-    """InputError for parts that are not of their kind, or a name, a stage or an `each` that no command can use."""
-    shapes = isinstance(effect.shapes, tuple) and all(isinstance(one, Shape) for one in effect.shapes)
-    for name, right, wanted in (
-        ("amplitude", isinstance(effect.amplitude, Amplitude), "an Amplitude(...)"),
-        ("shapes", shapes, "a tuple (Shape(...), ...)"),
-        ("act", callable(effect.act), "a function"),
-    ):
-        if not right:
-            got = type(getattr(effect, name)).__name__
-            raise InputError(
-                f"{shown}: `{name}` of the effect {effect.name!r} expected {wanted}, got {got}; correct it."
-            )
-    parts: tuple[Effect | Amplitude | Shape, ...] = (effect, effect.amplitude, *effect.shapes)
-    for part in parts:
-        kinds = get_type_hints(type(part))
-        for one in fields(part):
-            value, kind = getattr(part, one.name), kinds[one.name]
-            number = isinstance(value, Real) and not isinstance(value, bool)
-            if (kind in (float, int) and not number) or (kind is str and not isinstance(value, str)):
-                place = f"`{one.name}` of " + ("" if part is effect else f"{part.name!r} of ")
-                wanted = "text" if kind is str else "a number"
+        shapes = isinstance(effect.shapes, tuple) and all(isinstance(one, Shape) for one in effect.shapes)
+        for name, right, wanted in (
+            ("amplitude", isinstance(effect.amplitude, Amplitude), "an Amplitude(...)"),
+            ("shapes", shapes, "a tuple (Shape(...), ...)"),
+            ("act", callable(effect.act), "a function"),
+        ):
+            if not right:
+                got = type(getattr(effect, name)).__name__
                 raise InputError(
-                    f"{shown}: {place}the effect {effect.name!r} expected {wanted}, got {value!r}; correct it."
+                    f"{shown}: `{name}` of the effect {effect.name!r} expected {wanted}, got {got}; correct it."
                 )
-    for place, value, right, wanted in (
-        ("the name of an effect", effect.name, effect.name.isascii() and effect.name.isidentifier(),
-         "letters, digits and underscores"),
-        (f"the stage of `{effect.name}`", effect.stage, effect.stage in STAGES, f"one of {', '.join(STAGES)}"),
-        (f"`each` of `{effect.name}`", effect.each, effect.each in EACH, f"one of {', '.join(EACH)}"),
-    ):  # fmt: skip
-        if not right:
-            raise InputError(f"{shown}: {place} expected {wanted}, got `{value}`; correct it.")
+        parts: tuple[Effect | Amplitude | Shape, ...] = (effect, effect.amplitude, *effect.shapes)
+        for part in parts:
+            kinds = get_type_hints(type(part))
+            for one in fields(part):
+                value, kind = getattr(part, one.name), kinds[one.name]
+                number = isinstance(value, Real) and not isinstance(value, bool)
+                if (kind in (float, int) and not number) or (kind is str and not isinstance(value, str)):
+                    place = f"`{one.name}` of " + ("" if part is effect else f"{part.name!r} of ")
+                    wanted = "text" if kind is str else "a number"
+                    raise InputError(
+                        f"{shown}: {place}the effect {effect.name!r} expected {wanted}, got {value!r}; correct it."
+                    )
+        for place, value, right, wanted in (
+            ("the name of an effect", effect.name, effect.name.isascii() and effect.name.isidentifier(),
+             "letters, digits and underscores"),
+            (f"the stage of `{effect.name}`", effect.stage, effect.stage in STAGES, f"one of {', '.join(STAGES)}"),
+            (f"`each` of `{effect.name}`", effect.each, effect.each in EACH, f"one of {', '.join(EACH)}"),
+        ):  # fmt: skip
+            if not right:
+                raise InputError(f"{shown}: {place} expected {wanted}, got `{value}`; correct it.")
+    return tuple(replace(effect, from_file=True) for effect in found)

@@ -126,7 +126,18 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     stated, factor = site.eddy_viscosity_m2_s, site.viscosity_factor
     if "eddy_viscosity_m2_s" not in site.model_fields_set:
         stated = usual_viscosity(site, ground)
-    parameters = _priors_of_friction(site, ground) if of_result is None else of_result.parameters
+    if of_result is None:
+        classes = ground.tree["friction"]["classes"]
+        of_bed = bed_prior(*(BED_OF_STREAM if site.walls is None else BED_OF_FLUME))
+        parameters = {"n_b": of_bed} | {
+            one["n"]: of_bed | {"symbol": one["n"], "meaning": phrase("meaning_of_parameter", "bed_class", name)}
+            for name, one in classes.items()
+            if one.get("n", "n_b") != "n_b"
+        }
+        if BANK_CLASS in classes.values():
+            parameters["k_s"] = loguniform_prior(0.01, 5.0, "m", "k_s", phrase("meaning_of_parameter", "banks"))
+    else:
+        parameters = of_result.parameters
     if factor > 1:
         parameters = parameters | {VISCOSITY: viscosity_prior(stated, factor)}
     measured.imported.extend([*ground.imported, *drawn_patches])
@@ -169,20 +180,6 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     texts = {**ground.texts, **texts_of_tables(target, [*measured.tables, *held_out.tables])}
     kept = {"frame": frame.model_dump(exclude_none=True) | {"origin": list(frame.origin)}} if frame is not None else {}
     return FolderCase(tree | kept | ({"imported": measured.imported} if measured.imported else {}), texts)
-
-
-def _priors_of_friction(site: FieldSite, ground: Ground) -> Tree:
-    """Manning's n of the bed and of each class of it, and k_s of banks."""
-    classes = ground.tree["friction"]["classes"]
-    of_bed = bed_prior(*(BED_OF_STREAM if site.walls is None else BED_OF_FLUME))
-    found = {"n_b": of_bed} | {
-        one["n"]: of_bed | {"symbol": one["n"], "meaning": phrase("meaning_of_parameter", "bed_class", name)}
-        for name, one in classes.items()
-        if one.get("n", "n_b") != "n_b"
-    }
-    if BANK_CLASS in classes.values():
-        found["k_s"] = loguniform_prior(0.01, 5.0, "m", "k_s", phrase("meaning_of_parameter", "banks"))
-    return found
 
 
 def usual_viscosity(site: FieldSite, ground: Ground) -> float:

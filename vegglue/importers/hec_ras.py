@@ -87,7 +87,17 @@ def _flow_of_area(geometry: Any, results: Any, vertical: float, horizontal: floa
     inside = (cells >= 0) & (cells < count)
     at = np.where(inside, cells, 0)
     sides = np.where(inside & wet[at], level[at], -np.inf)  # of a dry side, or a ghost cell, the other one counts
-    area, n_face = _of_faces(geometry, sides.max(axis=1), vertical, normal[:, 2] * horizontal)
+    # Wetted area [m2] and Manning's n of each face at the higher level of its sides; walls stand above its table.
+    at_face, info = sides.max(axis=1), np.asarray(geometry["Faces Area Elevation Info"], dtype=np.int64)
+    table = np.asarray(geometry["Faces Area Elevation Values"], dtype=np.float64)
+    z, of_table = table[:, 0] * vertical, table[:, 1] * vertical**2
+    area, n_face = np.zeros(at_face.size), np.full(at_face.size, np.nan)
+    for face, (start, rows) in enumerate(info):
+        here = slice(start, start + rows)
+        if rows and np.isfinite(at_face[face]):
+            area[face] = np.interp(at_face[face], z[here], of_table[here], left=0.0)
+            area[face] += normal[face, 2] * horizontal * max(at_face[face] - z[start + rows - 1], 0.0)
+            n_face[face] = np.interp(at_face[face], z[here], table[here, 3]) if table.shape[1] > 3 else np.nan
     u, v = _cell_velocities(cells, inside, normal[:, :2], velocity, area, count)
     if "Cells Center Manning's n" in geometry:
         rough = np.asarray(geometry["Cells Center Manning's n"], dtype=np.float64)
@@ -110,21 +120,6 @@ def _last_of(dataset: Any, default: float) -> Array:
     stated = [text_of(one).lower() for one in dataset.attrs.values() if isinstance(one, bytes | np.bytes_)]
     unit = next((LENGTHS[one] for one in stated if one in LENGTHS), default)
     return without_marks(np.asarray(dataset[-1], dtype=np.float64)) * unit
-
-
-def _of_faces(geometry: Any, level: Array, vertical: float, length: Array) -> tuple[Array, Array]:
-    """Wetted area [m2] and Manning's n of each face at the level (faces,), -inf for dry; above its table walls."""
-    info = np.asarray(geometry["Faces Area Elevation Info"], dtype=np.int64)
-    table = np.asarray(geometry["Faces Area Elevation Values"], dtype=np.float64)
-    z, of_table = table[:, 0] * vertical, table[:, 1] * vertical**2
-    area, rough = np.zeros(level.size), np.full(level.size, np.nan)
-    for face, (start, rows) in enumerate(info):
-        here = slice(start, start + rows)
-        if rows and np.isfinite(level[face]):
-            area[face] = np.interp(level[face], z[here], of_table[here], left=0.0)
-            area[face] += length[face] * max(level[face] - z[start + rows - 1], 0.0)
-            rough[face] = np.interp(level[face], z[here], table[here, 3]) if table.shape[1] > 3 else np.nan
-    return area, rough
 
 
 def _sums_over_cells(values: Array, cells: np.ndarray[Any, Any], used: np.ndarray[Any, Any], count: int) -> Array:

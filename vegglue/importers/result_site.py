@@ -53,6 +53,8 @@ OWN_CLASS = 0.1
 # Spread of the logarithm of n of a class of several: a factor of 1.5, as between the rows of Chow (1959, table 5-6).
 LOG_SD_OF_CLASS = round(math.log(1.5), 4)
 TRIES_ALONG = 12
+# The result in a file, by its path and the time of its last change.
+read_once = lru_cache(maxsize=8)(lambda path, changed: read_result(path))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +110,7 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
         raise site_refusal(path, error, "result") from None
     if not (paths := _result_files(folder, given, stated)):
         return read_site(path)
-    results = {name: _read_once(one, one.stat().st_mtime_ns) for name, one in paths.items()}
+    results = {name: read_once(one, one.stat().st_mtime_ns) for name, one in paths.items()}
     completed = dict(given)
     if "frame" not in given and not (given.get("grid") or {}).get("centreline"):
         completed |= _frame_of(next(iter(results.values())))
@@ -124,7 +126,16 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
     )
     _, place = drawn_placement(folder, site)
     placed = {name: _along_channel(paths[name], one, place, stated) for name, one in results.items()}
-    terrain = _bed_of_result(next(iter(placed.values())))
+    first = next(iter(placed.values()))
+    flow, corners = first.flow, first.corners
+    surface = LinearNDInterpolator(np.column_stack([flow.x, flow.y]), flow.bed)
+    wet = flow.y[flow.depth > 0.0]
+    beside = LAND_BESIDE * float(np.ptp(wet)) + flow.spacing
+    south = max(float(corners[:, 1].min()), float(wet.min()) - beside)
+    north = min(float(corners[:, 1].max()), float(wet.max()) + beside)
+    # As far along as the mesh reaches, and across as far as its water and some land.
+    extent = (float(corners[:, 0].min()), float(corners[:, 0].max()), south, north)
+    terrain = Terrain(lambda x, y: np.asarray(surface(x, y)), extent, f"bed of {first.result.code}")
     tree = grid_of_terrain(next(iter(paths.values())), terrain, site.grid, place)
     of_grid = grid_of_keys(tree, place)
     for flows in (experiments, held):
@@ -197,11 +208,6 @@ def _result_files(folder: Path, given: Mapping[str, Any], stated: ResultEntry) -
     return named
 
 
-@lru_cache(maxsize=8)
-def _read_once(path: Path, changed: int) -> ModelResult:
-    return read_result(path)
-
-
 def _frame_of(result: ModelResult) -> Tree:
     """`frame` along the mesh: x downstream from its upper end, y = 0 in its middle; empty if it lies so already."""
     wet = result.wet
@@ -234,18 +240,6 @@ def _along_channel(path: Path, result: ModelResult, place: Placement, stated: Re
     if not (flow.depth > 0.0).any():
         raise InputError(f"{shown_path(path)}: expected a flow, got a result that is dry at its end; give one at rest.")
     return PlacedResult(result, flow, corners[np.isfinite(corners).all(axis=1)], manning[there])
-
-
-def _bed_of_result(placed: PlacedResult) -> Terrain:
-    """The bed of a result, as far along as its mesh reaches, and across as far as its water and some land."""
-    flow, corners = placed.flow, placed.corners
-    surface = LinearNDInterpolator(np.column_stack([flow.x, flow.y]), flow.bed)
-    wet = flow.y[flow.depth > 0.0]
-    beside = LAND_BESIDE * float(np.ptp(wet)) + flow.spacing
-    south = max(float(corners[:, 1].min()), float(wet.min()) - beside)
-    north = min(float(corners[:, 1].max()), float(wet.max()) + beside)
-    extent = (float(corners[:, 0].min()), float(corners[:, 0].max()), south, north)
-    return Terrain(lambda x, y: np.asarray(surface(x, y)), extent, f"bed of {placed.result.code}")
 
 
 def _boundary_values(path: Path, flow: TheirFlow, grid: Grid, straight: bool) -> tuple[float, float]:

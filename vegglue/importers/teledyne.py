@@ -124,8 +124,11 @@ def _raw_ensembles(path: Path, group: list[bytes]) -> tuple[str, list[_RawEnsemb
     lost = np.abs(data["vel_bt"]) > FASTEST  # -32.768 m/s marks a lost bottom; the reader keeps it
     data["vel_bt"] = data["vel_bt"].where(~lost)
     if data.attrs["coord_sys"] == "beam" and str(data.attrs.get("use_3beam", "")) == "yes":
-        for name in ("vel", "vel_bt"):
-            data[name] = (data[name].dims, _by_three_beams(np.asarray(data[name].values, dtype=np.float64)))
+        for name in ("vel", "vel_bt"):  # one lost of four from b1 + b2 - b3 - b4 = 0, no error of velocity
+            beams = np.asarray(data[name].values, dtype=np.float64)
+            signs, lost_beams = np.array([1.0, 1.0, -1.0, -1.0]).reshape(-1, *[1] * (beams.ndim - 1)), np.isnan(beams)
+            rest = -signs * np.nansum(signs * beams, axis=0)
+            data[name] = (data[name].dims, np.where(lost_beams & (lost_beams.sum(axis=0) == 1), rest, beams))
     model = str(data.attrs["inst_model"])
     if data.attrs["coord_sys"] != "earth":
         from mhkit import dolfyn  # which has opened the file
@@ -183,14 +186,6 @@ def _sound_ensembles(content: bytes) -> tuple[list[list[bytes]], int, bool]:
         leader = next((block for block in kept if block[:2] == FIXED_LEADER), b"")
         groups.setdefault(leader[9:10] + leader[12:14] + leader[32:34], []).append(whole)  # count, size and first range
     return [*groups.values()] or [[content]], damaged, of_surface
-
-
-def _by_three_beams(beams: Array) -> Array:
-    """Velocities (4, ...) along the beams, a lost one of four from b1 + b2 - b3 - b4 = 0, no error of velocity."""
-    signs = np.array([1.0, 1.0, -1.0, -1.0]).reshape(-1, *[1] * (beams.ndim - 1))
-    lost = np.isnan(beams)
-    rest = -signs * np.nansum(signs * beams, axis=0)
-    return np.where(lost & (lost.sum(axis=0) == 1), rest, beams)
 
 
 def _to_true_north(vectors: Array, declination: float) -> Array:

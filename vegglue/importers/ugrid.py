@@ -74,7 +74,14 @@ def read_ugrid(path: Path) -> ModelResult:
         node_x, node_y = (variables[name] for name in named["node_coordinates"][:2])
         refuse_degrees(path, node_x)
         nodes = np.column_stack([node_x.values(), node_y.values()])
-        corners = _corners_of_faces(variables[named["face_node_connectivity"][0]])
+        connectivity = variables[named["face_node_connectivity"][0]]
+        raw, fill = connectivity.numbers(), connectivity.attributes.get("_FillValue")
+        start = int(np.ravel(connectivity.attributes.get("start_index", 0))[0])
+        none = ~np.isfinite(raw.astype(np.float64)) | (raw < start)
+        if fill is not None:
+            none |= raw == np.ravel(fill)[0]
+        # Nodes of each face (faces, most), counted from 0, and -1 where a face has fewer.
+        corners = np.where(none, -1, np.where(none, 0, raw).astype(np.int64) - start)
         faces, times = corners.shape[0], max(variables["time"].shape[0], 1) if "time" in variables else 0
         fields = {key: _field(variables, mesh, key, (faces, len(nodes)), times) for key in UGRID_NAMES}
         given = {key: one for key, one in fields.items() if one is not None}
@@ -128,17 +135,6 @@ def _field(
         if len(rest) == 1 and rest[0] in sizes:
             return one.values(times if of_time else 0)
     return None
-
-
-def _corners_of_faces(connectivity: NetcdfVariable) -> np.ndarray[Any, Any]:
-    """Nodes of each face (faces, most), counted from 0, and -1 where a face has fewer."""
-    raw = connectivity.numbers()
-    start = int(np.ravel(connectivity.attributes.get("start_index", 0))[0])
-    fill = connectivity.attributes.get("_FillValue")
-    none = ~np.isfinite(raw.astype(np.float64)) | (raw < start)
-    if fill is not None:
-        none |= raw == np.ravel(fill)[0]
-    return np.where(none, -1, np.where(none, 0, raw).astype(np.int64) - start)
 
 
 def _mean_of_corners(values: Array, corners: np.ndarray[Any, Any]) -> Array:

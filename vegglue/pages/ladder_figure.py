@@ -68,7 +68,24 @@ def draw_ladder(scores: Sequence[ModelScore]) -> Figure:
     if names:
         panels = list(parts[1].subplots(rows, LADDER_COLUMNS, squeeze=False).flat)
         for axes, name in zip(panels, names, strict=False):
-            _paint_parameter(axes, scores, name)
+            known = [(k, score) for k, score in enumerate(scores, 1) if name in score.values]
+            for place, score in known:
+                middle, low, high = score.values[name]
+                axes.vlines(place, low, high, color=COLOUR["model"], linewidth=1.1)
+                face = COLOUR["paper" if name in differing(score.homogeneity) else "model"]
+                axes.plot(place, middle, "o", markersize=5, color=COLOUR["model"], markerfacecolor=face, zorder=4)
+            values = np.array([score.values[name] for _, score in known])
+            if (values > 0).all() and values.max() > LOGARITHMIC_FROM * values.min():
+                axes.set_yscale("log")
+                for set_formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+                    set_formatter(LogFormatter())  # plain numbers: the usual one writes formulae
+            moving = [score.homogeneity[name] for _, score in known if name in score.homogeneity]
+            homogeneity = f"\none value: p = {fixed(moving[-1], 2)}" if moving else ""
+            title = "\n".join(_broken(name, TITLE_LETTERS))
+            axes.set_title(f"{title}{homogeneity}", fontsize=SMALL + 0.5, fontweight="normal")
+            axes.set(xlim=(0.5, len(scores) + 0.5))
+            axes.set_xticks(range(1, len(scores) + 1))
+            axes.tick_params(labelsize=7.5)
         for axes in panels[len(names) :]:
             axes.set_visible(False)
     return figure
@@ -125,24 +142,3 @@ def _paint_errors(
 def _broken(name: str, letters: int) -> list[str]:
     """A name in lines of at most so many letters, broken at underscores first."""
     return [line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), letters)]
-
-
-def _paint_parameter(axes: Axes, scores: Sequence[ModelScore], name: str) -> None:
-    known = [(k + 1, score) for k, score in enumerate(scores) if name in score.values]
-    for place, score in known:
-        middle, low, high = score.values[name]
-        axes.vlines(place, low, high, color=COLOUR["model"], linewidth=1.1)
-        face = COLOUR["paper" if name in differing(score.homogeneity) else "model"]
-        axes.plot(place, middle, "o", markersize=5, color=COLOUR["model"], markerfacecolor=face, zorder=4)
-    values = np.array([score.values[name] for _, score in known])
-    if (values > 0).all() and values.max() > LOGARITHMIC_FROM * values.min():
-        axes.set_yscale("log")
-        for set_formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-            set_formatter(LogFormatter())  # plain numbers: the usual one writes formulae
-    moving = [score.homogeneity[name] for _, score in known if name in score.homogeneity]
-    homogeneity = f"\none value: p = {fixed(moving[-1], 2)}" if moving else ""
-    title = "\n".join(_broken(name, TITLE_LETTERS))
-    axes.set_title(f"{title}{homogeneity}", fontsize=SMALL + 0.5, fontweight="normal")
-    axes.set(xlim=(0.5, len(scores) + 0.5))
-    axes.set_xticks(range(1, len(scores) + 1))
-    axes.tick_params(labelsize=7.5)

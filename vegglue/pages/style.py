@@ -28,13 +28,18 @@ WIDTH, HEIGHT = 4.7, 3.1  # one column of the page [inch]
 SMALL = 7.5  # direct labels [pt]
 
 
-def _settings() -> dict[str, Any]:
+@contextmanager
+def _styled_context() -> Iterator[None]:
+    """Nothing of a `matplotlibrc` counts: one in the folder of a stranger could have texts set by LaTeX.
+
+    Signs that no font here has are drawn as boxes, which is enough: matplotlib would complain of each in a line.
+    """
     # The first of some sober faces that is installed; DejaVu Sans comes with matplotlib and fills missing glyphs.
     installed = {font.name for font in font_manager.fontManager.ttflist}
     wanted = ("Source Sans 3", "Inter", "Helvetica", "Arial", "Liberation Sans")
     face = [*[name for name in wanted if name in installed][:1], "DejaVu Sans"]
     ink, muted = COLOUR["ink"], COLOUR["muted"]
-    return {
+    settings: dict[str, Any] = {
         "font.family": face,
         "font.size": 9,
         # A name, title or section may hold any sign: it is no formula. Those that are stand in `formula_labels`.
@@ -72,18 +77,10 @@ def _settings() -> dict[str, Any]:
         "svg.fonttype": "path",  # glyphs as outlines: the same on every machine, no font needed by the reader
         "svg.hashsalt": "vegglue",  # the same picture, the same file
     }
-
-
-@contextmanager
-def _styled_context() -> Iterator[None]:
-    """Nothing of a `matplotlibrc` counts: one in the folder of a stranger could have texts set by LaTeX.
-
-    Signs that no font here has are drawn as boxes, which is enough: matplotlib would complain of each in a line.
-    """
     with matplotlib.rc_context(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+ .*missing from")
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_settings())  # type: ignore[arg-type]  # its keys are a literal type of 300 names
+        matplotlib.rcParams.update(settings)  # type: ignore[arg-type]  # its keys are a literal type of 300 names
         yield
 
 

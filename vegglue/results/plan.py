@@ -493,8 +493,17 @@ def write_field_files(folder: Path, case: Case, plan: FieldPlan) -> FieldFiles:
     ]  # fmt: skip
     write_text(folder / "stations.csv", csv_text(heading, rows), MAKE_ROOM)
     gpx = folder / "stations.gpx"
-    if not without:
-        write_text(gpx, _gpx(case, stations), MAKE_ROOM)
+    if not without:  # waypoints after GPX 1.1 (https://www.topografix.com/GPX/1/1/)
+        if not all(np.isfinite([one.longitude, one.latitude]).all() for one in stations):
+            raise InputError(f"{case.name}: `frame` places stations outside its `crs`; correct one of both.")
+        points = [
+            f'  <wpt lat="{one.latitude:.7f}" lon="{one.longitude:.7f}"><name>{escape(one.name)}</name>'
+            f"<desc>{escape(f'{one.work.value}, x {one.x:g} m, y {one.y:g} m')}</desc></wpt>"
+            for one in stations
+        ]
+        head = '<?xml version="1.0" encoding="UTF-8"?>\n<gpx version="1.1" creator="vegglue" xmlns="http://www.topografix.com/GPX/1/1">'
+        name = f"  <metadata><name>{escape(case.title or case.name)}</name></metadata>"
+        write_text(gpx, "\n".join([head, name, *points, "</gpx>", ""]), MAKE_ROOM)
     elif gpx.exists():
         gpx.unlink()
     write_made({folder / SHEET / name: text for name, text in sheets(folder / SHEET, case, plan).items()}, MAKE_ROOM)
@@ -549,17 +558,3 @@ def sheets(folder: Path, case: Case, plan: FieldPlan) -> dict[str, str]:
 
 def _digits(value: float, places: int) -> str:
     return f"{value:.{places}f}" if np.isfinite(value) else ""
-
-
-def _gpx(case: Case, stations: Sequence[FieldStation]) -> str:
-    """Waypoints after GPX 1.1 (https://www.topografix.com/GPX/1/1/)."""
-    if not all(np.isfinite([one.longitude, one.latitude]).all() for one in stations):
-        raise InputError(f"{case.name}: `frame` places stations outside its `crs`; correct one of both.")
-    points = [
-        f'  <wpt lat="{one.latitude:.7f}" lon="{one.longitude:.7f}"><name>{escape(one.name)}</name>'
-        f"<desc>{escape(f'{one.work.value}, x {one.x:g} m, y {one.y:g} m')}</desc></wpt>"
-        for one in stations
-    ]
-    head = '<?xml version="1.0" encoding="UTF-8"?>\n<gpx version="1.1" creator="vegglue" xmlns="http://www.topografix.com/GPX/1/1">'
-    name = f"  <metadata><name>{escape(case.title or case.name)}</name></metadata>"
-    return "\n".join([head, name, *points, "</gpx>", ""])

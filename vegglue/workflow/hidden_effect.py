@@ -106,7 +106,17 @@ def chosen_effect(
         candidate = everything[int(random.integers(len(everything)))] if name == ANY else candidate_of(base.model, name)
         amplitude = candidate.amplitude
         listed = not name.startswith(UNLISTED)
-        shapes = _shapes(base.model, candidate, listed, random)
+        if listed:  # between the values that a search tries, but for those of the place of a candidate
+            shapes = candidate.drawn_shapes(random)
+        else:  # anywhere on the floor
+            used, (low, high) = base.model.station[base.model.station["used"]], base.model.case.grid.x
+            first, last = (low + share * (high - low) for share in PLACED_ALONG)
+            x = random.uniform(first, last)
+            across = used[velocity_rows(used)]["y"]
+            middle, half = 0.5 * (across.max() + across.min()), 0.5 * (across.max() - across.min())
+            y = middle + PLACED_ACROSS * half * random.uniform(-1.0, 1.0)
+            radius = next(shape.default for shape in candidate.effect.shapes if shape.name == "radius")
+            shapes = {"x": float(x), "y": float(y), "radius": radius}
         label = candidate.name if listed else UNLISTED + candidate.effect.name
         if size is not None:
             if not amplitude.low <= size <= amplitude.high:
@@ -175,22 +185,6 @@ def size_given(text: str, size: str) -> float | None:
 def with_unlisted_objects(case: Case, hidden: Hidden) -> Case:
     """The case with the file of the unlisted objects, if what is hidden is one of them."""
     return case if hidden.listed else case.model_copy(update={"effect_file": Path(unlisted_objects.__file__)})
-
-
-def _shapes(model: Model, candidate: Candidate, listed: bool, random: np.random.Generator) -> dict[str, float]:
-    """Between the values that a search tries, not on them, but for those of the place of a candidate; something
-    in no list stands anywhere on the floor.
-    """
-    if listed:
-        return candidate.drawn_shapes(random)
-    used = model.station[model.station["used"]]
-    low, high = model.case.grid.x
-    first, last = (low + share * (high - low) for share in PLACED_ALONG)
-    x = random.uniform(first, last)
-    velocity = used[velocity_rows(used)]["y"]
-    middle, half = 0.5 * (velocity.max() + velocity.min()), 0.5 * (velocity.max() - velocity.min())
-    radius = next(shape.default for shape in candidate.effect.shapes if shape.name == "radius")
-    return {"x": float(x), "y": float(middle + PLACED_ACROSS * half * random.uniform(-1.0, 1.0)), "radius": radius}
 
 
 def _sized(

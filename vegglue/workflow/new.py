@@ -93,7 +93,19 @@ def new(name: str, reach: Reach | None = None, *, folder: Path | str = ".") -> C
     into = Path(folder) / name
     if into.exists():
         raise InputError(f"{shown_path(into)}: expected a name that is free, got one in use; take another.")
-    words = {"name": case_name(Path(name).name), "plants": reach.plants, **_grid_and_patch(reach)}
+    # Banks of 1:2 up to half a metre above the water, cells about twice as long as wide.
+    dy, level = reach.width / CELLS_OF_FLOOR, reach.depth - reach.slope * reach.length
+    beside = int(np.ceil((reach.depth + reach.slope * reach.length + 0.5) / 0.5 / dy))
+    columns = 2 * round(reach.length / dy / 4.0)
+    dx = reach.length / columns
+    numbers = {
+        "length": reach.length, "half": 0.5 * reach.width + beside * dy, "dx": dx, "dy": dy, "width": reach.width,
+        "slope": reach.slope, "discharge": reach.discharge, "level": level, "canopy": 0.6 * reach.depth,
+        "patch_from": dx * round(0.4 * columns), "patch_to": dx * round(0.55 * columns),
+        "patch_side": 0.5 * reach.width,
+    }  # fmt: skip
+    words = {"name": case_name(Path(name).name), "plants": reach.plants}
+    words |= {key: f"{value:.10g}" for key, value in numbers.items()}
     growing = into.with_name(f".{into.name}.new")
     _clear(growing)
     write_text(growing / "case.yaml", file_text("case.yaml.j2", words), ANOTHER_NAME)
@@ -121,21 +133,6 @@ def _clear(growing: Path) -> None:
                 for file in (growing / name, growing / f"{name}.new"):
                     file.unlink(missing_ok=True)
             growing.rmdir()
-
-
-def _grid_and_patch(reach: Reach) -> dict[str, str]:
-    """Grid and patch: banks of 1:2 up to half a metre above the water, cells about twice as long as wide."""
-    dy = reach.width / CELLS_OF_FLOOR
-    beside = int(np.ceil((reach.depth + reach.slope * reach.length + 0.5) / 0.5 / dy))
-    columns = 2 * round(reach.length / dy / 4.0)
-    half = 0.5 * reach.width + beside * dy
-    patch = (reach.length / columns * round(0.4 * columns), reach.length / columns * round(0.55 * columns))
-    found = {
-        "length": reach.length, "half": half, "dx": reach.length / columns, "dy": dy, "width": reach.width,
-        "slope": reach.slope, "discharge": reach.discharge, "level": reach.depth - reach.slope * reach.length,
-        "canopy": 0.6 * reach.depth, "patch_from": patch[0], "patch_to": patch[1], "patch_side": 0.5 * reach.width,
-    }  # fmt: skip
-    return {name: f"{value:.10g}" for name, value in found.items()}
 
 
 def _write_measurements(into: Path, flow: FlowFields, reach: Reach) -> None:
