@@ -42,7 +42,7 @@ Smooth fields of a term (`field_scan`) are so free that they explain much of wha
 with a single cause, but with all that was accepted in the end.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -277,20 +277,38 @@ def found_extent(
         candidate = replace(candidate, fitted=(("x", of_x), ("y", of_y), ("length", length), ("width", width)))
         gain = float(candidate.amplitude.gain(spot.amplitude))
         trials.append(RefitTrial(candidate, shapes, (start_with(candidate, spot.fitted.point.z[:-1], gain),)))
+    grid = search.model.site.grid
+
+    def is_narrow(shapes: Mapping[str, float]) -> bool:
+        return shapes["length"] < LEAST_EXTENT * grid.dx or shapes["width"] < LEAST_EXTENT * grid.dy
+
+    if (found := _best_fitted(search, kind, trials, is_narrow)) is None:
+        return None
+    fixed, evidence, errors = found
+    error = errors["x"], errors["y"]
+    return FoundPlace(fixed, evidence, error, error)
+
+
+def _best_fitted(
+    search: SearchModel, kind: HypothesisKind, trials: Sequence[RefitTrial],
+    is_none: Callable[[Mapping[str, float]], bool],
+) -> tuple[Refit, float, dict[str, float]] | None:  # fmt: skip
+    """The likeliest of some trials of one thing, calibrated again with its shapes held, its evidence, and the standard
+    errors of the shapes; None if no flow is found, its shapes are none, or it would take the place of what acts there.
+    """
     ended = [one for one in refits_of(search, trials) if one is not None]
     if not ended:
         return None
     best = max(ended, key=lambda one: one.log_factor)
     shapes, errors = fitted_extent(search, best)
-    candidate, grid = place_candidate(effect, shapes, places.plausible, above_off), search.model.site.grid
-    narrow = shapes["length"] < LEAST_EXTENT * grid.dx or shapes["width"] < LEAST_EXTENT * grid.dy
-    if narrow or candidate.key in search.model.case.effects:
+    of = best.candidate
+    candidate = place_candidate(of.effect, shapes, of.scale, of.above_off)
+    if is_none(shapes) or candidate.key in search.model.case.effects:
         return None
     (fixed,) = refits_of(search, [RefitTrial(candidate, shapes, (best.fitted.point.z[: -len(errors)],))])
     if fixed is None:
         return None
-    evidence, error = best.log_factor + float(logsumexp(kind.log_prior)), (errors["x"], errors["y"])
-    return FoundPlace(replace(fixed, interval95=best.interval95), evidence, error, error)
+    return replace(fixed, interval95=best.interval95), best.log_factor + float(logsumexp(kind.log_prior)), errors
 
 
 def found_patch(
@@ -342,27 +360,20 @@ def found_patch(
         candidate = replace(place_candidate(effect, shapes, plausible), fitted=tuple(free.items()))
         at = [start_with(candidate, search.point.z, share * plausible) for share in START_SHARES]
         trials.append(RefitTrial(candidate, shapes, tuple(at)))
-    ended = [one for one in refits_of(search, trials) if one is not None]
-    if not ended:
-        return None
-    best = max(ended, key=lambda one: one.log_factor)
-    shapes, errors = fitted_extent(search, best)
     geometry = channel_geometry(case, search.model.site, next(iter(case.experiments)))
-    share = rectangle(geometry, **{name: np.array([shapes[name]]) for name in errors})[..., 0]
-    covered = float((share * search.model.site.cover).sum() / share.sum())
-    candidate = place_candidate(effect, shapes, plausible)
-    if shapes["length"] <= places.length.min() or covered > MOST_COVERED or candidate.key in case.effects:
+
+    def is_spot_or_known(shapes: Mapping[str, float]) -> bool:
+        share = rectangle(geometry, **{name: np.array([shapes[name]]) for name in free})[..., 0]
+        covered = float((share * search.model.site.cover).sum() / share.sum())
+        return shapes["length"] <= places.length.min() or covered > MOST_COVERED
+
+    if (found := _best_fitted(search, kind, trials, is_spot_or_known)) is None:
         return None
-    (fixed,) = refits_of(search, [RefitTrial(candidate, shapes, (best.fitted.point.z[: -len(errors)],))])
-    if fixed is None:
-        return None
+    fixed, evidence, errors = found
     of_sizes = {f"{name}_error": errors[name] for name in ("length", "width", "angle")}
-    own = {name: shapes[name] for name in ("angle", "height", "proportional")}
+    own = {name: fixed.shapes[name] for name in ("angle", "height", "proportional")}
     outline = PatchOutline(**own, **of_sizes, like=like)
-    evidence = best.log_factor + float(logsumexp(kind.log_prior))
-    return FoundPlace(
-        replace(fixed, interval95=best.interval95), evidence, (errors["x"], errors["y"]), (0.0, 0.0), outline
-    )
+    return FoundPlace(fixed, evidence, (errors["x"], errors["y"]), (0.0, 0.0), outline)
 
 
 def window_around(search: SearchModel, places: Places, refit: Refit) -> Window:
