@@ -28,7 +28,6 @@ from vegglue.cli.terminal import (
     opened_runs,
     print_doubts_of_ensemble,
     print_object,
-    print_result,
     progress_reporter,
 )
 from vegglue.errors import InputError, shown_path
@@ -38,7 +37,20 @@ from vegglue.wording.numbers import so_many
 from vegglue.wording.sentences import phrase
 
 if TYPE_CHECKING:
+    from vegglue.case.schema import Case
     from vegglue.effects.definition import Effect
+
+
+def print_result(case: "Case", runs: Path, result: Any, as_object: bool, details: bool = False, more: str = "") -> None:
+    """Print a result of a verb, kept in runs/<name>/, as an object or in words."""
+    if as_object:
+        from vegglue.cli.objects import object_of
+
+        print_object(object_of(case, runs, result))
+    else:
+        from vegglue.cli.printed import show
+
+        show(case, runs, result, details, more)
 
 
 def check_command(

@@ -24,7 +24,6 @@ from vegglue.wording.sentences import phrase
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from vegglue.case.schema import Case
     from vegglue.workflow.case_run import CaseRun
 
 # What stands for the value of an option that takes none: typer 0.29 would write `<bool>`, as if it took one.
@@ -204,15 +203,3 @@ def moving_line(screen: "Console") -> Iterator[Watch]:
             )
 
         yield watch
-
-
-def print_result(case: "Case", runs: Path, result: Any, as_object: bool, details: bool = False, more: str = "") -> None:
-    """Print a result of a verb, kept in runs/<name>/, as an object or in words."""
-    if as_object:
-        from vegglue.cli.objects import object_of
-
-        print_object(object_of(case, runs, result))
-    else:
-        from vegglue.cli.printed import show
-
-        show(case, runs, result, details, more)
