@@ -104,17 +104,9 @@ class KnownInstead:
 
 
 NotKept = (
-    NoFlowWithIt
-    | NothingToHoldOut
-    | HeldOutErrorsRose
-    | FallNotClear
-    | HeldOutErrorsDidNotFall
-    | MisfitRose
-    | AmplitudeNearOff
-    | NotNeeded
-    | KnownInstead
-    | ActsElsewhere
-)
+    NoFlowWithIt | NothingToHoldOut | HeldOutErrorsRose | FallNotClear | HeldOutErrorsDidNotFall | MisfitRose |
+    AmplitudeNearOff | NotNeeded | KnownInstead | ActsElsewhere
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

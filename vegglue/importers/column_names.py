@@ -149,16 +149,8 @@ class Role:
 
 # Columns that name the gauge of a level, and mean nothing beside velocities.
 NAMES_OF_GAUGES = (
-    "gauge",
-    "gage",
-    "gauge name",
-    "gage name",
-    "gauge id",
-    "gauge no",
-    "staff gauge",
-    "pegelname",
-    "peilschaal",
-)
+    "gauge", "gage", "gauge name", "gage name", "gauge id", "gauge no", "staff gauge", "pegelname", "peilschaal",
+)  # fmt: skip
 # Told apart from one another by their whole name, so that none of these is ambiguous. East and north components are
 # roles of their own: they turn with the map.
 ROLES = {

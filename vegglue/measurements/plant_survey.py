@@ -12,16 +12,9 @@ from vegglue.errors import InputError, shown_path
 from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
 
 SURVEYED = (
-    "plant_height",
-    "stem_height",
-    "undergrowth_height",
-    "stem_diameter",
-    "stem_diameter_with_debris",
-    "undergrowth_diameter",
-    "branch_diameter",
-    "stems",
-    "branches_per_stem",
-)
+    "plant_height", "stem_height", "undergrowth_height", "stem_diameter", "stem_diameter_with_debris",
+    "undergrowth_diameter", "branch_diameter", "stems", "branches_per_stem",
+)  # fmt: skip
 DRAWS = 20000  # their mean is known to 0.7 % of their spread
 DRAG_COEFFICIENT = 1.0  # [-] of submerged plants: Berends et al. (2020), after Wunder et al. (2011)
 

@@ -196,26 +196,11 @@ class CommandNotSettled:
 
 OfTheData = DischargeMismatch | ImplausibleOutlet | ImplausibleValues
 Reason = (
-    OfTheData
-    | MisfitBeyondErrors
-    | ParameterFarFromPrior
-    | AmplitudeAtBound
-    | AmplitudeBeyondPlausible
-    | NameHangsOnSection
-    | NeighboursExcluded
-    | TooManyGroups
-    | NoneLeads
-    | MisfitUnexplained
-    | ErrorsLargerThanStated
-    | CorrelatedErrors
-    | ModelErrorExceeded
-    | NoFlowHeldOut
-    | HeldOutMissed
-    | UncertainBetweenSections
-    | FewTestable
-    | CommandDiffers
-    | CommandNotSettled
-)
+    OfTheData | MisfitBeyondErrors | ParameterFarFromPrior | AmplitudeAtBound | AmplitudeBeyondPlausible |
+    NameHangsOnSection | NeighboursExcluded | TooManyGroups | NoneLeads | MisfitUnexplained | ErrorsLargerThanStated |
+    CorrelatedErrors | ModelErrorExceeded | NoFlowHeldOut | HeldOutMissed | UncertainBetweenSections | FewTestable |
+    CommandDiffers | CommandNotSettled
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -646,52 +631,18 @@ class ResultCompared:
 
 
 Note = (
-    DischargeMismatch
-    | MisfitTooSmall
-    | ImplausibleAmplitude
-    | EstimateAtBound
-    | BeyondHandbook
-    | InflowDevelops
-    | CellsTooCoarse
-    | ShearLayer
-    | EstimateOffPrior
-    | EffectsNotExcluded
-    | EffectsExcluded
-    | ModelErrorUsed
-    | LawStandsOut
-    | NeighboursCorrelated
-    | StatedErrorsTooSmall
-    | InstrumentExcluded
-    | EffectsUntestable
-    | BedCorrected
-    | PlacesOnMap
-    | MeasuredStretch
-    | TooShallow
-    | MisfitRemains
-    | CommandCompared
-    | ResultCompared
-)
+    DischargeMismatch | MisfitTooSmall | ImplausibleAmplitude | EstimateAtBound | BeyondHandbook | InflowDevelops |
+    CellsTooCoarse | ShearLayer | EstimateOffPrior | EffectsNotExcluded | EffectsExcluded | ModelErrorUsed |
+    LawStandsOut | NeighboursCorrelated | StatedErrorsTooSmall | InstrumentExcluded | EffectsUntestable | BedCorrected |
+    PlacesOnMap | MeasuredStretch | TooShallow | MisfitRemains | CommandCompared | ResultCompared
+)  # fmt: skip
 
 
 Conclusion = Literal[
-    "measurements_to_correct",
-    "law_beside_instrument",
-    "law_in_doubt",
-    "law",
-    "law_rather_than_effects",
-    "law_or_effects",
-    "law_possible",
-    "field",
-    "several_possible",
-    "too_many_possible",
-    "named",
-    "best_explanation",
-    "instrument",
-    "nothing_missing",
-    "misfit_unexplained",
-    "few_testable",
-    "silence_in_doubt",
-]
+    "measurements_to_correct", "law_beside_instrument", "law_in_doubt", "law", "law_rather_than_effects",
+    "law_or_effects", "law_possible", "field", "several_possible", "too_many_possible", "named", "best_explanation",
+    "instrument", "nothing_missing", "misfit_unexplained", "few_testable", "silence_in_doubt",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
