@@ -6,13 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.special
 from drawings import off_the_sheet, points, texts
+from matplotlib.figure import Figure
+from report_runs import a_toy
 
 from vegglue.flow.sensor import FlowFields
+from vegglue.pages.diagnosis_figures import draw_fingerprint
 from vegglue.pages.flow_maps import draw_reach, stream_function, stretch_of, wet_window
 from vegglue.pages.measured_figures import Vertical, draw_quantiles, draw_residuals, draw_verticals
+from vegglue.pages.parameters import parameter_row
 from vegglue.pages.posterior_figures import (
     LONGEST_LABEL,
     POSTERIOR_MEMBERS,
@@ -23,8 +28,10 @@ from vegglue.pages.posterior_figures import (
     draw_joint,
     draw_marginal,
     draw_weights,
+    range_of_figure,
+    references_of,
 )
-from vegglue.pages.style import publish, publish_text
+from vegglue.pages.style import canvas, formula_labels, publish, publish_text, save, styled
 from vegglue.pages.svg import COLOUR, PALETTE, inline
 from vegglue.wording.numbers import (
     as_given,
@@ -34,6 +41,7 @@ from vegglue.wording.numbers import (
     plus_minus,
     short,
     symbol_html,
+    symbol_math,
     unit_html,
     unit_math,
 )
@@ -313,3 +321,98 @@ def luminance(colour: str) -> float:
 )
 def test_numbers_are_set_as_in_print(set_: str, expected: str) -> None:
     assert set_.replace("\u202f", " ").replace("\u00a0", " ") == expected
+
+
+@pytest.mark.parametrize(("bounds", "logarithmic", "wanted"), [
+    ((0.0, 10.0), False, (0.0, 10.0)),
+    ((-45.0, 45.0), False, (0.5, 9.8)),
+    ((0.4, np.inf), False, (0.4, 9.8)),
+    ((0.4, 12.0), True, (0.4, 12.0)),
+    ((1e-9, 1e9), True, (0.5, 9.8)),
+])  # fmt: skip
+def test_a_figure_ends_where_values_do_or_at_the_bounds_they_come_near(
+    bounds: tuple[float, float], logarithmic: bool, wanted: tuple[float, float]
+) -> None:
+    """Water that enters was a needle on an axis from -45 to 45 m3/s, with a prior of 0.13 m3/s."""
+    assert range_of_figure(np.linspace(0.5, 9.8, 50), bounds, logarithmic) == pytest.approx(wanted)
+
+
+def test_one_value_is_drawn_between_the_bounds() -> None:
+    assert range_of_figure(np.array([2.0, 2.0]), (1.0, 5.0), False) == (1.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("table", "value", "sd", "study"),
+    [
+        ({"phi": [30.0, 3.0], "log10_phi": [1.6, 0.2]}, 10**1.6, 0.2, 1.6),
+        ({"phi": [30.0, 3.0]}, 10**1.477, 0.043, 1.477),
+        ({"phi": 30.0}, 10**1.48, np.nan, 1.48),
+        ({"n_b": [0.03, 0.01], "log10_n_b": [-1.0, 0.1]}, 0.03, 0.01, 0.03),
+        ({"log10_n_b": [-1.0, 0.1]}, 0.1, 0.023, 0.1),
+    ],
+)
+def test_a_figure_marks_the_value_of_the_table(
+    tmp_path: Path, table: dict[str, object], value: float, sd: float, study: float
+) -> None:
+    """Of a study that gives a parameter and its power of ten, the figure marked one and the table the other."""
+    run = a_toy(tmp_path, reference={"source": "A study", "table": table})
+    name = next(iter(table)).removeprefix("log10_")
+    marked = references_of(run, name)[0]
+    assert (marked.value, marked.sd) == pytest.approx((value, sd), nan_ok=True)
+    assert parameter_row(run, name).study == pytest.approx((study, sd), nan_ok=True)
+
+
+NASTY = (
+    "10\\south", "$n_b$", "$x^$", "a b%", "n^", "x_", "_x", "a_b_c", "a_{b", "\\frac", "$", "$$", "\\$", "a#b&c~", "{}",
+    "<script>alert(1)</script>", "]]>", "&amp;", "φ_d", "%", "'", "",
+)  # fmt: skip
+
+
+def drawn(figure: Figure) -> Figure:
+    figure.canvas.draw()
+    return figure
+
+
+@pytest.mark.parametrize("name", NASTY)
+def test_a_symbol_or_unit_of_any_signs_can_be_drawn(name: str) -> None:
+    values = np.linspace(1.0, 2.0, 50)
+    parameter = DrawnParameter(values, values, 1.0, 2.0, False, name, name, (1.0, 2.0))
+    drawn(draw_joint(parameter, parameter, np.full(50, 0.02), [(name, 1.5, 1.5, "o")]))
+    drawn(draw_cylinder(values, np.full(50, 0.02), values, 1.0, 2.0, name))
+
+
+@pytest.mark.parametrize("name", NASTY)
+def test_a_section_of_any_signs_is_written_as_it_is(name: str) -> None:
+    assert name in texts(drawn(draw_quantiles(np.array([-1.0, 0.0, 1.0]), [name] * 3)).axes[0])
+    residuals = draw_residuals(np.arange(3.0), "x", np.arange(3.0), [name] * 3, unit_math("m/s"))
+    assert name in texts(drawn(residuals).axes[0])
+
+
+@pytest.mark.parametrize("name", NASTY)
+def test_the_size_of_an_effect_is_written_as_it_is(name: str) -> None:
+    station = pd.DataFrame({"experiment": "E", "kind": "velocity", "section": "S", "x": 1.0, "y": np.arange(3.0)})
+    figure = drawn(draw_fingerprint(np.arange(3.0), station, f"2 {name}"))
+    assert figure.get_suptitle() == f"by 2 {name}"
+
+
+@styled
+def formula(text: str) -> Figure:
+    figure = Figure()
+    formula_labels(figure.subplots(), text)
+    return drawn(figure)
+
+
+def test_symbols_and_units_stay_formulae() -> None:
+    assert symbol_math("n_b") == "$n_{b}$"
+    assert symbol_math("discharge_error[high]") == "$discharge_{error[high]}$"
+    assert symbol_math("$n_b$") == r"\$n_b\$"
+    assert unit_math("$ m^2") == r"\$ m$^{2}$"
+    assert formula("$n_{b}$").axes[0].xaxis.label.get_parse_math()
+
+
+def test_signs_that_no_font_has_make_no_complaints(tmp_path: Path) -> None:
+    """Warnings are errors in these tests."""
+    figure, axes = canvas()
+    axes.set_title("\U000131f2")  # a hieroglyph
+    save(figure, tmp_path / "hieroglyph.png", 50)
+    assert (tmp_path / "hieroglyph.png").stat().st_size > 0
