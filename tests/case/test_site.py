@@ -114,43 +114,33 @@ def test_cells_without_a_level_are_refused(tmp_path):
 
 
 TWO = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 2\n"
+BAD_SURVEYS = [
+    ("x,y\n1,2\n", ("x, y and z",)), ("x,y,z\n0,0,1\n1,0,high\n", ("data row 2", "column z", "'high'")),
+    ("x,y,z\n0,0,1\n1,0\n", ("data row 2", "column z")), ("x,y,z\n0,0,1\n1,1,1\n2,2,1\n", ("three", "got 3")),
+    ("x,y,z\n", ("three", "got 0")), ("x,y,z\n0,0,1,5\n", ("data row 1",)),
+    (f"x,y,z\n{'1' * 200_000},0,0\n", ("CSV",)),
+]  # fmt: skip
+BAD_RASTERS = [
+    ("1 2 3\n", ("`ncols`",)), ("", ("`ncols`",)), (TWO.replace("ncols 2", "ncols -2"), ("`ncols`", "-2")),
+    (PLANE.replace("cellsize 2", "cellsize 0") + "1 " * 12, ("`cellsize`",)),
+    (PLANE.replace("xllcorner 0\n", "") + "1 " * 12, ("`xllcorner`", "`xllcenter`")),
+    (PLANE.replace("ncols 4", "ncols") + "1 " * 12, ("line 1:", "`ncols`")),
+    (TWO.replace("nrows 2", "nrows 0.5") + "1 2\n", ("`nrows`", "0.5")),
+    (TWO.replace("ncols 2", "ncols 1e300") + "1 2\n", ("got 2",)), (TWO + "1 2 3\n", ("= 4", "got 3")),
+    (PLANE + "1 " * 11, ("= 12", "got 11")), (PLANE + "1 1 1 1\n1 x 1 1\n1 1 1 1\n", ("line 8", "'x'")),
+    (TWO + "1 2\n3 inf\n", ("line 7", "'inf'")), (TWO + "1 2\n3 1,5x\n", ("line 7", "x'")),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("x,y\n1,2\n", ("x, y and z",)), ("x,y,z\n0,0,1\n1,0,high\n", ("data row 2", "column z", "'high'")),
-        ("x,y,z\n0,0,1\n1,0\n", ("data row 2", "column z")), ("x,y,z\n0,0,1\n1,1,1\n2,2,1\n", ("three", "got 3")),
-        ("x,y,z\n", ("three", "got 0")), ("x,y,z\n0,0,1,5\n", ("data row 1",)),
-        (f"x,y,z\n{'1' * 200_000},0,0\n", ("CSV",)),
-    ],
+    ("kind", "text", "words"),
+    [*(("points", *one) for one in BAD_SURVEYS), *(("raster", *one) for one in BAD_RASTERS)],
     ids=lambda text: str(text)[:20],
-)  # fmt: skip
-def test_a_bad_survey_is_refused(tmp_path, text, words):
-    (tmp_path / "survey.csv").write_text(text)
-    with pytest.raises(InputError) as refused:
-        site(tmp_path, bed=[{"points": "survey.csv"}])
-    assert all(word in str(refused.value) for word in ("survey.csv", *words))
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("1 2 3\n", ("`ncols`",)), ("", ("`ncols`",)), (TWO.replace("ncols 2", "ncols -2"), ("`ncols`", "-2")),
-        (PLANE.replace("cellsize 2", "cellsize 0") + "1 " * 12, ("`cellsize`",)),
-        (PLANE.replace("xllcorner 0\n", "") + "1 " * 12, ("`xllcorner`", "`xllcenter`")),
-        (PLANE.replace("ncols 4", "ncols") + "1 " * 12, ("line 1:", "`ncols`")),
-        (TWO.replace("nrows 2", "nrows 0.5") + "1 2\n", ("`nrows`", "0.5")),
-        (TWO.replace("ncols 2", "ncols 1e300") + "1 2\n", ("got 2",)), (TWO + "1 2 3\n", ("= 4", "got 3")),
-        (PLANE + "1 " * 11, ("= 12", "got 11")), (PLANE + "1 1 1 1\n1 x 1 1\n1 1 1 1\n", ("line 8", "'x'")),
-        (TWO + "1 2\n3 inf\n", ("line 7", "'inf'")), (TWO + "1 2\n3 1,5x\n", ("line 7", "x'")),
-    ],
-    ids=lambda text: str(text)[:20],
-)  # fmt: skip
-def test_a_bad_raster_is_refused(tmp_path, text, words):
+)
+def test_a_bad_survey_or_raster_is_refused(tmp_path, kind, text, words):
     (tmp_path / "bed.asc").write_text(text)
     with pytest.raises(InputError) as refused:
-        site(tmp_path, bed=[{"raster": "bed.asc"}])
+        site(tmp_path, bed=[{kind: "bed.asc"}])
     assert all(word in str(refused.value) for word in ("bed.asc", *words))
 
 

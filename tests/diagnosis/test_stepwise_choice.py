@@ -65,14 +65,20 @@ def choice(
     return chosen([Nominee(name, name, 0.0) for name in named], score_with, clearly)
 
 
-def test_what_helps_by_itself_is_added_one_after_the_other() -> None:
-    made = choice({PARENT: (4, 4), A: (3, 3), B: (3, 3), A + B: (1, 2)})
-    assert made == Choice((PARENT, A, A + B), {})
-
-
-def test_what_helps_only_together_is_added_together() -> None:
-    made = choice({PARENT: (4, 4), A: (5, 3), B: (4, 5), A + B: (1, 1)})
-    assert made == Choice((PARENT, A + B), {})
+@pytest.mark.parametrize(
+    ("models", "small", "made"),
+    [
+        ({A: (3, 3), B: (3, 3), A + B: (1, 2)}, {}, Choice((PARENT, A, A + B), {})),  # one after the other
+        ({A: (5, 3), B: (4, 5), A + B: (1, 1)}, {}, Choice((PARENT, A + B), {})),  # only together
+        ({A: (3, 3), A + B: (2, 2), B: (2, 2)}, {}, Choice((PARENT, B), {"a": NotNeeded()})),  # the next one suffices
+        ({A: (3, 3), A + B: (2, 2), B: (2.5, 2.5)}, {A + B: "a"}, Choice((PARENT, B), {"a": AmplitudeNearOff()})),
+        ({A: (3, 3), A + B: (2, 2), B: (2, 5)}, {A + B: "a"}, Choice((PARENT, A, A + B), {})),  # B is worse than none
+    ],
+)
+def test_what_helps_is_added_and_what_is_not_needed_dropped(
+    models: dict[Names, Errors | None], small: dict[Names, str], made: Choice
+) -> None:
+    assert choice({PARENT: (4, 4), **models}, small=small) == made
 
 
 def test_two_of_three_are_enough_and_the_third_is_told() -> None:
@@ -87,11 +93,6 @@ def test_no_model_is_left_worse_than_its_parent(errors: Errors | None) -> None:
     made = choice({PARENT: (4, 4), A: errors}, A)
     assert made.stages == (PARENT,)
     assert list(made.refused) == ["a"]
-
-
-def test_what_the_next_one_makes_needless_is_dropped() -> None:
-    made = choice({PARENT: (4, 4), A: (3, 3), A + B: (2, 2), B: (2, 2)})
-    assert made == Choice((PARENT, B), {"a": NotNeeded()})
 
 
 def test_a_fall_that_cannot_be_told_from_none_is_told_as_such() -> None:
@@ -114,15 +115,8 @@ def test_a_fall_that_cannot_be_told_from_none_is_told_as_such() -> None:
 
 
 def test_an_amplitude_compatible_with_none_is_dropped() -> None:
-    made = choice({PARENT: (4, 4), A: (3, 3), A + B: (2, 2), B: (2.5, 2.5)}, small={A + B: "a"})
-    assert made == Choice((PARENT, B), {"a": AmplitudeNearOff()})
     made = choice({PARENT: (4, 4), A: (3, 3)}, A, small={A: "a"})
     assert made == Choice((PARENT,), {"a": AmplitudeNearOff()})
-
-
-def test_nothing_is_dropped_where_the_rest_is_worse_than_the_parent() -> None:
-    made = choice({PARENT: (4, 4), A: (3, 3), A + B: (2, 2), B: (2, 5)}, small={A + B: "a"})
-    assert made == Choice((PARENT, A, A + B), {})
 
 
 def test_in_doubt_errors_must_fall_clearly() -> None:

@@ -47,31 +47,20 @@ def test_it_is_read_back(family: tuple[Case, Case], tmp_path: Path, monkeypatch:
     np.testing.assert_equal(found.comparison.model_scores[1].held_out.sections, a_model_score("").held_out.sections)
 
 
-def test_another_diagnosis_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
-    other = replace(FOUND, verdict=replace(FOUND.verdict, effects=()))
-    assert kept_extension(CaseRun(family[0], tmp_path / "runs"), other) is None
-
-
-def test_other_readings_set_aside_extend_again(family: tuple[Case, Case], tmp_path: Path) -> None:
+def test_another_diagnosis_or_model_or_child_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
+    """Another verdict, other readings excluded, another viscosity; a child that was edited, or is gone."""
+    parent, path = family[0], family[1].source
     flagged = () if FOUND.errors.flagged else (0,)
-    other = replace(FOUND, errors=replace(FOUND.errors, flagged=flagged))
-    assert kept_extension(CaseRun(family[0], tmp_path / "runs"), other) is None
-
-
-def test_another_model_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
-    other = family[0].model_copy(update={"eddy_viscosity": 0.03})
-    assert kept_extension(CaseRun(other, tmp_path / "runs"), FOUND) is None
-
-
-def test_a_child_that_was_edited_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
-    path = family[1].source
+    for case, found in (
+        (parent, replace(FOUND, verdict=replace(FOUND.verdict, effects=()))),
+        (parent, replace(FOUND, errors=replace(FOUND.errors, flagged=flagged))),
+        (parent.model_copy(update={"eddy_viscosity": 0.03}), FOUND),
+    ):
+        assert kept_extension(CaseRun(case, tmp_path / "runs"), found) is None
     path.write_text(path.read_text(encoding="utf-8") + "eddy_viscosity: 0.03\n", encoding="utf-8")
-    assert kept_extension(CaseRun(family[0], tmp_path / "runs"), FOUND) is None
-
-
-def test_a_child_that_is_gone_extends_again(family: tuple[Case, Case], tmp_path: Path) -> None:
-    family[1].source.unlink()
-    assert kept_extension(CaseRun(family[0], tmp_path / "runs"), FOUND) is None
+    assert kept_extension(CaseRun(parent, tmp_path / "runs"), FOUND) is None
+    path.unlink()
+    assert kept_extension(CaseRun(parent, tmp_path / "runs"), FOUND) is None
 
 
 def test_code_that_a_child_names_is_never_run(family: tuple[Case, Case], tmp_path: Path) -> None:
