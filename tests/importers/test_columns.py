@@ -332,11 +332,23 @@ def test_columns_that_are_not_read_are_listed(tmp_path: Path) -> None:
     assert "surface velocity (m/s)" in named
 
 
-def test_velocities_of_no_usual_name_are_refused_beside_levels(tmp_path: Path) -> None:
-    levels = "x,y,level\n8,0,0.4\n9,0,0.4\n"
-    named = refusal_of(tmp_path, a__csv="x,y,surface velocity (m/s)\n8,0,0.4\n9,0,0.4\n", levels_of_june__csv=levels)
+@pytest.mark.parametrize(
+    "table",
+    [
+        "x,y,surface velocity (m/s)\n8,0,0.4\n9,0,0.4\n", "x,y,level,surface velocity (m/s)\n8,0,0.4,1\n9,0,0.4,1\n",
+        "x,y,z\n8,0,0.4\n9,0,0.4\n", "x,y,Avg-Vx\n8,0,0.4\n9,0,0.4\n",
+    ],
+)  # fmt: skip
+def test_what_may_be_measured_is_refused_beside_other_files(tmp_path: Path, table: str) -> None:
+    """It was listed as not read, or its file as without a measurement."""
+    named = refusal_of(tmp_path, a__csv=table, levels_of_june__csv="x,y,level\n8,0,0.4\n9,0,0.4\n")
     assert "a.csv: " in named
-    assert "surface velocity (m/s)" in named
+    assert table.partition("\n")[0].rpartition(",")[2] in named
+
+
+def test_levels_of_hec_ras_are_known_by_their_heading(tmp_path: Path) -> None:
+    table = "River Sta\tx\tQ Total\tW.S. Elev\n\t(ft)\t(cfs)\t(ft)\n100\t0\t71\t3.12\n50\t50\t71\t3.08\n"
+    assert rows_of(tmp_path, table).numbers["level"].tolist() == pytest.approx([0.950976, 0.938784])
 
 
 @pytest.mark.parametrize(

@@ -499,8 +499,9 @@ REFUSED = [
         alike=[("Q", ["small", "large"], True)],
     ),
     InputError("no_measurements", where="brook", files=["velocities.csv", "levels.csv"]),
+    InputError("no_value_measured", where="brook", tables=[{"name": "adv.csv", "taken": "x from x; 3 rows"}]),
     InputError(
-        "no_column_of_measurements", where="brook", tables=[{"name": "adv.csv", "taken": "x from x; 3 rows"}],
+        "no_measurement_in_file", where="adv.csv", got="x from x; 3 rows; not read: Ve1",
         usual=[("velocities", ("u", "velocity")), ("levels", ("level", "stage"))],
     ),
     InputError("no_polygon", file=Path("plants.geojson"), feature=2, got="Point"),

@@ -17,7 +17,7 @@ from vegglue.arrays import Array
 from vegglue.case.resolved_config import Tree
 from vegglue.case.text_files import unused as unused_name
 from vegglue.errors import InputError, path_from, shown_path
-from vegglue.importers.column_names import ROLES, words_of
+from vegglue.importers.column_names import words_of
 from vegglue.importers.column_roles import OF_FLAGS
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_options import FileOptions, read_file_options
@@ -48,8 +48,6 @@ SAME_PLACE, FEWEST_COPIED = 0.5, 4
 MEASURED_COLUMNS = {kind.column for kind in KINDS.values()}
 # Level of the bed [m] at places along and across the channel (n,) [m].
 BedLevel = Callable[[Array, Array], Array]
-# Headings that a message lists of each kind of measurement: the commonest stand first.
-HEADINGS_SHOWN = 4
 # What the columns of a table hold by the name of its file; what is held out is only for judging a finished model.
 KIND_OF_FILE = {kind.file: kind for kind in KINDS.values()} | {"holdout.csv": kind_of(STREAMWISE)}
 
@@ -100,8 +98,7 @@ def _nothing_measured(found: MeasuredFiles, where: str) -> InputError:
     """An error about a folder without measurements: what its tables hold, if there are any."""
     if not found.imported:
         return InputError("no_measurements", where=where, files=[kind.file for kind in KINDS.values()])
-    usual = [(kind.words, ROLES[kind.column].names[:HEADINGS_SHOWN]) for kind in KINDS.values()]
-    return InputError("no_column_of_measurements", where=where, tables=found.imported, usual=usual)
+    return InputError("no_value_measured", where=where, tables=found.imported)
 
 
 def texts_of_tables(target: Path, tables: Sequence[StationTable]) -> dict[Path, str]:

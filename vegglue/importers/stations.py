@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vegglue.arrays import Array, Mask
 from vegglue.case.resolved_config import Tree
 from vegglue.errors import InputError
-from vegglue.importers.column_names import is_in_degrees, unit_stated, words_of
+from vegglue.importers.column_names import ROLES, is_in_degrees, unit_stated, words_of
 from vegglue.importers.config_parts import observed
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.import_notes import FileNote, ImportNote, Noted
@@ -29,6 +29,8 @@ from vegglue.wording.numbers import listed, so_many
 from vegglue.wording.sentences import sentences
 
 EXPERIMENTS = "experiments"
+# Headings that a message lists of each kind of measurement: the commonest stand first.
+HEADINGS_SHOWN = 4
 VELOCITIES = ("u", "v", "speed")
 # Share of places with several heights from which a table is of verticals [-]. Chosen, not measured: less may be places
 # that were read again, with another level of the bed or of the probe beside it.
@@ -127,12 +129,14 @@ def station_tables(
     on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else (ImportNote(Noted.ON_AXIS),)
     if options.experiment is not None and options.experiment not in known.names:
         raise known.refusal(file, options.experiment)
+    if not kinds:
+        raise InputError("no_measurement_in_file", where=file, got=taken.summary, usual=usual_headings())
+    has_velocity = any(ROLES[role].quantity == "velocity" for role in taken.numbers)
     unnamed_velocities = [heading for heading in taken.others if unit_stated(heading, "velocity")]
-    if not kinds and unnamed_velocities:
+    if not has_velocity and unnamed_velocities:
         raise InputError(
             f"{file}: expected a column of velocities by a usual name, got {listed(unnamed_velocities)}; name them by "
-            "`columns: {u: ...}` of this file in `files` (with `v`, or `speed` and `direction`), or move the file out "
-            "of the folder."
+            "`columns: {u: ...}` of this file in `files` (with `v`, or `speed` and `direction`), or take them out."
         )
     if kinds and taken.lines:
         measured = taken.only(np.any([np.isfinite(taken.numbers[kind.column]) for kind in kinds], axis=0))
@@ -160,6 +164,11 @@ def station_tables(
             at_height = (ImportNote(Noted.HEIGHTS_UNUSED, names=(role,)),)
     left_out = (*on_axis, *without_place, *without_value, *once, *at_height)
     return StationTables([table for table in found if table.rows], left_out)
+
+
+def usual_headings() -> list[tuple[str, tuple[str, ...]]]:
+    """Of each kind of measurement its words, and the commonest headings of its column."""
+    return [(kind.words, ROLES[kind.column].names[:HEADINGS_SHOWN]) for kind in KINDS.values()]
 
 
 def _lacking(taken: MeasuredRows, roles: Sequence[str], needed: Callable[..., Mask]) -> tuple[FileNote, ...]:
