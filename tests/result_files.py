@@ -215,6 +215,18 @@ def write_flow_fm(path: Path, flow: GridFlow, classic: bool = True, ghosts: int 
     _write_netcdf(path, entries, sizes, classic)
 
 
+def write_velocimetry(path: Path, along: np.ndarray, across: np.ndarray, turned: float, classic: bool = False) -> None:
+    """What pyorc writes: velocities (time, y, x) on a grid of 0.2 m whose x runs `turned` [rad] from the east."""
+    times, ny, nx = along.shape
+    x, y = 0.2 * np.arange(nx), 0.2 * np.arange(ny)[::-1]  # rows of an image run down
+    east = 1000.0 + np.cos(turned) * x - np.sin(turned) * y[:, None]
+    north = 2000.0 + np.sin(turned) * x + np.cos(turned) * y[:, None]
+    entries = {name: (("time", "y", "x"), part, {}) for name, part in (("v_x", along), ("v_y", across))}
+    entries |= {"xs": (("y", "x"), east, {"units": b"m"}), "ys": (("y", "x"), north, {"units": b"m"})}
+    entries |= {"x": (("x",), x, {}), "y": (("y",), y, {})}
+    _write_netcdf(path, entries, {"time": times, "y": ny, "x": nx}, classic)
+
+
 def write_trim(path: Path, flow: GridFlow, clockwise: bool = False, layers: bool = False) -> None:
     """A trim file of Delft3D-4: the grid with a row of dummies on all sides, velocities along grid lines at faces.
 

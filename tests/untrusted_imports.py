@@ -14,7 +14,7 @@ import shapefile
 import tifffile
 from instrument_files import VECTRINO_HEADING, flowtracker, riversurveyor, vectrino, winriver
 from matlab_files import profiler_mat, qrev_mat, riversurveyor_mat
-from result_files import GridFlow, write_flow_fm, write_hec_ras, write_selafin, write_trim
+from result_files import GridFlow, write_flow_fm, write_hec_ras, write_selafin, write_trim, write_velocimetry
 from scipy.io import savemat
 
 from vegglue.importers.confluence import OF_THE_SET
@@ -112,6 +112,7 @@ SHAPES = _shapes()
 ONES = np.ones((3, 2))
 FLUME = GridFlow(np.arange(4.0), np.arange(3.0), 0.0 * ONES, ONES, ONES, 0.0 * ONES, 0.03 * ONES)
 EAST, NORTH = np.linspace(0.0, 8.0, 20), np.zeros(20)
+IMAGES = np.full((4, 2, 3), 0.3)
 IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("table.xlsx", _workbook(), lambda path: read_rows(path, OF_TABLES)),
     ("table.txt", b"x;y;u\nm;m;cm/s\n1,5;0;30\n1,5;1;40\n", lambda path: read_rows(path, OF_TABLES)),
@@ -141,5 +142,6 @@ IMPORTS: tuple[tuple[str, bytes, Callable[[Path], object]], ...] = (
     ("map.nc", _made(lambda path: write_flow_fm(path, FLUME)), read_result),
     ("map4.nc", _made(lambda path: write_flow_fm(path, FLUME, classic=False)), read_result),
     ("trim.nc", _made(lambda path: write_trim(path, FLUME)), read_result),
+    ("piv.nc", _made(lambda path: write_velocimetry(path, IMAGES, 0.1 * IMAGES, 0.5)), _measured),
     ("boat.txt", winriver(EAST, NORTH, 1.0, (0.1, 0.4), 0.01).encode(), _measured),
 )

@@ -11,6 +11,7 @@ import pytest
 from field_folders import CHANNEL, folder_of, imported, refusal
 from instrument_files import VECTRINO_HEADING, flowtracker, pd0, riversurveyor, vector, vectrino, winriver
 from matlab_files import profiler_mat, qrev_mat, riversurveyor_mat
+from result_files import GridFlow, write_flow_fm, write_velocimetry
 from scipy.io import savemat
 from untrusted_imports import IMPORTS
 
@@ -25,6 +26,7 @@ from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.nortek import read_nortek, read_vector
 from vegglue.importers.qrev import read_qrev_summary
 from vegglue.importers.teledyne import read_pd0, read_winriver
+from vegglue.importers.velocimetry import read_velocimetry
 from vegglue.measurements.observations import read_observations
 
 PLACES, DEPTHS, VELOCITIES = [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.5, 0.8, 0.6, 0.0], [0.0, 0.3, 0.5, 0.4, 0.0]
@@ -409,3 +411,34 @@ def test_a_summary_of_qrev_is_a_discharge_with_its_error(tmp_path: Path) -> None
 )  # fmt: skip
 def test_another_summary_is_refused(tmp_path: Path, change: tuple[str, str]) -> None:
     refused(written(tmp_path / "mill_QRev.xml", SUMMARY.replace(*change)), START)
+
+
+@pytest.mark.parametrize("classic", [False, True])
+def test_images_of_a_camera_become_means_of_what_they_saw(tmp_path: Path, classic: bool) -> None:
+    """Along the axes of the images 0.5 and 0.1 m/s, which lie 30 degrees from the east; a corner was hardly seen."""
+    random, turned, spread = np.random.default_rng(5), np.radians(30.0), 0.06
+    along, across = (mean + spread * random.standard_normal((400, 5, 6)) for mean in (0.5, 0.1))
+    along[:, 0, 0][20:] = np.nan
+    write_velocimetry(tmp_path / "piv.nc", along, across, turned, classic)
+    assert reader_of(tmp_path / "piv.nc") is read_velocimetry
+    taken = read_velocimetry(tmp_path / "piv.nc", FileOptions())
+    assert taken.size == 9
+    assert taken.numbers["east_velocity"] == pytest.approx(0.5 * np.cos(turned) - 0.1 * np.sin(turned), abs=0.01)
+    assert taken.numbers["north_velocity"] == pytest.approx(0.5 * np.sin(turned) + 0.1 * np.cos(turned), abs=0.01)
+    assert taken.numbers["u_se"] == pytest.approx(spread / 20.0, rel=0.1)
+    # The last row of images has no row beside it: two by two there are 0.1 m of x, 0 of y.
+    last = int(np.argmin(np.hypot(taken.numbers["x"] - 1000.0, taken.numbers["y"] - 2000.0)))
+    assert taken.numbers["x"][last] == pytest.approx(1000.0 + 0.1 * np.cos(turned))
+    assert taken.notes == ("pyorc", ImportNote(Noted.IMAGES, 400, ("factor",)))
+
+
+def test_images_that_saw_nothing_and_other_netcdf_are_refused(tmp_path: Path) -> None:
+    unseen = np.full((9, 2, 2), np.nan)
+    write_velocimetry(tmp_path / "piv.nc", unseen, unseen, 0.0)
+    with pytest.raises(InputError, match="mask less in pyorc"):
+        read_velocimetry(tmp_path / "piv.nc", FileOptions())
+    ones = np.ones((3, 2))
+    flow = GridFlow(np.arange(4.0), np.arange(3.0), 0.0 * ones, ones, ones, 0.0 * ones, 0.03 * ones)
+    write_flow_fm(tmp_path / "map.nc", flow)
+    with pytest.raises(InputError, match="expected velocities of images"):
+        read_velocimetry(tmp_path / "map.nc", FileOptions())

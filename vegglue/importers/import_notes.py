@@ -62,6 +62,7 @@ class Noted(StrEnum):
     ENSEMBLES_LACKING = auto()  # how many; what they lack
     TRANSECTS = auto()  # how many
     QREV_SUMMARY = auto()  # standard error [m3/s]
+    IMAGES = auto()  # at how many times; "factor" if none is stated
     # Of another model's result.
     PLACES_LOST = auto()  # how many
     PLACES_DRY = auto()  # how many

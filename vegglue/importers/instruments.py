@@ -23,6 +23,7 @@ from vegglue.importers.qrev import QREV_VARIABLE, is_qrev_summary, read_qrev_sum
 from vegglue.importers.riversurveyor import RIVERSURVEYOR_VARIABLES, stations_of_riversurveyor
 from vegglue.importers.table_parser import WORKBOOKS
 from vegglue.importers.teledyne import PD0_BEGINS, is_winriver, read_pd0, read_winriver
+from vegglue.importers.velocimetry import read_velocimetry
 
 # From the path of a file of measurements and its options to its rows in SI, by role; InputError begins with the file.
 FileReader = Callable[[Path, FileOptions], MeasuredRows]
@@ -34,6 +35,8 @@ PD0_ENDINGS, LONGEST_PREAMBLE = (".pd0", ".000"), 65_536
 NORTEK_BEGINS = (b"\xa5\x05", b"\xa5\x0a")
 # How a MATLAB file begins: version 5, which all instruments write, and 7.3, which is HDF5.
 MAT_BEGINS, MAT_73_BEGINS = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
+# How a NetCDF begins: version 4, which is HDF5, and classic.
+NETCDF_BEGINS, CLASSIC_BEGINS = b"\x89HDF", b"CDF"
 
 
 def read_matlab(path: Path, options: FileOptions) -> MeasuredRows:
@@ -58,6 +61,8 @@ BY_BEGINNING: Mapping[bytes, FileReader] = {
     ZIP_BEGINS: read_flowtracker2,
     MAT_BEGINS: read_matlab,
     MAT_73_BEGINS: read_matlab,
+    NETCDF_BEGINS: read_velocimetry,
+    CLASSIC_BEGINS: read_velocimetry,
 }
 
 

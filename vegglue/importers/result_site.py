@@ -101,7 +101,7 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
     if not folder.is_dir():
         return read_site(path)
     given = read_keys(path) if path.is_file() else {}
-    mappings = ("experiments", "holdout", "grid", "frame")
+    mappings = ("experiments", "holdout", "grid", "frame", "files")
     if not isinstance(given, dict) or not all(isinstance(given.get(key) or {}, dict) for key in mappings):
         return read_site(path)
     try:
@@ -188,7 +188,9 @@ def _result_files(folder: Path, given: Mapping[str, Any], stated: ResultEntry) -
                 f"{shown_path(path)}: `result.files` expected the result of {missing[0]}, got none; add it."
             )
     else:
-        there = [folder / stated.file] if stated.file else sorted(one for one in folder.iterdir() if holds_result(one))
+        measured = given.get("files") or {}  # velocities of images are netCDF, too
+        of_model = (one for one in folder.iterdir() if one.name not in measured and holds_result(one))
+        there = [folder / stated.file] if stated.file else sorted(of_model)
         if not there:
             return {}
         if len(there) > 1:
