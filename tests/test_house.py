@@ -35,7 +35,7 @@ HOMES_OF_EXTRAS = {
     "distributed": {"cluster"},
     "mhkit": {"importers"},
     "openpyxl": {"importers"},
-    "pyproj": {"results"},
+    "pyproj": {"importers", "results"},
     "shapefile": {"importers"},
     "tifffile": {"importers", "results"},
     "xarray": {"results", "workflow"},

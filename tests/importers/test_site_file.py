@@ -177,6 +177,22 @@ def test_what_no_case_can_have_is_refused(stated: dict[str, Any], said: str, tmp
         import_folder(field_folder(tmp_path / "site", **stated), tmp_path / "site.yaml")
 
 
+@pytest.mark.parametrize("crs", ["EPSG:99999", "EPSG:2263", "Gauss-Kruger"])  # the second is in feet
+def test_a_system_that_is_unknown_or_not_in_metres_is_refused(tmp_path: Path, crs: str) -> None:
+    pytest.importorskip("pyproj")
+    folder = field_folder(tmp_path / "site", frame={"origin": [10, 20], "angle": 0, "crs": crs})
+    with pytest.raises(InputError, match=rf"site\.json: `frame\.crs` .*'{crs}'"):
+        import_folder(folder, tmp_path / "site.yaml")
+
+
+def test_a_frame_may_have_its_place_in_feet(tmp_path: Path) -> None:
+    frame = {"origin": ["2000000 ftUS", "100 ft"], "towards": [609701.2192, 30.48]}
+    folder = field_folder(tmp_path / "site", frame=frame)
+    case = import_folder(folder, tmp_path / "site.yaml")
+    assert case.frame is not None
+    assert (*case.frame.origin, case.frame.angle) == pytest.approx((609601.2192, 30.48, 0.0), abs=1e-4)
+
+
 def test_a_second_file_of_what_is_held_out_is_told(tmp_path: Path) -> None:
     """It was left out without a word."""
     folder = field_folder(tmp_path / "site")

@@ -5,10 +5,11 @@ rivers are mapped most, and families whose number follows from the zone. What is
 """
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from vegglue.case.site_schema import Frame
+from vegglue.case.site_schema import Frame, in_metres
 from vegglue.errors import InputError, shown_path
 
 # Letters and digits of names of systems, in lower case, and their numbers of EPSG; {z} is a zone, added to the number.
@@ -54,6 +55,23 @@ class StatedSystem:
     number: int
     name: str
     metres: float = 1.0
+
+
+def known_in_metres(crs: str) -> str:
+    """The system of a frame. ValueError if it has no metres, or if pyproj, where it is installed, does not know it."""
+    in_metres(crs)
+    with suppress(ImportError):  # of the extra `field`: late, as it is not always there
+        from pyproj import CRS
+        from pyproj.exceptions import CRSError
+
+        try:
+            system = CRS.from_user_input(crs)
+        except CRSError:
+            raise ValueError("a coordinate system by its number, such as EPSG:2056, or no `crs`") from None
+        lengths = {axis.unit_conversion_factor for axis in system.axis_info[:2]}
+        if not (system.is_projected or system.is_engineering) or lengths != {1.0}:
+            raise ValueError("a projected system, with coordinates in metres, such as EPSG:2056")
+    return crs
 
 
 def epsg_number(crs: str) -> int:

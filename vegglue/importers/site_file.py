@@ -11,12 +11,13 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from vegglue.case.config import read_tree
 from vegglue.case.messages import dotted, expected_in_words, shown_value
-from vegglue.case.site_schema import CentrelineShape, Frame, Interval, Number, Polygon, Positive, in_metres
+from vegglue.case.site_schema import CentrelineShape, Frame, Interval, Number, Polygon, Positive
 from vegglue.case.size_limits import LARGEST_CONFIG
 from vegglue.case.text_files import read_text, unprintable
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import UNITS, in_si
 from vegglue.importers.config_parts import VISCOSITY_FACTOR
+from vegglue.importers.coordinate_systems import known_in_metres
 from vegglue.importers.import_notes import CountedStems, SiteAssumptions, ThickStems, UnreadHoldout, UnreadKeys
 from vegglue.measurements.plausibility import is_mark_anywhere
 
@@ -64,6 +65,7 @@ PrintableName = Annotated[str, AfterValidator(_printable)]
 Length = Annotated[Number, Field(gt=0, le=1e6)]
 UNMARKED = _accepting("a measured value, not a mark for none", lambda value: not is_mark_anywhere(value))
 Level = Annotated[Number, Field(ge=-1e4, le=1e4), UNMARKED]
+Coordinate = Annotated[Number, BeforeValidator(_with_unit("length"))]
 MeasuredDischarge = Annotated[Number, Field(gt=0, le=1e6), UNMARKED]
 
 
@@ -180,10 +182,10 @@ class SiteGrid(_SitePart):
 class SiteFrame(_SitePart):
     """Where the model lies on the map: its origin, and the angle of its x axis or a point further down that axis."""
 
-    origin: tuple[Number, Number] = (0.0, 0.0)
+    origin: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     angle: Annotated[Number, BeforeValidator(_with_unit("angle"))] | None = None
-    towards: tuple[Number, Number] | None = None
-    crs: Annotated[PrintableName, AfterValidator(in_metres)] | None = None
+    towards: tuple[Coordinate, Coordinate] | None = None
+    crs: Annotated[PrintableName, AfterValidator(known_in_metres)] | None = None
 
     @model_validator(mode="after")
     def _one_direction(self) -> Self:
