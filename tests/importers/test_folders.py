@@ -120,6 +120,21 @@ def test_points_over_the_water_whose_velocities_would_lie_in_it_may_be_exchanged
     assert ("exchanged" in refusal(folder)) == exchanged
 
 
+def test_levels_above_the_sea_need_that_of_the_floor(tmp_path: Path) -> None:
+    """Every level had to be lowered by hand."""
+    tables = {"u__csv": "x,y,u\n12,0,0.4\n", "w__csv": "x,y,depth\n12,0,0.95\n"}
+    high = JUNE.replace("95 cm", "390.95 ft")  # 119.16156 m
+    assert "channel.floor_level_m" in refusal_of(tmp_path, CHANNEL + high, **tables)
+    low, raised = (
+        import_of(tmp_path, CHANNEL.replace("}", f", floor_level_m: {floor}}}") + june, **tables)
+        for floor, june in (("0 m", JUNE), ("118.21156 m", high))
+    )
+    assert raised.case.grid == low.case.grid
+    assert raised.case.bed[0].trapezoid.level == pytest.approx(118.21156)
+    assert raised.case.parameters["eddy_viscosity"].median == low.case.parameters["eddy_viscosity"].median
+    assert raised.values("level") == pytest.approx([low.values("level")[0] + 118.21156], abs=1e-4)
+
+
 def test_the_grid_is_wide_enough_for_what_is_held_out(tmp_path: Path) -> None:
     high = {"high": {"discharge_m3_s": 6.0, "downstream_level_m": 1.6}}
     assert imported(field_folder(tmp_path / "site", holdout=high)).case.grid.y[1] > 1.5 + 1.6 / 0.6667

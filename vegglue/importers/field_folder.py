@@ -1,8 +1,8 @@
 """A field team's folder -> a case: a site file and its measurements, wide priors, sensible defaults.
 
-site.json or site.yaml has channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; z = 0 on the floor at
-x = 0, y = 0 on the axis) or bed (a survey; see terrain.py), patches (x, y, stems_per_m2, or a file of polygons),
-walls of a flume, canopy_height_guess_m, eddy_viscosity_m2_s and eddy_viscosity_factor, which it is good to,
+site.json or site.yaml has channel (length_m, bottom_width_m, bank_slope_v_per_h, bed_slope; floor_level_m at x = 0,
+else z = 0 there; y = 0 on the axis) or bed (a survey; see terrain.py), patches (x, y, stems_per_m2, or a file of
+polygons), walls of a flume, canopy_height_guess_m, eddy_viscosity_m2_s and eddy_viscosity_factor, which it is good to,
 experiments (discharge_m3_s, downstream_level_m), and, if needed, frame and grid (site_file.py), its centreline
 (vector_files.py) and files (file_options.py). What is not stated there is left at the defaults below.
 """
@@ -208,7 +208,7 @@ def usual_viscosity(site: FieldSite, ground: Ground) -> float:
 
 
 def _refuse_standing_water(path: Path, site: FieldSite) -> None:
-    """h = z + S L at the outlet, U = Q / (h (b + h / m)), b the width of the floor and m the slope of the banks.
+    """h = z - z_0 + S L at the outlet, U = Q / (h (b + h / m)), b the width of the floor and m the slope of the banks.
 
     InputError for an experiment that is more than twice as deep there as its floor is wide, and all but stands: its
     level is as a rule one above the sea. A grid that held it would be as wide as the lake.
@@ -218,16 +218,16 @@ def _refuse_standing_water(path: Path, site: FieldSite) -> None:
         return
     for key, flows in (("experiments", site.experiments), ("holdout", site.holdout)):
         for name, flow in flows.items():
-            depth = flow.downstream_level_m + channel.bed_slope * (channel.length_m or 0.0)
+            depth = flow.downstream_level_m - channel.floor_level_m + channel.bed_slope * (channel.length_m or 0.0)
             has_banks = channel.bank_slope_v_per_h and site.walls is None
             beside = depth / channel.bank_slope_v_per_h if has_banks and channel.bank_slope_v_per_h else 0.0
             area = depth * (channel.bottom_width_m + beside)
             speed = flow.discharge_m3_s / area if area > 0.0 else 0.0
             if depth > DEEPEST_CHANNEL * channel.bottom_width_m and speed < STANDING_WATER:
                 raise InputError(
-                    f"{shown_path(path)}: `{key}.{name}` expected a level above the floor at x = 0, got "
-                    f"{flow.downstream_level_m:g} m (outlet {depth:.3g} m deep at {speed:.1g} m/s); subtract that "
-                    "floor from all levels."
+                    f"{shown_path(path)}: `{key}.{name}` expected a level near the floor, at "
+                    f"{channel.floor_level_m:g} m where x = 0, got {flow.downstream_level_m:g} m (outlet {depth:.3g} m "
+                    f"deep at {speed:.1g} m/s); write the level of that floor as `channel.floor_level_m`."
                 )
 
 
@@ -314,7 +314,7 @@ def _plants(patches: Sequence[PlantedPatch], guess: float) -> tuple[Tree, Tree]:
 
 
 def _straight_ground(folder: Path, site: FieldSite, channel: Channel, place: Placement) -> Ground:
-    """Grid, bed and friction of a channel by its numbers, with z = 0 on the floor at x = 0.
+    """Grid, bed and friction of a channel by its numbers.
 
     The grid is that of the site file, else of cells that fit the floor, as wide as the water can get, or as the walls
     let it.
@@ -324,7 +324,8 @@ def _straight_ground(folder: Path, site: FieldSite, channel: Channel, place: Pla
     x = list(given.x or (0.0, round(along, 4) if channel.length_m is None else channel.length_m))
     length, width = x[1] - x[0], channel.bottom_width_m
     fall = channel.bed_slope * length
-    highest = max(one.downstream_level_m for one in (*site.experiments.values(), *site.holdout.values()))
+    floor = channel.floor_level_m
+    highest = max(one.downstream_level_m for one in (*site.experiments.values(), *site.holdout.values())) - floor
     # The surface upstream may stand as much above the outlet's as the bed does, and friction adds to it.
     depth = highest + fall + max(fall, 0.1 * highest) + FREEBOARD
     dy = width / CELLS_ACROSS
@@ -340,7 +341,7 @@ def _straight_ground(folder: Path, site: FieldSite, channel: Channel, place: Pla
         "bottom_width": channel.bottom_width_m,
         "bank_slope": round(channel.bank_slope_v_per_h or OF_NO_BANK, 6),
         "bed_slope": channel.bed_slope,
-        "level": 0.0 - channel.bed_slope * x[0],
+        "level": floor - channel.bed_slope * x[0],
     }
     friction, imported = mapped_classes(folder, site, place)
     if (steeper := slope_of_banks(site)) is not None and BANK not in friction["classes"]:
@@ -348,9 +349,9 @@ def _straight_ground(folder: Path, site: FieldSite, channel: Channel, place: Pla
     grid = {"x": x, "y": y, "cell": list(given.cell or (length / columns, dy))}
 
     def level(along: Array, across: Array) -> Array:
-        """z = -S x + m max(|y| - b / 2, 0)."""
+        """z = z_0 - S x + m max(|y| - b / 2, 0)."""
         bank_rise = np.maximum(np.abs(across) - 0.5 * channel.bottom_width_m, 0.0) * trapezoid["bank_slope"]
-        return -channel.bed_slope * along + bank_rise
+        return floor - channel.bed_slope * along + bank_rise
 
     return Ground({"grid": grid, "bed": [{"trapezoid": trapezoid}], "friction": friction}, imported, {}, level)
 

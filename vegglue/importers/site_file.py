@@ -90,6 +90,7 @@ class Channel(_SitePart):
     bottom_width_m: Annotated[Number, Field(gt=0, le=1e4)]
     bank_slope_v_per_h: Annotated[Number, Field(ge=0.001, le=100)] | None = None
     bed_slope: Annotated[Number, Field(gt=-1, lt=1)]
+    floor_level_m: Annotated[Level, BeforeValidator(_with_unit("length"))] = 0.0  # at x = 0
 
 
 class FlumeWalls(_SitePart):
