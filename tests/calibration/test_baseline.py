@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from coarse_twin import coarse_twin
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 
 from vegglue.arrays import Array
@@ -34,6 +35,23 @@ def test_a_flow_on_coarse_cells_is_found_once_at_a_place(away: float, monkeypatc
     assert found is not None
     assert np.array_equal(found.z, base.fitted.point.z)
     assert len(places) == (away > 0.0)
+
+
+def test_where_coarse_cells_fit_best_fine_ones_may_have_no_flow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stream near the critical depth was refused then, though its own prior has flows."""
+    model, _ = coarse_twin()
+    real, refused = baseline.linearise_from, list[Array]()
+
+    def none_at_first(of: Model, z: Array, near: Point | None) -> Point | None:
+        if of is model and not refused:
+            refused.append(z)
+            return None
+        return real(of, z, near)
+
+    monkeypatch.setattr(baseline, "linearise_from", none_at_first)
+    found = baseline.baseline(model)
+    assert len(refused) == 1
+    assert np.isfinite(found.fitted.chi2)
 
 
 ROOT = Path(__file__).parents[2]

@@ -119,6 +119,8 @@ def baseline(model: Model, known: Array | None = None, noise: Noise | None = Non
         near = near if known is not None else fit(coarse, noise, near).point
     z = known if near is None else near.z
     start = None if z is None else linearise_from(model, z, near)
+    if start is None and known is None:  # the best point of the coarser cells has no flow on these
+        start = _best_from_prior(model, noise)
     base = under_error_of_grid(Baseline(model, noise, at_point(noise, _with_steady_flow(model, start)), coarse, near))
     return with_own_error(base) if near is None else with_own_error_again(base, near.z)
 
