@@ -352,6 +352,15 @@ def test_the_page_says_that_the_verdict_is_not_to_be_relied_on(tmp_path: Path, m
     assert other is None or not other.discharges, "what was found may be why"
 
 
+def test_a_range_that_excludes_the_stated_discharge_is_told_below_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+    """Between two and three standard errors it stood in the table alone."""
+    sections = [replace(HIGHER, section=name, stated=(at, at)) for name, at in (("B", 1.95), ("C", 1.85), ("D", 1.7))]
+    assert [(one.excludes_stated, one.clearly_off) for one in sections] == [(False, False), (True, False), (True, True)]
+    show_carried(sections)
+    _, _, below = capsys.readouterr().out.partition("- ")
+    assert [name for name in "BCD" if f"{name} (low" in below] == ["C"]
+
+
 def test_every_section_stands_in_the_table_of_a_check(capsys: pytest.CaptureFixture[str]) -> None:
     show_carried([HIGHER, replace(HIGHER, section="B", stated=None, gauged=False)])
     *_, first, second = [line.split() for line in capsys.readouterr().out.splitlines()]

@@ -280,7 +280,9 @@ def show_check(case: Case, found: CheckedCase) -> None:
 
 
 def show_carried(sections: Sequence[CarriedDischarge]) -> None:
-    """What the velocities of each section carry beside the stated discharge; nothing without sections."""
+    """What the velocities of each section carry beside the stated discharge, and which exclude it by less than a remark
+    needs; nothing without sections.
+    """
     if not sections:
         return
     console().print(phrase("heading_of_discharges"))
@@ -292,6 +294,9 @@ def show_carried(sections: Sequence[CarriedDischarge]) -> None:
         for one in sections
     ]  # fmt: skip
     print_table(headings, rows, headings[1:7])
+    if off := [one for one in sections if one.excludes_stated and not one.clearly_off]:
+        for line in wrapped([str(phrase("excluded_discharges", off))]):
+            print(line)
 
 
 def error(value: float, digits: str = ".4f") -> str:

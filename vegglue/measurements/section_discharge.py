@@ -123,11 +123,19 @@ class CarriedDischarge:
         return self.value / (0.5 * sum(self.stated)) if self.stated else float("nan")
 
     @property
+    def excludes_stated(self) -> bool:
+        """Whether the stated discharge lies outside the 95 % range."""
+        return self._is_off_by(NORMAL95)
+
+    @property
     def clearly_off(self) -> bool:
         """Whether the stated discharge lies beyond SURELY_OTHERWISE standard errors, on the side on which it does."""
+        return self._is_off_by(SURELY_OTHERWISE)
+
+    def _is_off_by(self, errors: float) -> bool:
         if self.stated is None:
             return False
-        low, high = (self.value + SURELY_OTHERWISE / NORMAL95 * (end - self.value) for end in self.interval95)
+        low, high = (self.value + errors / NORMAL95 * (end - self.value) for end in self.interval95)
         return low > self.stated[1] or high < self.stated[0]
 
 
