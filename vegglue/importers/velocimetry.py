@@ -24,7 +24,7 @@ VELOCIMETRY_VARIABLES = ("v_x", "v_y", "xs", "ys", "x", "y")
 LEAST_SEEN = 0.33
 # Cells beside each other along each axis that share most of their images: windows of pyorc overlap by half.
 OVERLAPPING = 2
-IN_ITS_PROCESS = f"{__name__}:why_no_fields"
+_IN_ITS_PROCESS = f"{__name__}:why_no_fields"
 
 
 def read_velocimetry(path: Path, options: FileOptions) -> MeasuredRows:
@@ -51,7 +51,7 @@ def read_velocimetry(path: Path, options: FileOptions) -> MeasuredRows:
     """
     refuse_larger(path, path.stat().st_size)
     changed, size = path.stat().st_mtime_ns, path.stat().st_size
-    why = why_unreadable(path.absolute(), size, changed, by=IN_ITS_PROCESS)
+    why = why_unreadable(path.absolute(), size, changed, by=_IN_ITS_PROCESS)
     if why is not None:
         raise InputError("unreadable_as", file=path, kind="NetCDF", why=why)
     along, across, east, north, x, y = _fields(path)
