@@ -155,8 +155,9 @@ def own_and_shared(own_variance: Array, shared: Array) -> tuple[Array, Array]:
     if min(white.shape) > 2 * MOST_PATTERNS:  # the range of U by random vectors
         random = np.random.default_rng(0).standard_normal((white.shape[1], 2 * MOST_PATTERNS))
         basis, _ = np.linalg.qr(white @ random)
-        left, strength, _ = np.linalg.svd(basis.T @ white, full_matrices=False)
-        left = basis @ left
+        within = basis.T @ white
+        squares, left = np.linalg.eigh(within @ within.T)
+        left, strength = basis @ left[:, ::-1], np.sqrt(np.maximum(squares[::-1], 0.0))
     else:
         left, strength, _ = np.linalg.svd(white, full_matrices=False)
     kept = np.flatnonzero(strength > SMALL_SHARE)[:MOST_PATTERNS]
