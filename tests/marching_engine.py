@@ -73,7 +73,7 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
         prediction[np.isnan(prediction).any(axis=1)] = np.nan
         return prediction
 
-    def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
+    def responses_of(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
         """(f(small) - f(off)) / gain of small; all causes that act in an experiment are marched side by side."""
         found, theta = np.zeros((len(model.station), len(causes))), theta_at(model.case, point.z)
         values = [np.array([cause.amplitude.off + cause.amplitude.small]) for cause in causes]
@@ -118,7 +118,7 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
         name="marching",
         linearise=linearise,
         predict=predict,
-        responses=responses,
+        responses=lambda model, points, causes: np.array([responses_of(model, one, causes) for one in points]),
         responses_to_cells=responses_to_cells,
         flow_at_centres=flow_at_centres,
         relinearised=lambda model, point: point,

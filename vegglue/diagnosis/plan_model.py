@@ -23,7 +23,7 @@ from vegglue.case.schema import Case, Planned, PlannedDischarge, PlannedGauge, P
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.next_measurement import AS_MEASURED, with_other_discharges
-from vegglue.engine.interface import Cause, Model, Point, linearise, linearise_from, responses
+from vegglue.engine.interface import Cause, Model, Point, linearise, linearise_from, responses, responses_at
 from vegglue.engine.model import coarser
 from vegglue.engine.newton import on_half_as_many_cells
 from vegglue.errors import InputError
@@ -387,21 +387,18 @@ def _plan_model(
     every = _with_rows(responses(search, start, _causes(search, wanted)), len(places))
     one_each = np.array([columns[columns.size // 2] for columns in setting_columns(candidates)], dtype=int)
 
-    def draw(of: Model, point: Point, values: Array | None = None) -> PlanDraw:
+    def draw(of: Model, point: Point, values: Array) -> PlanDraw:
         of_model = model_error_columns(of, point, of.case.model_error)
-        if values is None:
-            values = _with_rows(responses(of, point, _causes(of, [settings[j] for j in one_each])), len(places))
         levels = _bed_levels(of, np.reshape(places, (-1, 2)), of_model.shape[1])
         slope = _with_rows(np.nan_to_num(point.slope), len(places))
         shared = np.vstack([of_model, levels])
         return PlanDraw(of, point, slope, values, shared, errors_of(error, grid_error, slope, shared))
 
-    def drawn(z: Array) -> PlanDraw | None:
-        point = below if z is middle else linearise_from(coarsest, z, below)
-        return None if point is None else draw(coarsest, point)
-
-    near = [] if below is None else in_threads(drawn, [(z,) for z in (middle, *around)])
-    drawn_there = [one for one in near if one is not None]
+    near = [] if below is None else [below, *in_threads(linearise_from, [(coarsest, z, below) for z in around])]
+    points = [one for one in near if one is not None]
+    of_each = responses_at(coarsest, points, _causes(coarsest, [settings[j] for j in one_each])) if points else ()
+    tasks = [(coarsest, *one) for one in zip(points, (_with_rows(one, len(places)) for one in of_each), strict=True)]
+    of_search, *drawn_there = in_threads(draw, [(search, start, every[:, one_each]), *tasks])
     unknown = np.full((error.size, len(candidates), 2), np.nan)
     return PlanModel(
         case=model.case,
@@ -415,7 +412,7 @@ def _plan_model(
         values=every[:, : len(settings)],
         between=every[:, len(settings) :],
         between_of=np.array([j for j, _ in between], dtype=int),
-        draws=(draw(search, start, every[:, one_each]), *drawn_there),
+        draws=(of_search, *drawn_there),
         at_plausible_size=_at_plausible_size(drawn_there[0], candidates) if drawn_there else unknown,
     )
 

@@ -103,9 +103,9 @@ def with_correction(added: Added, name: str) -> Engine:
     def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
         return NEWTON.predict(model, points, z) + np.stack([added(model, one)[0] for one in z])
 
-    def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
-        value, _ = added(model, point.z)
-        return NEWTON.responses(model, replace(point, prediction=point.prediction - value), causes)
+    def responses(model: Model, points: Sequence[Point], causes: Sequence[Cause]) -> Array:
+        own = [replace(one, prediction=one.prediction - added(model, one.z)[0]) for one in points]
+        return NEWTON.responses(model, own, causes)
 
     return replace(NEWTON, name=name, linearise=linearise_corrected, predict=predict, responses=responses)
 

@@ -104,7 +104,7 @@ class Engine:
     predict
         (model, points, z) -> f (m, n) at z (m, p), NaN where no flow is found; points: some that are known.
     responses
-        (model, point, causes) -> df / d(amplitude - off)^power at off (n, causes).
+        (model, points, causes) -> df / d(amplitude - off)^power at off (points, n, causes).
     responses_to_cells
         (model, point, experiment, terms) -> df / d term (n, nx, ny) by term for a change in each cell, of the stations
         of the experiment, some rows of them at a time; terms: of `flow.local_changes.TERMS`.
@@ -121,7 +121,7 @@ class Engine:
     name: str
     linearise: Callable[["Model", Array, Point | None, Wanted], Point | None]
     predict: Callable[["Model", Sequence[Point], Array], Array]
-    responses: Callable[["Model", Point, Sequence[Cause]], Array]
+    responses: Callable[["Model", Sequence[Point], Sequence[Cause]], Array]
     responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], "StationsOfCells"]
     flow_at_centres: Callable[["Model", Point, str], CentreFlow]
     relinearised: Callable[["Model", Point], Point]
@@ -221,7 +221,12 @@ def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
     (n, causes)
         [unit of each station per unit of the gain]
     """
-    return model.engine.responses(model, point, causes)
+    return responses_at(model, [point], causes)[0]
+
+
+def responses_at(model: Model, points: Sequence[Point], causes: Sequence[Cause]) -> Array:
+    """`responses` at points of the same experiments (points, n, causes), for less than one by one."""
+    return model.engine.responses(model, points, causes)
 
 
 def responses_to_cells(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> StationsOfCells:

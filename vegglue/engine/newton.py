@@ -301,52 +301,64 @@ def _predict_alone(model: Model, experiment: str, z: Array) -> Array:
     return prediction
 
 
-def responses_by_tangents(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
+def responses_by_tangents(model: Model, points: Sequence[Point], causes: Sequence[Cause]) -> Array:
     """df/dg of each cause, see `Engine.responses`: tangents, those of one experiment side by side."""
-    found, tasks = np.zeros((len(model.station), len(causes))), []
-    for experiment in point.flows:
+    found, tasks = np.zeros((len(points), len(model.station), len(causes))), []
+    for experiment in points[0].flows:
         here = [j for j, cause in enumerate(causes) if not cause.experiments or experiment in cause.experiments]
-        tasks += [(experiment, here[first : first + CAUSE_SLOTS]) for first in range(0, len(here), CAUSE_SLOTS)]
-    work = partial(_responses_in, model, point)
-    parts = in_threads(work, [(experiment, [causes[j] for j in some]) for experiment, some in tasks])
-    for (experiment, some), part in zip(tasks, parts, strict=True):
-        found[np.ix_(model.rows[experiment], np.array(some))] = part
+        bands = [one.flows[experiment].band for one in points]
+        for band in dict.fromkeys(bands):
+            alike = [k for k, one in enumerate(bands) if one == band]
+            tasks += [(experiment, alike, here[j : j + CAUSE_SLOTS]) for j in range(0, len(here), CAUSE_SLOTS)]
+    parts = in_threads(
+        partial(_responses_in, model),
+        [([points[k] for k in alike], experiment, [causes[j] for j in some]) for experiment, alike, some in tasks],
+    )
+    for (experiment, alike, some), part in zip(tasks, parts, strict=True):
+        found[np.ix_(alike, model.rows[experiment], some)] = part
     return found
 
 
-def _responses_in(model: Model, point: Point, experiment: str, causes: Sequence[Cause]) -> Array:
-    """Responses in one experiment, (stations of it, causes), to causes that act in it."""
-    flow, theta, rows = point.flows[experiment], theta_at(model.case, point.z), model.rows[experiment]
-    whole = problem_at(model, experiment, point.z)
-    base = crop(whole, *flow.band)
-    without_cause = residual(base, flow.state)
-    built, changes = [], np.zeros((*flow.state.shape[:3], len(causes)))
+def _responses_in(model: Model, points: Sequence[Point], experiment: str, causes: Sequence[Cause]) -> Array:
+    """Responses in one experiment, (points, stations of it, causes), at points of one band to causes that act in it."""
+    flows, rows, count = [one.flows[experiment] for one in points], model.rows[experiment], len(points)
+    z, band, members = np.array([one.z for one in points]), flows[0].band, np.arange(len(points))
+    theta, whole = theta_at(model.case, z), problem_at(model, experiment, z)
+    base, state = crop(whole, *band), np.concatenate([one.state for one in flows], axis=3)
+    without_cause = residual(base, state)
+    built, changes = [], np.zeros((*state.shape[:3], count, len(causes)))
     stages = [stages_of(cause.case, cause.parameter) for cause in causes]
     moving = [column for column, some in enumerate(stages) if some != {"sensor"}]
     for column, cause in enumerate(causes):
         amplitude = cause.amplitude
-        gain, value = amplitude.gain(amplitude.off + amplitude.small), np.array([amplitude.off + amplitude.small])
-        problem = with_effects_of(cause.case, model.site, experiment, theta | {cause.parameter: value}, whole)
+        value = amplitude.off + amplitude.small
+        gain, values = amplitude.gain(value), np.full(count, value)
+        problem = with_effects_of(cause.case, model.site, experiment, theta | {cause.parameter: values}, whole)
         if column in moving:
-            changes[..., column] = ((residual(crop(problem, *flow.band), flow.state) - without_cause) / gain)[..., 0]
+            changes[..., column] = (residual(crop(problem, *band), state) - without_cause) / gain
         built.append((problem, gain))
     gains = np.array([gain for _, gain in built])
     if moving:
-        changes[..., moving] = tangents(base, flow.state, flow.factors, changes[..., moving], TANGENT_TOLERANCE)
+        for k, flow in enumerate(flows):
+            own = take(base, members[[k]])
+            changes[..., k, moving] = tangents(
+                own, flow.state, flow.factors, changes[..., k, moving], TANGENT_TOLERANCE
+            )
     untouched = not any(active.effect.stage == "sensor" for active in whole.effects)
     alike = [column for column in moving if untouched and stages[column] <= UNSEEN_BY_SENSORS]  # read at once
-    states, now = flow.state + gains * changes, np.empty((len(causes), rows.size))
+    states, now = state[..., None] + gains * changes, np.empty((count, len(causes), rows.size))
     if alike:
-        now[alike] = _read_stations(
-            model, experiment, take(whole, np.zeros(len(alike), dtype=np.int64)), states[..., alike], flow.band
-        )
+        each = take(whole, np.repeat(members, len(alike)))
+        read = _read_stations(model, experiment, each, states[..., alike].reshape(*state.shape[:3], -1), band)
+        now[:, alike] = read.reshape(count, len(alike), rows.size)
     for column in set(moving) - set(alike):
-        now[column] = _read_stations(model, experiment, built[column][0], states[..., [column]], flow.band)[0]
+        there = np.ascontiguousarray(states[..., column])
+        now[:, column] = _read_stations(model, experiment, built[column][0], there, band)
     if at_rest := [column for column in range(len(causes)) if column not in moving]:
-        state, of_each = widen(flow.state, flow.rows, flow.band), [built[column][0].effects for column in at_rest]
-        station = model.stations[experiment]
-        now[at_rest] = predictions_under_effects(whole, state, model.site.grid, station, of_each)
-    return np.asarray((now - point.prediction[rows]).T / gains)
+        wide, of_each = widen(state, flows[0].rows, band), [built[column][0].effects for column in at_rest]
+        now[:, at_rest] = predictions_under_effects(whole, wide, model.site.grid, model.stations[experiment], of_each)
+    before = np.array([one.prediction[rows] for one in points])
+    return np.asarray(((now - before[:, None]) / gains[:, None]).swapaxes(1, 2))
 
 
 def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> StationsOfCells:

@@ -260,13 +260,13 @@ def predictions_at_sensors(problem: Problem, state: Array, grid: Grid, station: 
 def predictions_under_effects(
     problem: Problem, state: Array, grid: Grid, station: pd.DataFrame, effects: Sequence[tuple[ActiveEffect, ...]]
 ) -> Array:
-    """`predictions_at_sensors` of one flow (nx, 3, ny, 1) under each set of effects, which differ on instruments alone:
-    (set, station).
+    """`predictions_at_sensors` of flows (nx, 3, ny, m) under each set of effects, which differ on instruments alone:
+    (m, set, station).
     """
     flow = GriddedFlow(problem, state, grid)
     value = _without_effects(flow, station)
     around = _around_stations(flow, value, station)
-    return np.array([_after_effects(one, value, around, station)[:, 0] for one in effects])
+    return np.array([_after_effects(one, value, around, station) for one in effects]).transpose(2, 0, 1)
 
 
 def _predictions(flow: GriddedFlow, station: pd.DataFrame) -> Array:
