@@ -62,7 +62,7 @@ def linear_engine(
 
     def responses(model: Model, *_: object) -> Array:
         assert of_causes is not None
-        return of_causes[: len(model.station)]
+        return of_causes[None, : len(model.station)]
 
     def responses_to_cells(model: Model, _: Point, experiment: str, terms: Sequence[Term]) -> StationsOfCells:
         rows, grid = model.rows[experiment], model.site.grid
@@ -70,7 +70,8 @@ def linear_engine(
         yield rows, {term: nothing if of_cells is None else of_cells[term][rows] for term in terms}
 
     return Engine(
-        "linear", linearise, predict, responses, responses_to_cells, NEWTON.flow_at_centres,
+        "linear", linearise, lambda model, z, _: [linearise(model, one) for one in z],
+        predict, responses, responses_to_cells, NEWTON.flow_at_centres,
         lambda model, point: point, lambda point, before, after: point,
     )  # fmt: skip
 

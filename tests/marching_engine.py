@@ -11,7 +11,7 @@ import numpy as np
 from vegglue.arrays import Array, Single
 from vegglue.case.channel_geometry import channel_geometry
 from vegglue.case.parameter_space import theta_at
-from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, StationsOfCells, Wanted
+from vegglue.engine.interface import Cause, CentreFlow, Engine, Model, Point, StationsOfCells, Wanted, always
 from vegglue.engine.newton import problem_at
 from vegglue.flow.equations import faces
 from vegglue.flow.local_changes import Term, with_changed_term
@@ -117,6 +117,7 @@ def marching(time_step: float = 1.0, longest: float = 7200.0) -> Engine:
     return Engine(
         name="marching",
         linearise=linearise,
+        linearise_around=lambda model, z, near: [linearise(model, one, near, always) for one in z],
         predict=predict,
         responses=lambda model, points, causes: np.array([responses_of(model, one, causes) for one in points]),
         responses_to_cells=responses_to_cells,

@@ -23,7 +23,16 @@ from vegglue.case.schema import Case, Planned, PlannedDischarge, PlannedGauge, P
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.next_measurement import AS_MEASURED, with_other_discharges
-from vegglue.engine.interface import Cause, Model, Point, linearise, linearise_from, responses, responses_at
+from vegglue.engine.interface import (
+    Cause,
+    Model,
+    Point,
+    linearise,
+    linearise_around,
+    linearise_from,
+    responses,
+    responses_at,
+)
 from vegglue.engine.model import coarser
 from vegglue.engine.newton import on_half_as_many_cells
 from vegglue.errors import InputError
@@ -366,7 +375,8 @@ def _plan_model(
         return replace(one, case=one.case.model_copy(update={"experiments": flows}))
 
     coarsest = in_own_flows(coarser(search) or search)
-    middle, *around = places_of_draws(len(model.names))
+    places_of_prior = places_of_draws(len(model.names))
+    middle, around = places_of_prior[0], places_of_prior[1:]
     below = linearise(coarsest, middle)
     start = linearise_from(search, middle, None if coarsest.site is search.site else below)
     if start is None:
@@ -394,7 +404,7 @@ def _plan_model(
         shared = np.vstack([of_model, levels])
         return PlanDraw(of, point, slope, values, shared, errors_of(error, grid_error, slope, shared))
 
-    near = [] if below is None else [below, *in_threads(linearise_from, [(coarsest, z, below) for z in around])]
+    near = [] if below is None else [below, *linearise_around(coarsest, around, below)]
     points = [one for one in near if one is not None]
     of_each = responses_at(coarsest, points, _causes(coarsest, [settings[j] for j in one_each])) if points else ()
     tasks = [(coarsest, *one) for one in zip(points, (_with_rows(one, len(places)) for one in of_each), strict=True)]

@@ -100,6 +100,15 @@ def with_correction(added: Added, name: str) -> Engine:
             return None
         return replace(point, prediction=point.prediction + value, slope=point.slope + slope)
 
+    def linearise_around(model: Model, z: Array, near: Point) -> list[Point | None]:
+        found = []
+        for point, (value, slope) in zip(
+            NEWTON.linearise_around(model, z, near), (added(model, one) for one in z), strict=True
+        ):
+            corrected = point and replace(point, prediction=point.prediction + value, slope=point.slope + slope)
+            found.append(corrected)
+        return found
+
     def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
         return NEWTON.predict(model, points, z) + np.stack([added(model, one)[0] for one in z])
 

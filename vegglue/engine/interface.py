@@ -1,4 +1,4 @@
-"""What inference and diagnosis need of a flow engine: seven functions.
+"""What inference and diagnosis need of a flow engine: eight functions.
 
 A model is a function f from z (p,) to predictions (n,) at stations. z is a place of the prior in which every parameter
 is standard normal, z = Phi^-1(F(theta)), so that the misfit of the prior is |z|^2.
@@ -101,6 +101,8 @@ class Engine:
     linearise
         (model, z, near, wanted) -> f(z) and df/dz as a Point at z (p,), or None if no steady flow is found. near: a
         point to start from, of this model or of one on cells of twice the size, whose experiments may be fewer.
+    linearise_around
+        (model, z, near) -> the same at z (m, p) around a point of the same model.
     predict
         (model, points, z) -> f (m, n) at z (m, p), NaN where no flow is found; points: some that are known.
     responses
@@ -120,6 +122,7 @@ class Engine:
 
     name: str
     linearise: Callable[["Model", Array, Point | None, Wanted], Point | None]
+    linearise_around: Callable[["Model", Array, Point], list[Point | None]]
     predict: Callable[["Model", Sequence[Point], Array], Array]
     responses: Callable[["Model", Sequence[Point], Sequence[Cause]], Array]
     responses_to_cells: Callable[["Model", Point, str, Sequence[Term]], "StationsOfCells"]
@@ -187,6 +190,11 @@ def linearise_from(model: Model, z: Array, near: Point | None) -> Point | None:
     """`linearise` from a point nearby, and from afar if that fails or there is none."""
     found = None if near is None else linearise(model, z, near)
     return found or linearise(model, z)
+
+
+def linearise_around(model: Model, z: Array, near: Point) -> list[Point | None]:
+    """`linearise_from` a point at z (m, p) around it, for less than one by one."""
+    return model.engine.linearise_around(model, z, near)
 
 
 def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
