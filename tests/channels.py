@@ -1,8 +1,10 @@
 """Channels that the verification tests share: small, with smooth walls."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 
 import numpy as np
+import pandas as pd
 
 from vegglue.arrays import Array
 from vegglue.effects import bed_laws
@@ -197,3 +199,14 @@ def family(points: Array) -> Problem:
     coefficient = np.stack([0.03 + 0.06 * points[:, 0], np.full(len(points), 1.0)])
     phi = many.plants.phi * 10.0 ** (points[:, 1] - 0.5)
     return changed(many, coefficient=coefficient, plants=replace(many.plants, phi=phi))
+
+
+def stations_at(
+    experiments: Iterable[str], places: Mapping[str, tuple[Sequence[float], Sequence[float]]]
+) -> pd.DataFrame:
+    """A table of stations, of each kind in each experiment at some x and y [m]; nothing was read yet."""
+    rows = [
+        {"experiment": experiment, "kind": kind, "section": f"{kind} {x:g}", "x": x, "y": y}
+        for experiment in experiments for kind, (along, across) in places.items() for x in along for y in across
+    ]  # fmt: skip
+    return pd.DataFrame(rows).assign(value=0.0, standard_error=0.01, used=True, reason="", depth=np.nan, device="")

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from channels import stations_at
 from marching_engine import marching
 
 from vegglue.calibration.model_error import cell_responses
@@ -56,14 +57,7 @@ def flume(rough: bool = True) -> Case:
 
 
 def stations(x: tuple[float, ...] = (1.3, 3.0, 4.9), y: tuple[float, ...] = (0.05, 0.3, 0.8)) -> pd.DataFrame:
-    rows = [
-        {"experiment": "one", "kind": kind, "section": f"{kind} {at:g}", "x": at, "y": across}
-        for kind in ("velocity", "velocity_across", "level")
-        for at in x
-        for across in y
-    ]
-    given = {"value": 0.0, "standard_error": 0.01, "used": True, "reason": "", "depth": np.nan, "device": ""}
-    return pd.DataFrame(rows).assign(**given)
+    return stations_at(["one"], dict.fromkeys(("velocity", "velocity_across", "level"), (x, y)))
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
+from channels import stations_at
 from marching_engine import marching
 
 from vegglue.calibration.candidates import candidates_of, cause_of, with_effect
@@ -50,21 +50,12 @@ OF_EVERY_STAGE = (
 )  # fmt: skip
 
 
-def stations() -> pd.DataFrame:
-    rows = [
-        {"experiment": experiment, "kind": kind, "section": f"{kind} {x:g}", "x": x, "y": y}
-        for experiment in CASE.experiments
-        for kind, places in (("velocity", (5.0, 11.0, 17.0)), ("level", (3.0,)))
-        for x in places
-        for y in ((-1.2, 0.1, 1.2) if kind == "velocity" else (0.0,))
-    ]
-    given = {"value": 0.0, "standard_error": 0.01, "used": True, "reason": "", "depth": np.nan, "device": ""}
-    return pd.DataFrame(rows).assign(**given)
+PLACES = {"velocity": ((5.0, 11.0, 17.0), (-1.2, 0.1, 1.2)), "level": ((3.0,), (0.0,))}
 
 
 @pytest.fixture(scope="module")
 def models() -> tuple[Model, Model]:
-    newton = Model(CASE, build_site(CASE), stations(), NEWTON)
+    newton = Model(CASE, build_site(CASE), stations_at(CASE.experiments, PLACES), NEWTON)
     return newton, replace(newton, engine=marching())
 
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
+from channels import stations_at
 
 from vegglue.arrays import Array
 from vegglue.calibration.candidates import Candidate, cause_of, place_candidate, with_effect
@@ -32,20 +32,12 @@ CASE = Case.model_validate(
 )
 
 
-def stations() -> pd.DataFrame:
-    rows = [
-        {"experiment": "high", "kind": kind, "section": f"{kind} {x:g}", "x": x, "y": y}
-        for kind, places in (("velocity", (6.5, 12.5)), ("level", (3.5,)))
-        for x in places
-        for y in ((-1.25, 0.25, 1.25) if kind == "velocity" else (0.25,))
-    ]
-    given = {"value": 0.0, "standard_error": 0.01, "used": True, "reason": "", "depth": np.nan, "device": ""}
-    return pd.DataFrame(rows).assign(**given)
+PLACES = {"velocity": ((6.5, 12.5), (-1.25, 0.25, 1.25)), "level": ((3.5,), (0.25,))}
 
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return Model(CASE, build_site(CASE), stations(), NEWTON)
+    return Model(CASE, build_site(CASE), stations_at(["high"], PLACES), NEWTON)
 
 
 @pytest.fixture(scope="module")
