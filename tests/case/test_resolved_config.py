@@ -118,13 +118,9 @@ def test_what_was_made_or_edited_by_hand_stays(texts: Texts, tmp_path: Path, nam
     assert mine.read_text().startswith(edited(texts)[mine])
 
 
-def test_what_a_killed_command_wrote_is_no_edit(texts: Texts, tmp_path: Path) -> None:
-    (tmp_path / "velocities.csv").write_text(texts[tmp_path / "velocities.csv"])
-    write_made(texts, ADVICE)
-
-
-def test_a_file_of_an_older_version_with_the_same_content_is_its_own(texts: Texts, tmp_path: Path) -> None:
-    (tmp_path / "brook.yaml").write_text(texts[tmp_path / "brook.yaml"])
+@pytest.mark.parametrize("name", ["velocities.csv", "brook.yaml"])
+def test_what_a_killed_command_or_an_older_version_wrote_is_no_edit(texts: Texts, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(texts[tmp_path / name])
     write_made(texts, ADVICE)
 
 

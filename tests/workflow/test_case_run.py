@@ -107,14 +107,11 @@ def test_a_case_has_as_many_members_as_were_solved(case: Case, tmp_path: Path, m
     assert case_run.as_solved(case, tmp_path).simulate.members == 12
 
 
-@pytest.mark.parametrize("members", [0, -1, 2**30])
-def test_no_ensemble_is_larger_than_the_largest(members: int) -> None:
-    with pytest.raises(InputError, match="members: expected 1 to 1,048,576, got"):
-        case_run.of_size(load_case(CONFIG), members)
-
-
-@pytest.mark.parametrize("members", ["8", 8.0])
-def test_a_number_of_members_is_whole(members: int) -> None:
-    """8.0 went on into the config; and '8' was an error within the package."""
-    with pytest.raises(InputError, match=f"members: expected a whole number, got {members!r}"):
+@pytest.mark.parametrize(
+    ("members", "wanted"),
+    [*((number, "1 to 1,048,576, got") for number in (0, -1, 2**30)),
+     *((number, f"a whole number, got {number!r}") for number in ("8", 8.0))],
+)  # fmt: skip
+def test_a_number_of_members_is_whole_and_no_larger_than_the_largest(members: int, wanted: str) -> None:
+    with pytest.raises(InputError, match=f"members: expected {wanted}"):
         case_run.of_size(load_case(CONFIG), members)

@@ -116,18 +116,14 @@ def gone(
     return made, [one for one in shown if one]
 
 
-def test_a_law_is_searched_where_no_known_effect_explains_what_acts_all_over(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+@pytest.mark.parametrize(
+    ("kind", "places", "laws"), [("none-of-these", 0, False), ("none-of-these", 1, True), ("cannot-tell", 0, True)]
+)
+def test_a_law_is_searched_where_it_stands_out_or_no_effect_explains_what_acts_all_over(
+    kind: str, places: int, laws: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    assert gone("none-of-these", 0, 0.01, monkeypatch, tmp_path) == (["twin-law"], ["law"])
-
-
-@pytest.mark.parametrize(("kind", "places"), [("none-of-these", 1), ("cannot-tell", 0)])
-def test_a_law_that_stands_out_is_searched(
-    kind: str, places: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    laws = candidate_laws_of("law_bank_speed_step")
-    assert gone(kind, places, 0.01, monkeypatch, tmp_path, laws) == (["twin-law"], ["law"])
+    known = candidate_laws_of("law_bank_speed_step") if laws else None
+    assert gone(kind, places, 0.01, monkeypatch, tmp_path, known) == (["twin-law"], ["law"])
 
 
 def test_a_law_that_does_not_lower_errors_is_told_and_not_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
