@@ -3,10 +3,12 @@
 import os
 import signal
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 from joblib import cpu_count
+from reach import Say, said_to
 from threadpoolctl import threadpool_limits
 
 import vegglue.parallel
@@ -69,6 +71,12 @@ def _own_share_of_the_cores() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(vegglue.parallel, "cpu_count", lambda: cores)
         yield
+
+
+@pytest.fixture
+def say(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Say:
+    """How `vegglue ...` ends in this process, and its standard error."""
+    return partial(said_to, monkeypatch, capsys)
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -15,6 +16,7 @@ from vegglue.cli.main import main
 ROOT = Path(__file__).parents[1]
 OWN_CASE, OWN_FILES = ((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("own_case.md", "own_files.md"))
 ENVIRONMENT = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MPLBACKEND": "agg", "COLUMNS": "200"}
+Say = Callable[..., tuple[int, str]]
 COARSE = ("cell: [1.0, 0.5]", "cell: [1.25, 0.75]")  # solves several members in a hundredth of a second
 
 

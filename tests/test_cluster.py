@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from reach import COARSE, said_to, write_reach
+from reach import COARSE, Say, write_reach
 from workers import Workers, workers_in
 
 import vegglue
@@ -251,11 +251,11 @@ def test_nobody_is_waited_for_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("verb", ["simulate", "infer", "diagnose", "run"])
 def test_commands_say_that_the_extra_is_missing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], verb: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say, verb: str
 ) -> None:
     config = write_reach(tmp_path, *CHANGES)
     monkeypatch.setitem(sys.modules, "distributed", None)
     monkeypatch.chdir(tmp_path)
-    code, error = said_to(monkeypatch, capsys, verb, config, "--cluster", "local:2")
+    code, error = say(verb, config, "--cluster", "local:2")
     assert (code, error.count("\n")) == (2, 1)
     assert "--cluster needs the package distributed, which is not installed: pip install 'vegglue[cluster]'" in error

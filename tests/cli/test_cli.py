@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from reach import COARSE, OWN_CASE, ROOT, block, said_to, vegglue, write_reach
+from reach import COARSE, OWN_CASE, ROOT, Say, block, vegglue, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, simulation_hash
@@ -117,16 +117,16 @@ def test_the_snippet_on_files_runs(
 
 
 def test_an_ensemble_without_measurements_can_be_simulated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say
 ) -> None:
     config = write_reach(tmp_path, COARSE, (yaml_part("observations"), ""))
     monkeypatch.chdir(tmp_path)
     several = 4 * CLUSTER_SIZE + 1  # more than one chunk
-    assert said_to(monkeypatch, capsys, "simulate", config, "--members", several, "--jobs", 1) == (0, "")
+    assert say("simulate", config, "--members", several, "--jobs", 1) == (0, "")
     ensemble = read_ensemble(tmp_path / "runs/brook/ensemble.h5")
     assert ensemble.prediction.shape == (several, 0)
     assert ensemble.mass_error.max() < 1e-6
-    code, error = said_to(monkeypatch, capsys, "infer", config, "--members", several)
+    code, error = say("infer", config, "--members", several)
     assert (code, error.count("\n")) == (2, 1), error
     assert "nothing can be inferred" in error
 
@@ -150,12 +150,12 @@ def yaml_part(key: str) -> str:
     ],
 )
 def test_a_mistake_in_the_config_is_one_sentence(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say,
     step: str, old: str, new: str, expected: str,
 ) -> None:  # fmt: skip
     config = write_reach(tmp_path, (old, new))
     monkeypatch.chdir(tmp_path)
-    code, error = said_to(monkeypatch, capsys, step, config.name)
+    code, error = say(step, config.name)
     assert (code, error.count("\n")) == (2, 1), error
     assert expected in error
     assert error.startswith("brook.yaml")
@@ -166,13 +166,13 @@ def test_a_mistake_in_the_config_is_one_sentence(
     ("step", "expected"), [("infer --method glue", "run `vegglue simulate {}`"), ("report", "run `vegglue infer {}`")]
 )
 def test_a_step_out_of_turn_names_the_one_before(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], step: str, expected: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say, step: str, expected: str
 ) -> None:
     """It said CONFIG, which is no file of a user."""
     (folder := tmp_path / "my brooks").mkdir()
     write_reach(folder)
     monkeypatch.chdir(tmp_path)
-    code, error = said_to(monkeypatch, capsys, *step.split(), "my brooks/brook.yaml")
+    code, error = say(*step.split(), "my brooks/brook.yaml")
     assert (code, error.count("\n")) == (2, 1), error
     assert expected.format("'my brooks/brook.yaml'") in error
 
@@ -185,11 +185,11 @@ def test_no_message_names_a_config_that_is_none() -> None:
 
 @pytest.mark.parametrize("arguments", [("--members", 0), ("--members", -3), ("--members", "many"), ("--jobs", 0)])
 def test_an_impossible_option_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: tuple[object, ...]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say, arguments: tuple[object, ...]
 ) -> None:
     config = write_reach(tmp_path)
     monkeypatch.chdir(tmp_path)
-    code, error = said_to(monkeypatch, capsys, "simulate", config, *arguments)
+    code, error = say("simulate", config, *arguments)
     assert code == 2
     assert str(arguments[0]) in error
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from reach import COARSE, said_to, write_reach
+from reach import COARSE, Say, write_reach
 
 import vegglue
 from vegglue.errors import InputError
@@ -32,14 +32,14 @@ def multiplied(folder: Path, times: float) -> None:
 @pytest.mark.parametrize("verb", COMMANDS)
 @pytest.mark.parametrize(("times", "doubt"), [(100.0, "cm/s"), (-1.0, "run upstream"), (1.0, None)])
 def test_a_command_doubts_what_no_flow_can_show(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], verb: str, times: float,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say, verb: str, times: float,
     doubt: str | None,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     write_reach(tmp_path, COARSE)
     multiplied(tmp_path, times)
     monkeypatch.setattr(vegglue, verb, stop, raising=False)
-    code, said = said_to(monkeypatch, capsys, *COMMANDS[verb], "brook.yaml", "--quiet")
+    code, said = say(*COMMANDS[verb], "brook.yaml", "--quiet")
     *doubts, last = said.splitlines()
     assert (code, last) == (2, "no further.")
     assert len(doubts) == (doubt is not None)

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from reach import COARSE, ROOT, here, said_to, vegglue, write_reach
+from reach import COARSE, ROOT, here, vegglue, write_reach
 
 from vegglue.cli.main import main
 from vegglue.effects.library import SHIPPED, library
@@ -30,8 +30,8 @@ def pasted(text: str) -> tuple[tuple[str, str], ...]:
     return ("observations:\n", f"{effects}observations:\n"), ("  phi: {dist", f"{parameter}  phi: {{dist")
 
 
-def test_the_list_names_every_effect(capsys, monkeypatch):
-    assert said_to(monkeypatch, capsys, "effects")[0] == 0
+def test_the_list_names_every_effect(say, capsys, monkeypatch):
+    assert say("effects")[0] == 0
     listed = said_to_text(monkeypatch, capsys, "effects").splitlines()
     assert {line.split()[0] for line in listed if line.startswith("  ")} == {effect.name for effect in SHIPPED}
     named = json.loads(said_to_text(monkeypatch, capsys, "effects", "--json"))
@@ -65,16 +65,16 @@ def test_the_example_on_a_page_can_be_pasted(tmp_path, monkeypatch, capsys):
     assert "brook does not have it." in said_to_text(monkeypatch, capsys, "effects", "elder", "--config", config)
 
 
-def test_an_effect_of_ones_own_is_checked(tmp_path, monkeypatch, capsys):
+def test_an_effect_of_ones_own_is_checked(tmp_path, monkeypatch, say, capsys):
     file = tmp_path / "slow_stones.py"
     file.write_text(OWN, encoding="utf-8")
-    code, complaint = said_to(monkeypatch, capsys, "effects", "--check", file)
+    code, complaint = say("effects", "--check", file)
     assert (code, "--trust" in complaint) == (2, True)
     assert said_to_text(monkeypatch, capsys, "effects", "--check", file, "--trust") == (
         "slow_stones: keeps the contract\n"
     )
     file.with_name("bad.py").write_text(OWN.replace("1 + excess", "1 - 20 * excess"), encoding="utf-8")
-    code, complaint = said_to(monkeypatch, capsys, "effects", "--check", tmp_path / "bad.py", "--trust")
+    code, complaint = say("effects", "--check", tmp_path / "bad.py", "--trust")
     assert (code, "1 of 1 effects break the contract: slow_stones" in complaint) == (2, True)
 
 
@@ -83,16 +83,16 @@ def test_the_example_is_ten_lines():
 
 
 @pytest.mark.slow
-def test_an_effect_of_ones_own_works_in_every_command(tmp_path, monkeypatch, capsys):
+def test_an_effect_of_ones_own_works_in_every_command(tmp_path, monkeypatch, say, capsys):
     """In several processes too, where the effect is known to none: the ensemble is made by two, the page by another."""
     config = own_case(tmp_path)
     monkeypatch.chdir(tmp_path)
-    assert "--trust" in said_to(monkeypatch, capsys, "check", config)[1]
+    assert "--trust" in say("check", config)[1]
     told = said_to_text(monkeypatch, capsys, "effects", "slow_stones", "--config", config, "--trust")
     assert "as `slow_stones`" in told
-    assert said_to(monkeypatch, capsys, "check", config, "--trust")[0] == 0
+    assert say("check", config, "--trust")[0] == 0
     vegglue(tmp_path, "simulate", "--members", 8, "--jobs", 2, config, "--trust")
-    inferred = said_to(monkeypatch, capsys, "infer", "--members", 8, "--method", "glue", config, "--trust")
+    inferred = say("infer", "--members", 8, "--method", "glue", config, "--trust")
     assert inferred[0] == 0
     page = here(tmp_path, "report", config, "--members", 8, "--trust")
     assert "Report" in page.stdout
@@ -110,11 +110,11 @@ def test_an_effect_of_ones_own_works_in_every_command(tmp_path, monkeypatch, cap
         (OWN.replace('name="slow_stones"', 'name="wind"'), "exists already"),
     ],
 )
-def test_a_file_that_holds_no_effects_is_refused(text, complaint, tmp_path, monkeypatch, capsys):
+def test_a_file_that_holds_no_effects_is_refused(text, complaint, tmp_path, say):
     config = own_case(tmp_path)
     (tmp_path / "slow_stones.py").write_text(text, encoding="utf-8")
     library.cache_clear()
-    code, said = said_to(monkeypatch, capsys, "check", config, "--trust")
+    code, said = say("check", config, "--trust")
     assert (code, complaint in said, said.count("\n")) == (2, True, 1)
 
 
@@ -133,10 +133,10 @@ REFUSED = {  # what is refused, and the names that the message has
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_what_does_not_agree_with_the_library_is_refused(what, tmp_path, monkeypatch, capsys):
+def test_what_does_not_agree_with_the_library_is_refused(what, tmp_path, say):
     entry, complaint = REFUSED[what]
     config = write_reach(tmp_path, COARSE, *pasted(f"effects:\n  {entry}\n"))
-    code, said = said_to(monkeypatch, capsys, "check", config)
+    code, said = say("check", config)
     assert (code, complaint in said, said.count("\n")) == (2, True, 1), said
 
 

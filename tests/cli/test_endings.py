@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from reach import COARSE, ENVIRONMENT, command, said_to, write_reach
+from reach import COARSE, ENVIRONMENT, Say, command, said_to, write_reach
 
 from vegglue import parallel
 from vegglue.__main__ import enter
@@ -20,7 +20,6 @@ from vegglue.errors import InputError, StorageError
 from vegglue.wording.commands import LAST_WORDS
 
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
-Say = Callable[..., tuple[int, str]]
 
 
 @pytest.fixture

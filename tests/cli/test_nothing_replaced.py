@@ -1,11 +1,10 @@
 """Commands that write among a user's own files: import, extend, twin; and a larger ensemble, which cost hours."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from reach import COARSE, block, said_to, write_reach
+from reach import COARSE, Say, block, write_reach
 
 from vegglue.calibration.candidates import Candidate
 from vegglue.case.config import load_case
@@ -14,14 +13,13 @@ from vegglue.effects.library import library
 
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
 WITH_ERRORS = ("experiment: June}", "experiment: June, standard_error: 0.01}")
-Say = Callable[..., tuple[int, str]]
 
 
 @pytest.fixture
-def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Say:
+def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say) -> Say:
     monkeypatch.chdir(tmp_path)
     write_reach(tmp_path, *SIXTEEN, WITH_ERRORS)
-    return lambda *arguments: said_to(monkeypatch, capsys, *arguments)
+    return say
 
 
 def refused(said: tuple[int, str], *parts: str) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from fault_table import ENSEMBLE, FAULTS, PAGE, Fault, page
 from kills import same
-from reach import COARSE, said_to, write_reach
+from reach import COARSE, Say, write_reach
 from stored import CHUNKS, a_header, append
 
 from vegglue.inference import solve_ensemble
@@ -50,7 +50,7 @@ def words(command: str) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS, ids=[f"{one.command}: {one.what}" for one in FAULTS])
 def test_a_fault_has_its_code_and_loses_nothing(
-    fault: Fault, undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    fault: Fault, undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_reach(tmp_path, *CHANGES)
@@ -60,7 +60,7 @@ def test_a_fault_has_its_code_and_loses_nothing(
     with fault.trouble(tmp_path):
         solved.clear()
         there = contents(tmp_path)
-        code, error = said_to(monkeypatch, capsys, *words(fault.command))
+        code, error = say(*words(fault.command))
     assert code == fault.code, error
     assert fault.names in error
     assert error.count("\n") == (1 if fault.code else 0), error
@@ -70,7 +70,7 @@ def test_a_fault_has_its_code_and_loses_nothing(
         assert changed == [], "nothing that was there is touched"
     restore(tmp_path, before, undisturbed)
     for step in STEPS:
-        assert said_to(monkeypatch, capsys, *words(step)) == (0, "")
+        assert say(*words(step)) == (0, "")
     assert len(solved) == fault.solves, "chunks solved"
     # The same bits, whatever has happened.
     for name in (ENSEMBLE, ENSEMBLE.with_name("posterior.h5")):

@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from reach import COARSE, begin, here, said_to, vegglue, write_reach
+from reach import COARSE, Say, begin, here, vegglue, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.errors import StorageError
@@ -32,7 +32,6 @@ ENSEMBLE = Path("runs/brook/ensemble.h5")
 PART = Path("runs/brook/ensemble.h5.part")
 SIXTEEN = (COARSE, ("members: 1024", "members: 16"))
 COMPARED = ("prediction", "section_flow", "mass_error", "status", "reason", "iterations")
-Say = Callable[[str], tuple[int, str]]
 Damage = Callable[[str], str]
 
 
@@ -161,12 +160,12 @@ def simulated(folder: Path) -> None:
 
 
 @pytest.fixture
-def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Say:
+def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say) -> Say:
     """`vegglue step brook.yaml` in the test's folder: exit code and standard error, of one line if it is refused."""
     monkeypatch.chdir(tmp_path)
 
     def said(step: str) -> tuple[int, str]:
-        code, error = said_to(monkeypatch, capsys, step, "brook.yaml")
+        code, error = say(step, "brook.yaml")
         assert error.count("\n") == bool(code), error
         return code, error
 

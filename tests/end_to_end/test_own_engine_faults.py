@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import SMOOTH, commanded
-from reach import COARSE, begin, here, said_to
+from reach import COARSE, Say, begin, here
 from reach import vegglue as shell
 
 import vegglue
@@ -74,12 +74,10 @@ def test_members_that_fail_are_counted_with_their_reason(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_where_all_fail_it_is_said_why(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_where_all_fail_it_is_said_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say) -> None:
     commanded(tmp_path, "raise SystemExit('no licence')", "", COARSE, SMALL)
     monkeypatch.chdir(tmp_path)
-    code, said = said_to(monkeypatch, capsys, "check", "brook.yaml", "--trust", "--quiet")
+    code, said = say("check", "brook.yaml", "--trust", "--quiet")
     assert (code, said.count("\n")) == (2, 1)
     assert (
         "brook.yaml: the command of `engine` failed at the medians of the priors: the command ended with exit" in said
@@ -90,7 +88,7 @@ def test_where_all_fail_it_is_said_why(
     assert done.returncode == 2
     assert "brook.yaml: expected members with a solution, got none of 8; 8 of them: the command ended" in done.stderr
     for command in ("infer", "diagnose"):
-        code, said = said_to(monkeypatch, capsys, command, "brook.yaml", "--trust", "--quiet")
+        code, said = say(command, "brook.yaml", "--trust", "--quiet")
         assert code == 2
         assert "no licence" in said
 
@@ -187,13 +185,13 @@ CONSTANT = re.sub(r"\{0\.2 / .*!r\}", "0.4", SMOOTH)
 
 @pytest.mark.slow
 def test_a_command_that_ignores_its_parameters_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say
 ) -> None:
     """It was told as water that enters the channel, beside a remark that nothing was as reckoned."""
     error = ("experiment: June}", "experiment: June, standard_error: 0.01}")
     commanded(tmp_path, CONSTANT, "", COARSE, SMALL, error)
     monkeypatch.chdir(tmp_path)
-    code, said = said_to(monkeypatch, capsys, "diagnose", "brook.yaml", "--trust", "--quiet", "--jobs", 1)
+    code, said = say("diagnose", "brook.yaml", "--trust", "--quiet", "--jobs", 1)
     assert (code, said.count("\n")) == (2, 1)
     assert "expected a command of `engine` whose predictions change with n_b or phi, got the same ones" in said
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from diagnoses import IMPLAUSIBLE
-from reach import COARSE, block, said_to, write_reach
+from reach import COARSE, Say, block, write_reach
 
 from vegglue.cli.main import main
 from vegglue.errors import InputError
@@ -29,13 +29,11 @@ def without_parameters(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("command", ["diagnose", "next", "discover", "run", "simulate", "infer", "export"])
-def test_nothing_to_calibrate_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
-) -> None:
+def test_nothing_to_calibrate_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say, command: str) -> None:
     config = without_parameters(tmp_path)
     monkeypatch.chdir(tmp_path)
     options = () if command == "export" else ("--jobs", 1)
-    code, told = said_to(monkeypatch, capsys, command, config, *options)
+    code, told = say(command, config, *options)
     assert (code, "`parameters` expected a prior or more, got none" in told) == (2, True), told
 
 
@@ -54,21 +52,21 @@ def test_check_remarks_that_there_is_nothing_to_calibrate(
 @pytest.mark.slow
 @pytest.mark.parametrize("lines", [1, 5])
 def test_one_reading_and_one_section_are_diagnosed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], lines: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say, lines: int
 ) -> None:
     config = thin(tmp_path, lines)
     monkeypatch.chdir(tmp_path)
     text = config.read_text(encoding="utf-8").replace("experiment: June}", "experiment: June, standard_error: 0.01}")
     config.write_text(text, encoding="utf-8")
     for command in ("diagnose", "next"):
-        code, told = said_to(monkeypatch, capsys, command, config, "--jobs", 1)
+        code, told = say(command, config, "--jobs", 1)
         assert code == 0, told
         assert "Traceback" not in told
 
 
 @pytest.mark.slow
 def test_velocities_no_flow_comes_near_are_told_before_priors(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say
 ) -> None:
     """Where no flow is found at all, wrong units are the reason and not the priors."""
     config = thin(tmp_path, 10)
@@ -78,9 +76,9 @@ def test_velocities_no_flow_comes_near_are_told_before_priors(
         raise InputError("brook: the model finds no steady flow at its best point; widen the priors.")
 
     monkeypatch.setattr("vegglue.diagnosis.diagnose.kept_baseline", none_found)
-    code, told = said_to(monkeypatch, capsys, "diagnose", config, "--jobs", 1)
+    code, told = say("diagnose", config, "--jobs", 1)
     assert (code, "widen the priors" in told) == (2, True), told
     monkeypatch.setattr("vegglue.diagnosis.diagnose.implausible_values", lambda *_: [IMPLAUSIBLE])
-    code, told = said_to(monkeypatch, capsys, "diagnose", config, "--jobs", 1)
+    code, told = say("diagnose", config, "--jobs", 1)
     assert code == 2
     assert sentence(IMPLAUSIBLE) in told

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from reach import COARSE, said_to, write_reach
+from reach import COARSE, Say, write_reach
 
 import vegglue
 from vegglue.case.config import load_case
@@ -167,9 +167,7 @@ def test_cross_sections_of_a_bend_are_carried_on_along_it(tmp_path: Path) -> Non
     assert "in 4 cross-sections" in " ".join(one.taken for one in case.imported)
 
 
-def test_a_raster_needs_the_width_of_the_grid(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_raster_needs_the_width_of_the_grid(tmp_path: Path, say: Say) -> None:
     """Levels of a plane on the map, which the grid then reads where its cells lie."""
     at = np.arange(40.0) + 0.5
     rows = (2.0 + 0.01 * at[None, :] - 0.02 * at[::-1, None]).tolist()
@@ -181,7 +179,7 @@ def test_a_raster_needs_the_width_of_the_grid(
     for name, text in (("site.yaml", site), ("dtm.asc", head + levels),
                        ("axis.csv", line_file("csv")), ("a.csv", "E,N,u\n683140,247495,0.5\n")):  # fmt: skip
         (folder / name).write_text(text, encoding="utf-8")
-    code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "bend.yaml")
+    code, error = say("import", folder, "--to", tmp_path / "bend.yaml")
     assert code == 2
     assert "dtm.asc: expected `grid.y`" in error
     (folder / "site.yaml").write_text(site.replace("axis.csv}", "axis.csv}, y: [-4, 4]"), encoding="utf-8")
@@ -211,8 +209,7 @@ def test_a_raster_needs_the_width_of_the_grid(
 )
 def test_a_line_that_cannot_be_taken_is_refused_in_one_sentence(
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    say: Say,
     drawn: str,
     files: dict[str, str],
     said: str,
@@ -222,21 +219,19 @@ def test_a_line_that_cannot_be_taken_is_refused_in_one_sentence(
     (folder / "site.yaml").write_text(GROUND + EXPERIMENTS + f"grid: {{centreline: {drawn}}}\n", encoding="utf-8")
     for name, text in {"u__csv": "x,y,u\n1,2,0.5\n", **files}.items():
         (folder / name.replace("__", ".")).write_text(text, encoding="utf-8")
-    code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "bend.yaml")
+    code, error = say("import", folder, "--to", tmp_path / "bend.yaml")
     assert code == 2
     assert said in error
     assert len(error.strip().splitlines()) == 1
 
 
-def test_a_file_on_the_map_of_a_line_is_not_flipped(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_on_the_map_of_a_line_is_not_flipped(tmp_path: Path, say: Say) -> None:
     folder = tmp_path / "Bend"
     folder.mkdir()
     site = GROUND + EXPERIMENTS + "grid: {centreline: [[0, 0], [30, 0], [50, 10]]}\nfiles: {u.csv: {flip: x}}\n"
     (folder / "site.yaml").write_text(site, encoding="utf-8")
     (folder / "u.csv").write_text("x,y,u\n1,2,0.5\n", encoding="utf-8")
-    code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "bend.yaml")
+    code, error = say("import", folder, "--to", tmp_path / "bend.yaml")
     assert code == 2
     assert "u.csv: expected no `flip`" in error
 
@@ -258,9 +253,7 @@ def test_a_misspelt_key_of_the_grid_is_refused(tmp_path: Path) -> None:
         imported(folder, site, u__csv="x,y,u\n1,0,0.5\n")
 
 
-def test_without_a_line_the_length_and_the_frame_are_needed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_a_line_the_length_and_the_frame_are_needed(tmp_path: Path, say: Say) -> None:
     folder = tmp_path / "Brook"
     folder.mkdir()
     (folder / "u.csv").write_text("x,y,u\n1,0,0.5\n", encoding="utf-8")
@@ -269,6 +262,6 @@ def test_without_a_line_the_length_and_the_frame_are_needed(
         (GROUND.replace("{", "{length_m: 30, ", 1) + EXPERIMENTS + "frame: {crs: a}\n", "`frame.origin`"),
     ):
         (folder / "site.yaml").write_text(site, encoding="utf-8")
-        code, error = said_to(monkeypatch, capsys, "import", folder, "--to", tmp_path / "brook.yaml")
+        code, error = say("import", folder, "--to", tmp_path / "brook.yaml")
         assert code == 2
         assert said in error

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from field_folders import CHANNEL, JUNE, field_folder, folder_of, import_of, imported, refusal, refusal_of
-from reach import here, said_to
+from reach import Say, here
 
 import vegglue
 from vegglue.case.config import load_case
@@ -306,11 +306,11 @@ def test_a_file_of_the_usual_name_need_not_name_the_only_experiment(tmp_path: Pa
 
 
 def test_import_reports_which_measurements_lack_errors(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say
 ) -> None:
     monkeypatch.chdir(tmp_path)
     folder_of(tmp_path / "brook", CHANNEL + JUNE, adv__csv="x;y;Vx (cm/s)\n8;0;21\n")
-    code, printed = said_to(monkeypatch, capsys, "import", "brook", "--quiet")
+    code, printed = say("import", "brook", "--quiet")
     assert code == 0
     for word in ("`infer`", "1 value of velocity", "x = 8, y = 0 m", "`u_se`", "0.015 m/s"):
         assert word in printed

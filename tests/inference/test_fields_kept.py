@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from channels import make_problem
-from reach import COARSE, said_to, write_reach
+from reach import COARSE, Say, write_reach
 from stored import HASH, MEMBERS, X, Y
 
 from vegglue.case.config import load_case
@@ -145,11 +145,11 @@ def test_a_failed_member_has_no_fields(finished: Finished, monkeypatch: pytest.M
 
 
 def test_fields_beyond_their_budget_are_refused_with_what_to_do(
-    finished: Finished, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    finished: Finished, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say
 ) -> None:
     config = write_reach(tmp_path, COARSE, ("seed: 7", "seed: 7, fields: {x: [8, 20]}, field_budget: 1"))
     monkeypatch.chdir(tmp_path)
-    code, error = said_to(monkeypatch, capsys, "simulate", config.name)
+    code, error = say("simulate", config.name)
     assert (code, error.count("\n")) == (2, 1), error
     assert error.startswith("brook.yaml: `simulate.fields` keeps 1.769 MB of 1,024 members, more than the 1 MB of")
     assert "shorten its 12 m along x to 5 m, take fewer members, or raise the budget." in error
@@ -176,13 +176,11 @@ def test_an_ensemble_depends_on_its_window_but_not_on_the_budget(finished: Finis
     assert simulation_hash(changed(case, members=17)) != simulation_hash(case)
 
 
-def test_fields_that_were_removed_are_made_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_fields_that_were_removed_are_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say) -> None:
     config = write_reach(tmp_path, COARSE, SMALL)
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "runs/brook/fields.h5"
     for _ in range(2):
-        assert said_to(monkeypatch, capsys, "simulate", config.name, "--jobs", 1) == (0, "")
+        assert say("simulate", config.name, "--jobs", 1) == (0, "")
         assert path.exists()
         path.unlink()

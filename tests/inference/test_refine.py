@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import scipy.stats
 from posteriors import assert_same
-from reach import COARSE, said_to, write_reach
+from reach import COARSE, Say, write_reach
 from refined_reach import FEW_MEMBERS, SolvedReach, solved_reach
 
 from vegglue.calibration.noise import Noise, covariance_of
@@ -176,19 +176,17 @@ def test_an_informal_likelihood_is_not_refined(reach: SolvedReach) -> None:
 
 
 @pytest.mark.slow
-def test_the_method_can_be_chosen(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_method_can_be_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say) -> None:
     config = write_reach(tmp_path, COARSE, (FEW_MEMBERS[0], "simulate: {members: 64, seed: 7}"))
     monkeypatch.chdir(tmp_path)
-    assert said_to(monkeypatch, capsys, "simulate", config, "--jobs", 1) == (0, "")
+    assert say("simulate", config, "--jobs", 1) == (0, "")
     for method in ("refine", "glue"):
-        assert said_to(monkeypatch, capsys, "infer", config, "--method", method, "--jobs", 1) == (0, "")
+        assert say("infer", config, "--method", method, "--jobs", 1) == (0, "")
         assert read_posterior(tmp_path / "runs/brook/posterior.h5").settings.method == method
     config.write_text(config.read_text(encoding="utf-8") + "infer: {likelihood: nse}\n", encoding="utf-8")
-    assert said_to(monkeypatch, capsys, "infer", config, "--jobs", 1) == (0, "")
+    assert say("infer", config, "--jobs", 1) == (0, "")
     assert read_posterior(tmp_path / "runs/brook/posterior.h5").settings.method == "glue"
-    assert said_to(monkeypatch, capsys, "infer", config, "--method", "refine")[0] == 2
+    assert say("infer", config, "--method", "refine")[0] == 2
 
 
 def test_missing_standard_errors_are_told(reach: SolvedReach) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from reach import said_to, write_reach
+from reach import Say, write_reach
 
 from vegglue.case.config import load_case
 from vegglue.errors import InputError
@@ -94,11 +94,11 @@ def test_a_file_without_the_column_of_its_kind_is_refused(kind: str, column: str
 
 
 def test_a_misspelt_kind_is_refused_with_the_config_and_the_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say
 ) -> None:
     config = write_reach(tmp_path, ("kind: velocity", "kind: velocty"))
     monkeypatch.chdir(tmp_path)
-    code, said = said_to(monkeypatch, capsys, "check", config.name)
+    code, said = say("check", config.name)
     assert code == 2
     assert all(word in said for word in ("brook.yaml", "velocities.csv", "`kind`", "`velocity`"))
 

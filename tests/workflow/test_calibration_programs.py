@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from reach import COARSE, here, said_to, write_reach
+from reach import COARSE, Say, here, write_reach
 
 import vegglue
 from vegglue.case.config import load_case
@@ -211,8 +211,6 @@ def test_without_members_only_a_control_file_is_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "words", [("export", "--only", "csv", "--to", "pest"), ("simulate", "--members", 8, "--parameters", "given.csv")]
 )
-def test_options_that_exclude_each_other_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: tuple[object, ...]
-) -> None:
+def test_options_that_exclude_each_other_are_refused(tmp_path: Path, say: Say, words: tuple[object, ...]) -> None:
     verb, *options = words
-    assert said_to(monkeypatch, capsys, verb, write_reach(tmp_path), *options)[0] == 2
+    assert say(verb, write_reach(tmp_path), *options)[0] == 2

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from reach import COARSE, said_to, write_reach
+from reach import COARSE, Say, write_reach
 from systems import POSIX_ALONE
 
 from vegglue.case.config import load_case
@@ -231,10 +231,8 @@ def test_a_posterior_of_another_state_is_told(tmp_path: Path) -> None:
     assert found.parameters.startswith("the middle of the priors, as the posterior that is kept is of another state")
 
 
-def test_an_unknown_form_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, error = said_to(monkeypatch, capsys, "export", write_reach(tmp_path), "--only", "shape")
+def test_an_unknown_form_is_refused(tmp_path: Path, say: Say) -> None:
+    code, error = say("export", write_reach(tmp_path), "--only", "shape")
     assert code == 2
     assert "shape" in error
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from diagnoses import a_candidate_effect, a_diagnosis, a_patch, an_instrument, candidate_laws_of
 from linear_baseline import stations_of
-from reach import said_to
+from reach import Say
 from surveyed_twin import surveyed_twin
 
 from vegglue.calibration.candidates import candidates_in_case, candidates_of, with_effect
@@ -265,12 +265,11 @@ def test_what_is_not_kept_and_what_is_unclear_are_reported() -> None:
 )
 def test_what_cannot_be_added_is_refused(
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    say: Say,
     arguments: tuple[str, ...],
     said: str,
 ) -> None:
-    code, error = said_to(monkeypatch, capsys, "extend", ROOT / "configs" / "twin.yaml", *arguments, "--runs", tmp_path)
+    code, error = say("extend", ROOT / "configs" / "twin.yaml", *arguments, "--runs", tmp_path)
     assert code == 2
     assert said in error
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reach import said_to
+from reach import Say
 
 import vegglue
 from vegglue.case.gridded_site import build_site
@@ -57,13 +57,12 @@ def test_a_folder_that_is_there_is_left_alone(tmp_path: Path) -> None:
 )
 def test_senseless_numbers_are_refused(
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    say: Say,
     option: str,
     value: str,
     said: str,
 ) -> None:
-    code, error = said_to(monkeypatch, capsys, "new", "brook", "--folder", tmp_path, option, value)
+    code, error = say("new", "brook", "--folder", tmp_path, option, value)
     assert code == 2
     assert said in error
     assert not (tmp_path / "brook").exists()

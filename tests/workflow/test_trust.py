@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from house import FILES
-from reach import COARSE, said_to, write_reach
+from reach import COARSE, Say, write_reach
 from systems import POSIX_ALONE
 
 import vegglue
@@ -38,12 +38,10 @@ def strangers(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytes
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[0])
-def test_no_command_runs_code_that_a_config_names(
-    strangers: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: tuple[str, ...]
-) -> None:
+def test_no_command_runs_code_that_a_config_names(strangers: Path, say: Say, command: tuple[str, ...]) -> None:
     name, *options = command
     arguments = [*options, strangers] if options == ["--config"] else [strangers, *options]
-    code, said = said_to(monkeypatch, capsys, name, *arguments)
+    code, said = say(name, *arguments)
     assert code == 2
     assert re.search("which runs as code: read it.* and add --trust if you trust", said)
     assert not Path("ran").exists()

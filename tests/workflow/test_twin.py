@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnoses import a_candidate_effect, a_diagnosis, an_anomaly, candidate_laws_of
-from reach import said_to
+from reach import Say
 
 from vegglue.calibration.candidates import cause_of, with_effect
 from vegglue.calibration.noise import noise_of, with_grid_error
@@ -252,13 +252,15 @@ def test_a_bad_probe_is_named_by_its_row_in_the_twin(tmp_path: Path) -> None:
     assert probe.station != 40
 
 
-def test_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Say, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
-    assert said_to(monkeypatch, capsys, "twin", CONFIG, "--hide", "gauge_datum=0.1", "--seed", 2, "--to", "play") == (
+    assert say("twin", CONFIG, "--hide", "gauge_datum=0.1", "--seed", 2, "--to", "play") == (
         0,
         "",
     )
-    assert said_to(monkeypatch, capsys, "twin", CONFIG, "--hide", "meander", "--to", "other")[0] == 2
+    assert say("twin", CONFIG, "--hide", "meander", "--to", "other")[0] == 2
     monkeypatch.setattr("sys.argv", ["vegglue", "reveal", "play"])
     case = load_case(tmp_path / "play" / "play.yaml")
     steps = (Step("gauge_datum", ("gauge_datum",), (1.0,), (("gauge_datum",),), 900.0, 90.0, 0.0),)
