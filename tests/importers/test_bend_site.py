@@ -16,6 +16,8 @@ from vegglue.case.schema import Case
 from vegglue.case.site_schema import CentrelineShape, Frame
 from vegglue.errors import InputError
 from vegglue.importers.measured_rows import Placement
+from vegglue.importers.site_file import FileOfSite
+from vegglue.importers.vector_files import drawn_centreline
 from vegglue.measurements.observations import read_observations
 
 FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0, crs="EPSG:2056")
@@ -75,9 +77,18 @@ def test_a_survey_on_the_map_comes_back_along_and_across(tmp_path: Path, flow: p
         assert np.allclose(part["value"], cells[column], atol=2e-6), "to the six digits of a station"
     assert part["used"].all()
     assert case.imported is not None
-    assert "33.53 m, 81 degrees to the left, radius 12 m" in case.imported[0].taken
+    assert {"33.53", "81", "12", "left"} <= set(case.imported[0].taken.partition(":")[0].split())
     assert "centreline" in case.imported[1].taken
     assert case.imported[0].name == ("site.yaml" if ending == "list" else f"axis.{ending}")
+
+
+def test_a_line_that_is_straight_to_its_digits_has_no_radius(tmp_path: Path) -> None:
+    """It was one of 1.6e12 m."""
+    points = "\n".join(f"{683120 + 8.75 * i:.3f},{247480 + 3.775 * i:.3f}" for i in range(5))
+    (tmp_path / "axis.csv").write_text(f"x,y\n{points}\n", encoding="utf-8")
+    drawn = drawn_centreline(tmp_path, FileOfSite(file="axis.csv"), None)
+    assert "radius" not in drawn.taken
+    assert drawn.line.s[-1] == pytest.approx(38.12, abs=0.01)
 
 
 def test_places_given_along_the_channel_stay_there(tmp_path: Path) -> None:

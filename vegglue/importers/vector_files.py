@@ -37,6 +37,8 @@ TABLES = (".csv", ".txt", ".tsv", ".dat", *WORKBOOKS)
 LARGEST_LONGITUDE, LARGEST_LATITUDE = 360.0, 90.0
 # Degrees on the map that a whole reach spans at most: what is so small, in a file of a map program, lies in degrees.
 SPAN_OF_DEGREES = 0.5
+# A centreline whose directions all lie within this angle is straight [degrees]: chosen.
+STRAIGHT = 0.5
 # Headings of a density, as words: `stems`, `Stems/m2`, `stem density per ft2`; plain ones are of 1/m2.
 DENSITY = re.compile(
     r"(?:(?:stem|plant)s?(?: density)?|density|shoots|stengels?|stengeldichtheid|halme|halmdichte|stangel|stangeldichte"
@@ -471,7 +473,8 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
     kept = {key: as_lists(value) for key, value in shape.model_dump(exclude_defaults=True, exclude_none=True).items()}
     turn = float(np.degrees(line.heading[-1] - line.heading[0]))
     sharpest = float(np.abs(np.gradient(line.heading, line.s)).max())
-    shown = CentrelineTaken(float(line.s[-1]), turn, 1.0 / sharpest if sharpest > 0.0 else None)
+    bends = np.degrees(np.ptp(line.heading)) >= STRAIGHT
+    shown = CentrelineTaken(float(line.s[-1]), turn, 1.0 / sharpest if bends else None)
     return DrawnCentreline(kept, line, columns, units, f"{sentence(shown)}: {how}")
 
 
