@@ -1,5 +1,6 @@
 """A folder of a field team becomes a case: files as people have them, what is held out, walls, what is left alone."""
 
+import json
 import re
 from math import cos, radians, sin
 from pathlib import Path
@@ -18,9 +19,11 @@ from vegglue.engine.interface import linearise
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
+from vegglue.importers.import_notes import UnreadFiles
 from vegglue.measurements.kinds import Unused
 from vegglue.measurements.observations import read_observations
-from vegglue.workflow.import_folder import assumptions_of
+from vegglue.wording.sentences import sentence
+from vegglue.workflow.import_folder import assumptions_of, import_folder, unread_files
 
 FRAME = Frame(origin=(683120.0, 247480.0), angle=32.0)
 FLUME = "channel: {length_m: 8, bottom_width_m: 0.8, bed_slope: 0.001}\n"
@@ -133,6 +136,21 @@ def test_levels_above_the_sea_need_that_of_the_floor(tmp_path: Path) -> None:
     assert raised.case.bed[0].trapezoid.level == pytest.approx(118.21156)
     assert raised.case.parameters["eddy_viscosity"].median == low.case.parameters["eddy_viscosity"].median
     assert raised.values("level") == pytest.approx([low.values("level")[0] + 118.21156], abs=1e-4)
+
+
+def test_files_that_are_not_read_are_listed(tmp_path: Path) -> None:
+    """A workbook of an old kind, or a .mat that no entry named, was left out without a word."""
+    folder = field_folder(tmp_path / "site", patches={"file": "reeds.geojson", "stems_per_m2": 20})
+    area = {"type": "Polygon", "coordinates": [[[16, 0], [20, 0], [20, 1], [16, 0]]]}
+    reeds = {"type": "Feature", "properties": {}, "geometry": area}
+    (folder / "reeds.geojson").write_text(json.dumps(reeds), encoding="utf-8")
+    for name in ("levels.prj", "reeds.qmd", "readme.txt", "~$a.xlsx"):
+        (folder / name).write_text("", encoding="utf-8")
+    case = import_folder(folder, tmp_path / "site.yaml")
+    assert unread_files(case, folder) == []
+    for name in ("gauging.xls", "transects.mat"):
+        (folder / name).write_bytes(b"")
+    assert unread_files(case, folder) == [sentence(UnreadFiles(("gauging.xls", "transects.mat")))]
 
 
 def test_the_grid_is_wide_enough_for_what_is_held_out(tmp_path: Path) -> None:

@@ -57,6 +57,7 @@ from vegglue.importers.import_notes import (
     SiteAssumptions,
     ThickStems,
     UnitsAssumed,
+    UnreadFiles,
     UnreadHoldout,
     UnreadKeys,
 )
@@ -423,6 +424,7 @@ IMPORTED = [
     ImportNote(Noted.UNNAMED_SECTIONS, 1),
     SiteAssumptions("site.yaml", 2.0, 0.8, True, False), SiteAssumptions("site.yaml", None, None, False, True),
     UnreadKeys("site.yaml", ("weather", "patches[0].diameter"), True), ThickStems(), CountedStems(),
+    UnreadFiles(("gauging.xls", "t.mat")), UnreadFiles(tuple(f"IMG_{n}.jpg" for n in range(9))),
     UnreadHoldout("holdout.csv", "site.yaml"), UnreadHoldout("holdout.xlsx", "site.yaml", "holdout.csv"),
     RepeatsAveraged(1, at=(2.0, 0.5), copied=True, needed=3),
     RepeatsAveraged(12, together=2.2, apart=4.1, worst=(2.0, 0.5)),

@@ -237,9 +237,16 @@ def import_command(
     target = shown_path(case.source)
     patches = [patch.name for patch in case.plants.patches]
     imported = [one.model_dump() for one in case.imported or ()]
-    from vegglue.workflow.import_folder import assumptions_of, errors_of_site, unnamed_banks, without_errors
+    from vegglue.workflow.import_folder import (
+        assumptions_of,
+        errors_of_site,
+        unnamed_banks,
+        unread_files,
+        without_errors,
+    )
 
-    assumed, unstated = [*assumptions_of(folder), *errors_of_site(case), *unnamed_banks(case)], without_errors(case)
+    assumed = [*unread_files(case, folder), *assumptions_of(folder), *errors_of_site(case), *unnamed_banks(case)]
+    unstated = without_errors(case)
     for sentence in unstated:
         print(sentence, file=sys.stderr)
     if as_object:

@@ -216,3 +216,10 @@ class UnreadHoldout:
     file: str
     site: str
     beside: str = ""
+
+
+@dataclass(frozen=True)
+class UnreadFiles:
+    """Files of a folder that nothing was read of: their names."""
+
+    names: tuple[str, ...]

@@ -31,8 +31,10 @@ from vegglue.importers.confluence import (
 )
 from vegglue.importers.field_folder import case_from_folder, case_from_sheet, case_of_sheet
 from vegglue.importers.finished_results import holds_result
+from vegglue.importers.import_notes import UnreadFiles
+from vegglue.importers.measured_files import OF_PROGRAMS, OTHERS
 from vegglue.importers.result_site import SiteOfResult, site_of
-from vegglue.importers.site_file import assumptions_of_site, site_file
+from vegglue.importers.site_file import HELD_OUT, assumptions_of_site, site_file
 from vegglue.measurements.observations import read_observations
 from vegglue.wording.remedies import ANOTHER_FILE, ROOM_FOR_TEMPORARY
 from vegglue.wording.sentences import phrase, sentence, sentences
@@ -91,6 +93,18 @@ def assumptions_of(folder: Path | str) -> list[str]:
         found = site_of(folder)
         return list(sentences(assumptions_of_site(folder, found.site if isinstance(found, SiteOfResult) else found)))
     return [sentence(NOT_STATED)] if holds_confluence(folder) or mat_folder(folder) is not None else []
+
+
+def unread_files(case: Case, folder: Path | str) -> list[str]:
+    """Which files of a folder with a site file were not read; none that belongs to one by its name, as a .prj does."""
+    site = site_file(Path(folder))
+    if not site.is_file():
+        return []
+    named = [one.name for one in case.imported or ()] + [one.file.name for one in case.observations]
+    stems = [Path(name).stem for name in (*named, site.name, case.source.name)]
+    free = (one.name for one in site.parent.iterdir() if one.is_file() and one.name.lower() not in OTHERS)
+    names = tuple(sorted(name for name in free if not name.startswith((*stems, HELD_OUT, *OF_PROGRAMS))))
+    return [sentence(UnreadFiles(names))] if names else []
 
 
 def without_errors(case: Case) -> list[str]:
