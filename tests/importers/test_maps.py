@@ -461,6 +461,12 @@ def test_what_is_no_area_is_refused_among_polygons(tmp_path: Path, other: dict[s
     assert (refused.value.kind, refused.value.values["feature"]) == ("no_polygon", 2)
 
 
+def test_a_geometry_without_properties_is_a_patch(tmp_path: Path) -> None:
+    area = {"type": "Polygon", "coordinates": [[[16, 0], [20, 0], [20, 1], [16, 0]]]}
+    (tmp_path / "reeds.geojson").write_text(json.dumps(area), encoding="utf-8")
+    assert [len(one.corners) for one in planted_polygons(tmp_path / "reeds.geojson", None, {})] == [3]
+
+
 def test_a_polygon_of_two_corners_is_refused(tmp_path: Path) -> None:
     path = geojson(tmp_path, ({}, polygon(*PATCH)), ({}, polygon((16.0, 0.0), (20.0, 0.0))))
     with pytest.raises(InputError) as refused:

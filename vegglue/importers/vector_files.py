@@ -167,7 +167,7 @@ def _outlines_and_properties(
         return features, ()
     with geojson_features(path, "polygons", frame) as mapped:
         for number, feature in enumerate(mapped, 1):
-            own, geometry = dict(feature.get("properties") or {}), feature["geometry"]
+            own, geometry = dict(feature.get("properties") or {}), feature.get("geometry", feature)
             if geometry is None or geometry["type"] not in ("Polygon", "MultiPolygon"):
                 got = "" if geometry is None else str(geometry["type"])[:40]
                 raise InputError("no_polygon", file=path, feature=number, got=got)
