@@ -8,7 +8,7 @@ from zipfile import ZipFile
 import numpy as np
 import pandas as pd
 import pytest
-from field_folders import CHANNEL, folder_of, imported, refusal
+from field_folders import CHANNEL, JUNE, folder_of, imported, refusal
 from instrument_files import VECTRINO_HEADING, flowtracker, pd0, riversurveyor, vector, vectrino, winriver
 from matlab_files import profiler_mat, qrev_mat, riversurveyor_mat
 from result_files import GridFlow, write_flow_fm, write_velocimetry
@@ -430,6 +430,17 @@ def test_images_of_a_camera_become_means_of_what_they_saw(tmp_path: Path, classi
     last = int(np.argmin(np.hypot(taken.numbers["x"] - 1000.0, taken.numbers["y"] - 2000.0)))
     assert taken.numbers["x"][last] == pytest.approx(1000.0 + 0.1 * np.cos(turned))
     assert taken.notes == ("pyorc", ImportNote(Noted.IMAGES, 400, ("factor",)))
+
+
+def test_images_named_under_files_are_no_result_of_a_model(tmp_path: Path) -> None:
+    """At 0.85 of the surface, in the channel: its frame lies 30 degrees from the east, as the images do."""
+    frame = "frame: {origin: [998, 1999], angle: 30 degrees}\n"
+    folder = folder_of(tmp_path / "stream", f"{CHANNEL}{JUNE}{frame}files: {{piv.nc: {{factor: 0.85}}}}\n")
+    moving = 0.5 + 0.05 * np.random.default_rng(6).standard_normal((30, 4, 6))
+    write_velocimetry(folder / "piv.nc", moving, 0.0 * moving, np.radians(30.0))
+    found = imported(folder)
+    assert np.allclose(found.values(), 0.85 * 0.5, atol=0.03)
+    assert np.allclose(found.values("velocity_across"), 0.0, atol=0.03)
 
 
 def test_images_that_saw_nothing_and_other_netcdf_are_refused(tmp_path: Path) -> None:

@@ -195,6 +195,19 @@ def netcdf_variables(path: Path) -> Iterator[dict[str, NetcdfVariable]]:
         }
 
 
+def why_no_variables(path: str) -> str | None:
+    """Read all variables and drop them: None, as the next reader meets its errors, which harm nothing."""
+    try:
+        with netcdf_variables(Path(path)) as variables:
+            for one in variables.values():
+                one.numbers()
+    except MemoryError:
+        raise
+    except Exception:  # on damaged files libraries raise anything
+        return None
+    return None
+
+
 def last_time(variables: Mapping[str, NetcdfVariable]) -> str:
     """The last time with its unit; '' if there is none."""
     time = variables.get("time")

@@ -24,7 +24,7 @@ VELOCIMETRY_VARIABLES = ("v_x", "v_y", "xs", "ys", "x", "y")
 LEAST_SEEN = 0.33
 # Cells beside each other along each axis that share most of their images: windows of pyorc overlap by half.
 OVERLAPPING = 2
-_IN_ITS_PROCESS = f"{__name__}:why_no_fields"
+_IN_ITS_PROCESS = "vegglue.importers.model_result:why_no_variables"
 
 
 def read_velocimetry(path: Path, options: FileOptions) -> MeasuredRows:
@@ -54,7 +54,22 @@ def read_velocimetry(path: Path, options: FileOptions) -> MeasuredRows:
     why = why_unreadable(path.absolute(), size, changed, by=_IN_ITS_PROCESS)
     if why is not None:
         raise InputError("unreadable_as", file=path, kind="NetCDF", why=why)
-    along, across, east, north, x, y = _fields(path)
+    with read_by_library(path, "NetCDF"), netcdf_variables(path) as variables:
+        if not set(VELOCIMETRY_VARIABLES) <= variables.keys():
+            raise InputError(
+                f"{shown_path(path)}: expected velocities of images, as pyorc writes them, with "
+                f"{', '.join(VELOCIMETRY_VARIABLES)}, got a NetCDF with {', '.join(variables) or 'nothing in it'}; "
+                "export a table."
+            )
+        refuse_larger(path, 8 * math.prod(variables["v_x"].shape))
+        along, across, east, north, x, y = (variables[name].values() for name in VELOCIMETRY_VARIABLES)
+        if along.ndim == 2:  # means over time already
+            along, across = along[None], across[None]
+        shape = along.shape[1:]
+        if not (along.shape == across.shape == (len(along), y.size, x.size) and east.shape == north.shape == shape):
+            raise ValueError(f"v_x (time, y, x) has the shape {along.shape}, xs (y, x) {east.shape}")
+        if min(shape) < 2 or not all(np.isfinite(one).all() for one in (east, north, x, y)):
+            raise ValueError("places")
     times = len(along)
     # Directions of the axes of the images on the map.
     to_x = np.array([np.mean(np.diff(part, axis=1) / np.diff(x)) for part in (east, north)])
@@ -94,35 +109,3 @@ def means_of_blocks(fields: Array) -> Array:
     number = known.sum(axis=(2, 4))
     total = np.where(known, blocks, 0.0).sum(axis=(2, 4))
     return np.where(number > 0, total / np.maximum(number, 1), np.nan).reshape(len(fields), -1)
-
-
-def _fields(path: Path) -> tuple[Array, ...]:
-    """v_x, v_y (time, y, x), xs, ys (y, x), x and y of a file. InputError."""
-    with read_by_library(path, "NetCDF"), netcdf_variables(path) as variables:
-        if not set(VELOCIMETRY_VARIABLES) <= variables.keys():
-            raise InputError(
-                f"{shown_path(path)}: expected velocities of images, as pyorc writes them, with "
-                f"{', '.join(VELOCIMETRY_VARIABLES)}, got a NetCDF with {', '.join(variables) or 'nothing in it'}; "
-                "export a table."
-            )
-        refuse_larger(path, 8 * math.prod(variables["v_x"].shape))
-        along, across, east, north, x, y = (variables[name].values() for name in VELOCIMETRY_VARIABLES)
-        if along.ndim == 2:  # means over time already
-            along, across = along[None], across[None]
-        shape = along.shape[1:]
-        if not (along.shape == across.shape == (len(along), y.size, x.size) and east.shape == north.shape == shape):
-            raise ValueError(f"v_x (time, y, x) has the shape {along.shape}, xs (y, x) {east.shape}")
-        if min(shape) < 2 or not all(np.isfinite(one).all() for one in (east, north, x, y)):
-            raise ValueError("places")
-    return along, across, east, north, x, y
-
-
-def why_no_fields(path: str) -> str | None:
-    """Read the fields and drop them: None, as the next reader meets its errors, which harm nothing."""
-    try:
-        _fields(Path(path))
-    except MemoryError:
-        raise
-    except Exception:  # on damaged files libraries raise anything
-        return None
-    return None
