@@ -8,7 +8,7 @@ from vegglue.case.schema import Case, Planned
 from vegglue.case.text_files import write_text
 from vegglue.diagnosis.plan import plan_measurements
 from vegglue.errors import InputError
-from vegglue.parallel import at_most, one_thread
+from vegglue.parallel import at_most, import_beside, one_thread
 from vegglue.plain_json import plain
 from vegglue.progress import Watch, silent
 from vegglue.results.plan import FieldPlan, plan_json, refuse_filled_in, write_field_files
@@ -75,6 +75,7 @@ def plan(
         run = run.of(run.case.model_copy(update={"planned": planned}))
     folder = run.folder / FOLDER
     refuse_filled_in(folder)
+    import_beside("vegglue.pages.plan")
     with at_most(run.jobs):
         found = plan_measurements(run.model, about, size, between, run.watch)
     files = write_field_files(folder, run.case, found)
