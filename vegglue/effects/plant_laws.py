@@ -22,7 +22,7 @@ are fixed at plausible values, see there.
 
 import math
 
-from vegglue.compilation import compiled
+from vegglue.compilation import compiled, compiled_inside
 from vegglue.effects.physical_constants import GRAVITY, KARMAN
 
 PLANT_LAWS = ("baptist", "huthoff", "klopstra", "luhar-nepf", "stone-shen", "yang-choi")
@@ -35,7 +35,7 @@ STEM_SPACING, INTERFACE, SOLIDITY = 0.1, 0.1, 0.05
 DENSE = 5.0
 
 
-@compiled
+@compiled_inside
 def _klopstra(drag_area: float, top: float, depth: float) -> float:
     """U / (g S)^(1/2) [m^1/2] over plants of drag_area = C_D m D [1/m], so written that nothing overflows."""
     over, mixing, stem = depth - top, 0.0227 * top**0.7, math.sqrt(2.0 / drag_area)
@@ -55,7 +55,7 @@ def _klopstra(drag_area: float, top: float, depth: float) -> float:
     return (top * within + over * above) / depth
 
 
-@compiled
+@compiled_inside
 def _submerged(law: int, phi: float, top: float, depth: float) -> float:
     """C [m^1/2/s] of plants under water, without the bed."""
     share = top / depth
@@ -86,7 +86,7 @@ def baptist_chezy(phi: float, top: float, depth: float, bare: float) -> float:
     return 1.0 / math.sqrt(1.0 / bare**2 + phi / (2.0 * GRAVITY)) + above_canopy(top, depth)
 
 
-@compiled
+@compiled_inside
 def _chezy(law: int, phi: float, top: float, depth: float, bare: float) -> float:
     """C [m^1/2/s] of plants and bed; phi already of the part under water."""
     if law == BAPTIST:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.compilation import compiled
+from vegglue.compilation import compiled, compiled_inside
 from vegglue.effects.physical_constants import GRAVITY
 from vegglue.flow.wet_and_dry import afloat, depths
 
@@ -33,7 +33,7 @@ class Bend(NamedTuple):
     dy: float
 
 
-@compiled
+@compiled_inside
 def at_cell(bend: Bend | None, column: int, rows: float) -> float:
     """J [-] in a column of cells, so many rows north of the south edge; 1 on a straight grid."""
     if bend is None:
@@ -41,7 +41,7 @@ def at_cell(bend: Bend | None, column: int, rows: float) -> float:
     return 1.0 - bend.at_cells[column] * (bend.south + rows * bend.dy)
 
 
-@compiled
+@compiled_inside
 def at_face(bend: Bend | None, face: int, rows: float) -> float:
     """J [-] at the west-east faces, so many rows north of the south edge; 1 on a straight grid."""
     if bend is None:
@@ -49,7 +49,7 @@ def at_face(bend: Bend | None, face: int, rows: float) -> float:
     return 1.0 - bend.at_faces[face] * (bend.south + rows * bend.dy)
 
 
-@compiled
+@compiled_inside
 def columns_of(bend: Bend | None, first: int, stop: int) -> Bend | None:
     """The bend of the columns first .. stop - 1."""
     if bend is None:
@@ -61,7 +61,7 @@ def columns_of(bend: Bend | None, first: int, stop: int) -> Bend | None:
 THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
 
 
-@compiled
+@compiled_inside
 def upwind(flux: float, far_left: float, left: float, right: float, far_right: float) -> float:
     """Third-order upwind-biased value between `left` and `right` (kappa = 1/3; van Leer 1985)."""
     from_left = left + (right - left) * THIRD + (left - far_left) * SIXTH
@@ -69,33 +69,33 @@ def upwind(flux: float, far_left: float, left: float, right: float, far_right: f
     return from_left if flux > 0.0 else from_right
 
 
-@compiled
+@compiled_inside
 def upwind_downstream(flux: float, far_left: float, left: float, right: float) -> float:
     """The same where the flux runs downstream; first order against it, so that the Jacobian's blocks stay narrow."""
     return left + (right - left) * THIRD + (left - far_left) * SIXTH if flux > 0.0 else right
 
 
-@compiled
+@compiled_inside
 def flat(values):
     """Rows and members of (n, rows, m) as one axis."""
     n, rows, m = values.shape
     return values.reshape((n, rows * m))
 
 
-@compiled
+@compiled_inside
 def end_of_rows(bend, first, size, m):
     """Where in a column what lies along one row, and is as long, ends: at its end, where the grid is straight."""
     return size if bend is None else first + m
 
 
-@compiled
+@compiled_inside
 def straight_on(out, last, before_it):
     """Values (rows m,) one cell beyond the last: second order where a further neighbour is missing."""
     for t in range(out.size):
         out[t] = 2.0 * last[t] - before_it[t]
 
 
-@compiled
+@compiled_inside
 def beyond_outlet(out, last, before_it, carrier):
     """Values (rows m,) one cell beyond the outlet: straight on where water leaves; where it enters, as in the last.
 
@@ -105,14 +105,14 @@ def beyond_outlet(out, last, before_it, carrier):
         out[t] = 2.0 * last[t] - before_it[t] if carrier[t] > 0.0 else last[t]
 
 
-@compiled
+@compiled_inside
 def carrying(out, flux, depth, other_flux, other_depth):
     """Velocity [m/s] that carries momentum between two faces: their fluxes over their depths."""
     for t in range(out.size):
         out[t] = (flux[t] + other_flux[t]) / (depth[t] + other_depth[t])
 
 
-@compiled
+@compiled_inside
 def shear_at_corners(out, m, f, u, v, viscosity, corner, per_x, per_y, bend):
     """h nu (du/dy + dv/dx) [m3/s2] at the corners ((ny + 1) m,) of west-east faces f; none at walls and ends."""
     nx, n = viscosity.shape
@@ -132,7 +132,7 @@ def shear_at_corners(out, m, f, u, v, viscosity, corner, per_x, per_y, bend):
             found[t] = nu * depth[t] * turn
 
 
-@compiled
+@compiled_inside
 def strain_along(out, m, f, u, v, viscosity, cell, per_x, bend):
     """2 h nu du/dx [m3/s2] of the cells (ny m,) of column f; none beyond the outlet."""
     if f == cell.shape[0]:
@@ -150,7 +150,7 @@ def strain_along(out, m, f, u, v, viscosity, cell, per_x, bend):
                 out[t] -= 2.0 * nu[t] * h[t] * turned
 
 
-@compiled
+@compiled_inside
 def beside_x(out, bend, f, m, per_x):
     """1 / (J dx) [1/m] of west-east face f, and (J / that J)^2 at its south and its north end [-], into (3, ny m)."""
     for j in range(out.shape[1] // m):
@@ -160,7 +160,7 @@ def beside_x(out, bend, f, m, per_x):
             out[0, t], out[1, t], out[2, t] = per_x / stretch, lift_s * lift_s, lift_n * lift_n
 
 
-@compiled
+@compiled_inside
 def beside_y(out, bend, i, m, per_x):
     """The fluxes of `south_of` for the rows 1 .. ny - 1 of column i, into (3, (ny - 1) m)."""
     for j in range(out.shape[1] // m):
@@ -169,14 +169,14 @@ def beside_y(out, bend, i, m, per_x):
             out[0, t], out[1, t], out[2, t] = per_length, lift_s, lift_n
 
 
-@compiled
+@compiled_inside
 def south_of(bend, i, j, per_x):
     """1 / (J dx) [1/m] of the south face of a cell, and J / that J in the cells south and north of it [-]."""
     stretch = at_cell(bend, i, j)
     return per_x / stretch, at_cell(bend, i, j - 0.5) / stretch, at_cell(bend, i, j + 0.5) / stretch
 
 
-@compiled
+@compiled_inside
 def with_rows_beyond(out, row, m):
     """Values (rows m,) with the first and the last row twice more at their ends, into out ((rows + 4) m,)."""
     n = row.size
@@ -186,13 +186,13 @@ def with_rows_beyond(out, row, m):
         out[t], out[n + 2 * m + t] = row[t % m], row[n - m + t % m]
 
 
-@compiled
+@compiled_inside
 def rows_around(wide, m):
     """Of such a column what stands two rows and one south of each row, there, and one and two rows north."""
     return wide[: -4 * m], wide[m : -3 * m], wide[2 * m : -2 * m], wide[3 * m : -m], wide[4 * m :]
 
 
-@compiled
+@compiled_inside
 def level_drop(out, f, level, outlet_level):
     """Rise of the level [m] over the east face f of cells (ny m,), from the last ones twice that to the outlet."""
     m = outlet_level.size
@@ -212,7 +212,7 @@ REST_SPEED = 1e-3
 STRIP, HALO = 40, 3
 
 
-@compiled
+@compiled_inside
 def _neighbours_of_u(far, near, east, f, u, carrier, flux, face, cell):
     """u [m/s] two faces and one west of face f and one east of it, (ny m,) each; where a side is nearer, into what is
     given.
@@ -234,7 +234,7 @@ def _neighbours_of_u(far, near, east, f, u, carrier, flux, face, cell):
     return u[f - 2] if f > 2 else far, west, u[f + 1] if f < nx else east
 
 
-@compiled
+@compiled_inside
 def _neighbours_of_v(far, near, east, m, i, v, carrier):
     """v [m/s] two columns and one west of column i and one east of it, ((ny + 1) m,) each; where a side is nearer, into
     what is given.
@@ -252,7 +252,7 @@ def _neighbours_of_v(far, near, east, m, i, v, carrier):
     return v[i - 2] if i > 1 else far, v[i - 1] if i > 0 else near, v[i + 1] if i < last else east
 
 
-@compiled
+@compiled_inside
 def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy, bend):
     """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes."""
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
@@ -295,7 +295,7 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
                         out[offset + a - first, 2, t] = u[f, t]
 
 
-@compiled
+@compiled_inside
 def _u_of_column(out, of_u, carriers, of_v, stresses, column, lengths, bend, f, dx):
     """`momentum_x` of one column; all are (ny m,) but per_y and half_per_film."""
     u_ss, u_s1, u_here, u_n1, u_nn, u_ww, u_w1, u_e1 = of_u
@@ -325,7 +325,7 @@ def _u_of_column(out, of_u, carriers, of_v, stresses, column, lengths, bend, f, 
         out[t] = moved + GRAVITY * drop[t] * per_length[t] + pulled
 
 
-@compiled
+@compiled_inside
 def momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, film, dx, dy, bend):
     """Rate R_v [m/s2] on the south faces of columns first .. stop - 1, into out[offset ..]; rows 1 .. ny - 1 only."""
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
@@ -363,7 +363,7 @@ def momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, f
         )
 
 
-@compiled
+@compiled_inside
 def _v_of_column(out, of_v, carriers, of_u, stresses, column, levels, lengths, bend, i, dx):
     """`momentum_y` of one column; all are ((ny - 1) m,) but per_y and half_per_film."""
     v_ss, v_s1, v_here, v_n1, v_nn, v_ww, v_w1, v_e1 = of_v
@@ -447,7 +447,7 @@ def push(out, depth, x, y, xx, xy, yy, film, dx, dy, bend):
                     out[i, 1, j, k] -= pushed / pair * afloat(0.5 * pair, half_per_film)
 
 
-@compiled
+@compiled_inside
 def _pushed_at_centres(depth, x, y, xx, xy, dx, dy, bend):
     """h f_x - d(h T_xy)/dy and h f_y - d(h T_xy)/dx at cell centres [m2/s2], (nx, ny, m) each."""
     nx, ny, m = depth.shape

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
-from vegglue.compilation import compiled
+from vegglue.compilation import compiled, compiled_inside
 from vegglue.effects.physical_constants import FILM_ON_LAND
 from vegglue.flow.closures import closures
 from vegglue.flow.equations import all_depths, cell_depths, residual_of, side_fluxes
@@ -35,7 +35,7 @@ from vegglue.flow.wet_and_dry import wet_depth
 THIN = 5.0
 
 
-@compiled
+@compiled_inside
 def _gap(own: float, other: float, rough: float, rate: float) -> float:
     """u - u* [m/s] of a row whose rate is `rate`, k |U| u in it; other: |U|^2 less u^2."""
     drive = math.sqrt(own * own + other) * own - rate / rough
@@ -43,7 +43,7 @@ def _gap(own: float, other: float, rough: float, rate: float) -> float:
     return own - math.copysign(root, drive)
 
 
-@compiled
+@compiled_inside
 def _beside(state, before, i, j, along):
     """The cell beyond the face of cell i, j (its east one, or its south one) and the four velocities across it."""
     nx, _, ny, _ = state.shape
@@ -99,7 +99,7 @@ def ease(out, state, depth, drag, west, slope, film, at_outlet):
                 out[i, 2, j, k] = rate + (1.0 - share * share) * (at_reference * gap - rate)
 
 
-@compiled
+@compiled_inside
 def _beyond(i, e, j):
     """The cell beyond the face of an unknown of cell i, j; for a level this cell itself."""
     if e == 0:
@@ -107,7 +107,7 @@ def _beyond(i, e, j):
     return (i + 1, j) if e == 2 else (i, j - 1)
 
 
-@compiled
+@compiled_inside
 def _above(state, bed, rise, i, j, a, b, k):
     """Level above the bed [m] at the face between the cells i, j and a, b, the mean of both."""
     above = 0.5 * (state[i, 0, j, k] - bed[i, j] + state[a, 0, b, k] - bed[a, b])
@@ -145,7 +145,7 @@ def thin_cells_and_faces(state, bed, rise, half_range, film, thick):
     return found
 
 
-@compiled
+@compiled_inside
 def _rho(h: float, reference: float, per_thin: float) -> float:
     """h / h_c of a thin face, one of a deep one."""
     share = min(min(h, reference) * per_thin, 1.0)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from vegglue.compilation import compiled
+from vegglue.compilation import compiled, compiled_inside
 from vegglue.effects.physical_constants import FILM_ON_LAND
 
 
-@compiled
+@compiled_inside
 def wet_depth(above: float, half_range: float, film: float) -> float:
     """h >= f/10 [m] of water standing `above` a bed that is even between -w and +w around its level, w = half_range.
 
@@ -20,7 +20,7 @@ def wet_depth(above: float, half_range: float, film: float) -> float:
     return dry + half_range * share * share + max(lifted - half_range, 0.0)
 
 
-@compiled
+@compiled_inside
 def _sheared(above: float, film: float) -> float:
     """max(a, 0) [m], rounded off within a film: the depth of the point itself, for land drags at no water beside it."""
     share = min(max(0.5 * above * (1.0 / film) + 0.5, 0.0), 1.0)
