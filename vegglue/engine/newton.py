@@ -409,7 +409,7 @@ def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Se
         together = int(np.clip(STATIONS_AND_CELLS / cells, 8, STATIONS_TOGETHER))
 
     def responses_of(some: pd.DataFrame) -> dict[Term, Single]:
-        sensitivity = adjoints(part, flow.state, flow.factors, reading_weights(problem, state, grid, some)[:, :, rows])
+        sensitivity = adjoints(part, flow.state, flow.factors, reading_weights(problem, state, grid, some, rows))
         of_discharges = [np.einsum("ikjn,ikj->n", sensitivity, discharge) for discharge in discharges]
         nx, _, ny, n = sensitivity.shape
         found = {term: np.zeros((n, nx, grid.y.size), np.float32) for term in terms}
