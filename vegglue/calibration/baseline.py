@@ -17,7 +17,7 @@ from scipy.special import ndtri
 
 from vegglue.arrays import Array
 from vegglue.calibration.fit import NEGLIGIBLE_DECREASE, MapEstimate, at_point, fit, log_evidence_under, objective
-from vegglue.calibration.model_error import any_error, model_error_columns
+from vegglue.calibration.model_error import CellResponses, any_error, model_error_columns
 from vegglue.calibration.noise import Noise, noise_of, with_grid_error, with_independent_grid_errors, with_model_error
 from vegglue.case.channel_geometry import cells_across
 from vegglue.case.parameter_space import refuse_without_parameters
@@ -227,11 +227,11 @@ def model_that_errs(base: Baseline) -> SearchModel:
     return search_model(base)
 
 
-def with_error_there(where: SearchModel) -> SearchModel:
-    """The model with its own error as computed at its point: what is known of parts of that error then is no more than
-    all of it. That of a baseline is of a point before its last fit.
+def with_error_there(where: SearchModel, cells: CellResponses | None = None) -> SearchModel:
+    """The model with its own error as computed at its point, see `model_error_columns`: what is known of parts of that
+    error then is no more than all of it. That of a baseline is of a point before its last fit.
     """
-    columns = model_error_columns(where.model, where.point, where.model.case.model_error)
+    columns = model_error_columns(where.model, where.point, where.model.case.model_error, cells)
     return replace(where, noise=with_model_error(where.noise, columns))
 
 

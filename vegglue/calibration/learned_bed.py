@@ -21,7 +21,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, model_that_errs, with_error_there
-from vegglue.calibration.model_error import cell_responses
+from vegglue.calibration.model_error import cell_responses, terms_that_err
 from vegglue.calibration.score_test import project
 from vegglue.case.bed_error import SurveyedLine, bed_error_columns, surveyed_lines
 from vegglue.case.grid import Grid
@@ -93,11 +93,12 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
     """
     where = model_that_errs(base)
     model, grid = where.model, where.model.site.grid
-    columns = bed_error_columns(model.case, grid)
-    if not columns.any():
+    if not bed_error_columns(model.case, grid).any():
         return None
-    where = with_error_there(where)
-    answers = cell_responses(model, where.point, ("bed",)).of["bed"].reshape(len(model.station), -1) @ columns
+    cells = cell_responses(model, where.point, terms_that_err(model.case, model.case.model_error))
+    where, columns = with_error_there(where, cells), bed_error_columns(model.case, grid)
+    answers = cells.of["bed"].reshape(len(model.station), -1) @ columns
+    del cells  # several times what is kept of them
     answers[model.station["experiment"].isin(model.site.own)] = 0.0
     residual = where.noise.whiten(where.noise.residual(where.point.prediction))
     slope, white = (where.noise.whiten(where.noise.used(part)) for part in (where.point.slope, answers))
