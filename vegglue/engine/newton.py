@@ -75,8 +75,8 @@ CELL_STRIDE = 5
 # Stations whose adjoints are made together [-]. On 342 x 40 cells 1,000 stations take 1.6 s of a core with 128, 1.7 s
 # with 64 or 32, and 2.6 s all at once, when each holds some 50 bytes in every cell.
 STATIONS_TOGETHER = 128
-# Stations times cells on a wide grid whose adjoints are made together [-]: they then take 0.1 GB for each core.
-STATIONS_AND_CELLS = 2e6
+# Stations times cells on a wide grid whose adjoints are made together [-]: they then take 0.05 GB for each core.
+STATIONS_AND_CELLS = 1e6
 # Largest correction [m, m/s] of flows on coarser cells, which are off by more than that: chosen.
 ROUGH = 1e-3
 # Small changes for differences, in the unit of each term: thousandths of what is common, and large against rounding.

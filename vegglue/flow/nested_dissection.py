@@ -353,13 +353,17 @@ class SparseFactors:
         (nx, ny), rows = self.values.shape[:2], right.reshape(-1, right.shape[2])
         at, place = _rows_in_order(nx, ny), dissection(nx, ny).place
         found = rows[at]
+        rows[:] = found
         self._by_parts(memory, found, transposed)
+        left = np.arange(found.shape[1])  # each column ends by itself, whatever is solved beside it
         for _ in range(MOST_ADJOINT_ROUNDS if transposed else 0):
-            step = rows[at]
-            times(step, self.values, self.far, found, place, transposed)
+            some, step = found.take(left, axis=1), rows.take(left, axis=1)
+            times(step, self.values, self.far, some, place, transposed)
             self._by_parts(memory, step, transposed)
-            found += step
-            if (_largest(step) <= ADJOINT_TOLERANCE * _largest(found)).all():
+            some += step
+            found[:, left] = some
+            left = left[_largest(step) > ADJOINT_TOLERANCE * _largest(some)]
+            if not left.size:
                 break
         rows[at] = found
 
