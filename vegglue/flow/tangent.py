@@ -20,8 +20,8 @@ from vegglue.flow.problem import LEVEL, Problem, take
 DIRECTION_STEP = 1e-5
 # Rounds of residuals at most [-]: chosen, not measured; where factors are those of the state itself a few are enough.
 MOST_ROUNDS = 12
-# Causes answered together [-]: what has been tried for each is kept, so that more need more memory.
-CAUSE_SLOTS = 16
+# Causes answered together [-], and on wide grids: what has been tried for each is kept, so that more need more memory.
+CAUSE_SLOTS, WIDE_CAUSE_SLOTS = 16, 8
 # Sparse factors are those of a matrix near J: what the last correction leaves is up to 0.3 of it [-], of others a
 # hundredth, so that corrections go on to a smaller one.
 FURTHER_IF_SPARSE = 0.1
@@ -52,11 +52,11 @@ def tangents(problem: Problem, state: Array, shared: Factors, causes: Array, tol
     ----------
     Eisenstat, Elman and Schultz (1983), doi:10.1137/0720023.
     """
-    found = np.empty_like(causes)
+    found, slots = np.empty_like(causes), CAUSE_SLOTS
     if isinstance(shared.inverse, SharedFactors):
-        tolerance *= FURTHER_IF_SPARSE
-    for first in range(0, causes.shape[3], CAUSE_SLOTS):
-        some = slice(first, first + CAUSE_SLOTS)
+        tolerance, slots = tolerance * FURTHER_IF_SPARSE, WIDE_CAUSE_SLOTS
+    for first in range(0, causes.shape[3], slots):
+        some = slice(first, first + slots)
         left = -np.ascontiguousarray(causes[..., some])
         answer, tried = np.zeros_like(left), list[tuple[Array, Array]]()
         for _ in range(MOST_ROUNDS):
