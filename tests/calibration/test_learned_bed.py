@@ -129,7 +129,7 @@ def test_a_spot_is_off_by_the_mean_over_it_with_its_error_and_evidence(surveyed:
     there, elsewhere = (bed_of_spots(found, *places[:, j : j + 1]) for j in range(2))
     assert there.before[0] == pytest.approx(np.linalg.norm(at_spot), rel=1e-6)
     assert there.mean[0] == pytest.approx(float(weight @ found.correction.ravel()), rel=1e-6)
-    own = np.linalg.norm(weight @ found.columns)
+    own = np.linalg.norm(weight @ found.before @ found.left)
     assert there.error[0] == pytest.approx(np.hypot(own, 0.15 * there.mean[0]), rel=1e-6)
     ratio = there.mean[0] / there.error[0]
     assert there.log_factor[0] == pytest.approx(0.5 * ratio**2 - np.log(there.before[0] / there.error[0]))
@@ -142,8 +142,8 @@ def test_spots_some_at_a_time_are_those_of_all_at_once(monkeypatch: pytest.Monke
     learned = LearnedBed(
         grid,
         correction=random.standard_normal((grid.x.size, grid.y.size)),
-        columns=random.standard_normal((grid.x.size * grid.y.size, 7)),
         before=random.standard_normal((grid.x.size * grid.y.size, 7)),
+        left=random.standard_normal((7, 7)),
     )
     x, y = random.uniform(grid.x[0], grid.x[-1], 23), random.uniform(grid.y[0], grid.y[-1], 23)
     whole = bed_of_spots(learned, x, y, 3.0 + 0.0 * x, 1.0 + 0.0 * y)

@@ -29,25 +29,27 @@ from vegglue.decision_constants import constants
 
 # Below it a standard error counts as this [m]: far less than any bed is known to.
 LEAST_KNOWN = 1e-9
-# Spots times cells whose weights are computed at a time.
-MOST_WEIGHTS = 10_000_000
+# Spots times cells whose weights are computed at a time, and cells whose errors are: some 20 MB.
+MOST_WEIGHTS, CELLS_AT_A_TIME = 2_000_000, 10_000
 
 
 @dataclass(frozen=True)
 class LearnedBed:
-    """Most likely correction dz (nx, ny) [m] of the bed on a grid, and columns (nx ny, k) [m] of its covariance, and of
-    that before the flow was measured.
+    """Most likely correction dz (nx, ny) [m] of the bed on a grid, columns B (nx ny, k) [m] of its covariance before
+    the flow was measured, and W (k, k) [-], so that those after are B W.
     """
 
     grid: Grid
     correction: Array
-    columns: Array
     before: Array
+    left: Array
 
     @property
     def error(self) -> Array:
         """Standard error of the corrected bed (nx, ny) [m]."""
-        return np.asarray(np.linalg.norm(self.columns, axis=1).reshape(self.correction.shape))
+        parts = np.array_split(self.before, len(self.before) // CELLS_AT_A_TIME + 1)
+        found = [np.linalg.norm(part @ self.left, axis=1) for part in parts]
+        return np.concatenate(found).reshape(self.correction.shape)
 
 
 @dataclass(frozen=True)
@@ -75,13 +77,13 @@ def bed_of_spots(learned: LearnedBed, x: Array, y: Array, length: Array, width: 
         np.exp(-(((cells[None] - middles[:, None]) / radius[:, None]) ** 2))
         for cells, middles, radius in ((grid.x, x, length), (grid.y, y, width))
     )
-    mean, columns, before = np.empty(x.size), *np.empty((2, x.size, learned.columns.shape[1]))
+    mean, before = np.empty(x.size), np.empty((x.size, learned.before.shape[1]))
     for some in np.array_split(np.arange(x.size), x.size * learned.correction.size // MOST_WEIGHTS + 1):
         weight = (along[some, :, None] * across[some, None, :]).reshape(some.size, -1)
         weight /= weight.sum(axis=1, keepdims=True)
         mean[some] = weight @ learned.correction.ravel()
-        weight = weight.astype(learned.columns.dtype, copy=False)
-        columns[some], before[some] = weight @ learned.columns, weight @ learned.before
+        before[some] = weight.astype(learned.before.dtype, copy=False) @ learned.before
+    columns = before @ learned.left
     error = np.hypot(np.linalg.norm(columns, axis=1), constants().fingerprint_error * mean)
     return BedOfSpots(mean, error, np.linalg.norm(before, axis=1), columns)
 
@@ -105,8 +107,8 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
     amounts = white.T @ residual
     seen = project(slope, residual, where.point.z, white).fingerprints  # seen' seen = F' (C + J J')^-1 F
     values, vectors = np.linalg.eigh(np.eye(columns.shape[1]) - seen.T @ seen)
-    left = columns @ (vectors * np.sqrt(np.maximum(values, 0.0))).astype(columns.dtype)
-    return LearnedBed(grid, np.einsum("ck,k->c", columns, amounts).reshape(grid.x.size, grid.y.size), left, columns)
+    left = (vectors * np.sqrt(np.maximum(values, 0.0))).astype(columns.dtype)
+    return LearnedBed(grid, np.einsum("ck,k->c", columns, amounts).reshape(grid.x.size, grid.y.size), columns, left)
 
 
 def line_offset(loose: Baseline, line: SurveyedLine, tight: Baseline) -> tuple[float, float]:
