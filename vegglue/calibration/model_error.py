@@ -322,10 +322,12 @@ def _sides(model: Model, cells: CellResponses) -> Array:
     """
     site, parts = model.site, [np.zeros((len(model.station), 0))]
     patch, rate = site.main_patch, dict[str, Array]()
+    friction, drag = (cells.of[term] for term in ("friction", "drag"))
     for experiment, rows in model.rows.items():
         # k (nx, ny) [1/m]: what answers to friction made larger by its own part is k times what answers to drag.
-        friction, drag = (cells.of[term][rows] for term in ("friction", "drag"))
-        both, square = (np.einsum("nij,nij->ij", one, drag, dtype=float) for one in (friction, drag))
+        both, square = (
+            sum((one[n] * drag[n].astype(float) for n in rows), np.zeros(patch.shape)) for one in (friction, drag)
+        )
         rate[experiment] = both / np.maximum(square, np.finfo(float).tiny)
     sides = [(axis, step) for axis in (0, 1) for step in (-1, 1)]
     for index, (axis, outwards) in ((int(index), side) for index in np.unique(patch[patch >= 0]) for side in sides):
@@ -337,8 +339,9 @@ def _sides(model: Model, cells: CellResponses) -> Array:
             if index in patches_present(model.case, experiment):
                 excess = within * (rate[experiment] - _next_cell(rate[experiment], axis, outwards)) / width
                 beside = ~inside * _next_cell(excess, axis, -outwards)
-                answers = cells.of["drag"][rows].reshape(rows.size, inside.size)
-                inwards, beyond = answers @ excess.ravel(), answers @ beside.ravel()
+                there = (excess != 0.0) | (beside != 0.0)
+                answers = drag[:, there][rows]
+                inwards, beyond = answers @ excess[there], answers @ beside[there]
                 found[rows] = np.stack([0.5 * (inwards + beyond), inwards], axis=1)
         parts.append(found)
     return np.hstack(parts) / np.sqrt(2.0)

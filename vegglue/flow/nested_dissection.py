@@ -355,9 +355,11 @@ class SparseFactors:
         found = rows[at]
         rows[:] = found
         self._by_parts(memory, found, transposed)
-        left = np.arange(found.shape[1])  # each column ends by itself, whatever is solved beside it
-        for _ in range(MOST_ADJOINT_ROUNDS if transposed else 0):
-            some, step = found.take(left, axis=1), rows.take(left, axis=1)
+        left, work = np.arange(found.shape[1]), np.empty((2, found.size), np.float32)
+        for _ in range(MOST_ADJOINT_ROUNDS if transposed else 0):  # each column ends by itself, whatever is beside it
+            some, step = work[:, : len(at) * left.size].reshape(2, len(at), left.size)
+            np.take(found, left, 1, some, "clip")
+            np.take(rows, left, 1, step, "clip")
             times(step, self.values, self.far, some, place, transposed)
             self._by_parts(memory, step, transposed)
             some += step
