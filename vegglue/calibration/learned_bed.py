@@ -107,7 +107,8 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
     amounts = white.T @ residual
     seen = project(slope, residual, where.point.z, white).fingerprints  # seen' seen = F' (C + J J')^-1 F
     values, vectors = np.linalg.eigh(np.eye(columns.shape[1]) - seen.T @ seen)
-    left = (vectors * np.sqrt(np.maximum(values, 0.0))).astype(columns.dtype)
+    # The symmetric root: that of the eigenvectors alone depends on their signs, and with it what is drawn by it.
+    left = ((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T).astype(columns.dtype)
     return LearnedBed(grid, np.einsum("ck,k->c", columns, amounts).reshape(grid.x.size, grid.y.size), columns, left)
 
 
