@@ -1,10 +1,12 @@
 """Results of costly functions, kept in memory by what their arguments hold."""
 
 import hashlib
-import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
 
 Arguments = ParamSpec("Arguments")
 Found = TypeVar("Found")
@@ -20,7 +22,7 @@ def memoised(most: int) -> Callable[[Callable[Arguments, Found]], Callable[Argum
 
         @wraps(compute)
         def found(*args: Arguments.args, **named: Arguments.kwargs) -> Found:
-            key = hashlib.sha256(pickle.dumps((args, named))).digest()
+            key = hashlib.sha256(b"\0".join(_bytes_of((args, sorted(named.items()))))).digest()
             if (result := known.get(key)) is None:
                 result = compute(*args, **named)
                 while len(known) >= most:
@@ -31,3 +33,19 @@ def memoised(most: int) -> Callable[[Callable[Arguments, Found]], Callable[Argum
         return found
 
     return of
+
+
+def _bytes_of(value: Any) -> Iterator[bytes]:
+    """What tells a value from others: the numbers of arrays, the parts of what has parts, else how it is shown."""
+    if isinstance(value, np.ndarray):
+        yield f"{value.dtype} {value.shape}".encode()
+        yield value.tobytes()
+    elif is_dataclass(value):
+        for field in fields(value):
+            yield from _bytes_of(getattr(value, field.name))
+    elif isinstance(value, tuple | list):
+        yield f"{len(value)}".encode()
+        for part in value:
+            yield from _bytes_of(part)
+    else:
+        yield repr(value).encode()

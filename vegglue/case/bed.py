@@ -240,9 +240,8 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
     else:
         return np.full((grid.x.size, grid.y.size), np.nan)
     if (survey := layer.survey) is not None and survey.relevelled:
-        x, y = spline_places(grid, survey.covariances)
-        change = _change_without_levels(surveyed(survey), survey.loose, survey.covariances, all_places(x, y))
-        level = level + to_cells(change[:, None], x, y, grid).reshape(level.shape)
+        change = _change_without_levels(surveyed(survey), survey.loose, survey.covariances, cell_places(grid))
+        level = level + change.reshape(level.shape)
     return level
 
 

@@ -277,9 +277,9 @@ def found_extent(
         candidate = replace(candidate, fitted=(("x", of_x), ("y", of_y), ("length", length), ("width", width)))
         gain = float(candidate.amplitude.gain(spot.amplitude))
         trials.append(RefitTrial(candidate, shapes, (start_with(candidate, spot.fitted.point.z[:-1], gain),)))
-    grid = search.model.site.grid
 
     def is_narrow(shapes: Mapping[str, float]) -> bool:
+        grid = search.model.site.grid
         return shapes["length"] < LEAST_EXTENT * grid.dx or shapes["width"] < LEAST_EXTENT * grid.dy
 
     if (found := _best_fitted(search, kind, trials, is_narrow)) is None:
