@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from coarse_twin import coarse_twin
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
+from scipy.special import ndtr
 
 from vegglue.arrays import Array
 from vegglue.calibration import baseline
-from vegglue.calibration.baseline import MOST_KEPT, Baseline, kept_baseline
+from vegglue.calibration.baseline import MOST_KEPT, PRIOR_POINTS, START_SPREAD, Baseline, kept_baseline, places_of_prior
 from vegglue.case.config import load_case
 from vegglue.engine.interface import Model, Point
 from vegglue.engine.model import model_of
@@ -119,3 +120,16 @@ def test_no_more_are_kept_than_a_case_and_its_child(model: Model, made: list[Mod
     for one in [*models, models[0]]:
         kept_baseline(one)
     assert len(made) == MOST_KEPT + 2
+
+
+@pytest.mark.parametrize("parameters", [1, 4, 9])
+def test_places_of_the_prior_begin_in_its_middle_and_fill_each_axis(parameters: int) -> None:
+    """With many parameters, too, they lie on both sides of the middle of each, in shares of their own."""
+    places = places_of_prior(parameters)
+    assert places.shape == (PRIOR_POINTS, parameters)
+    assert not places[0].any()
+    shares = np.sort(ndtr(places[1:] / START_SPREAD), axis=0)
+    assert np.diff(shares, axis=0).min() > 0.99 / PRIOR_POINTS
+    assert shares[0].max() < 0.2
+    assert shares[-1].min() > 0.8
+    assert np.unique(places, axis=0).shape == places.shape

@@ -156,17 +156,16 @@ def _best_from_prior(model: Model, noise: Noise) -> Point:
 
 
 def places_of_prior(parameters: int) -> Array:
-    """The middle of the prior, and points spread around it by the golden ratio's sequence, z (PRIOR_POINTS, p).
+    """The middle of the prior, and points of a Latin hypercube around it, z (PRIOR_POINTS, p): one in each of as many
+    equal shares of each parameter, in random order.
 
-        u_nj = frac(1/2 + n g^-j),   g^(p + 1) = g + 1
-
-    Source: Roberts (2018), The Unreasonable Effectiveness of Quasirandom Sequences; not checked against it.
+    Source: McKay, Beckman and Conover (1979), doi:10.2307/1268522; not checked against it.
     """
-    golden = 2.0
-    for _ in range(40):
-        golden = (1.0 + golden) ** (1.0 / (parameters + 1))
-    turns = np.outer(np.arange(PRIOR_POINTS), golden ** -np.arange(1.0, parameters + 1))
-    return np.asarray(START_SPREAD * ndtri((0.5 + turns) % 1.0))
+    shares = np.tile(np.arange(PRIOR_POINTS), (parameters, 1))
+    order = np.random.default_rng(1).permuted(shares, axis=1).T
+    places = START_SPREAD * ndtri((order + 0.5) / PRIOR_POINTS)
+    places[0] = 0.0
+    return np.asarray(places)
 
 
 def under_error_of_grid(trial: Baseline) -> Baseline:
