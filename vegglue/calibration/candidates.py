@@ -178,7 +178,7 @@ def missing_needs(case: Case, station: pd.DataFrame) -> set[Need]:
         "one surface": len({one.coefficient for one in case.friction.classes.values()}) == 1,
         "gauges": any(kind.instrument == "gauge" for kind in kinds),
         "two streams": site_scales(case).two_streams
-        or any(effect_of(case, name).name.startswith("inflow_") for name in case.effects),
+        or any("inflow" in effect_of(case, name).tags for name in case.effects),
         "few heights": not averaged
         or len(averaged) < sum(kind_of(one.kind).velocity for one in case.observations if one.kind != "adv")
         or min(heights) < ENOUGH_HEIGHTS,

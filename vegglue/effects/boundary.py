@@ -89,6 +89,7 @@ EFFECTS = (
         ),
         source="definition",
         checked=True,
+        tags=("inflow",),
         mirrored=False,
     ),
     Effect(
@@ -100,6 +101,7 @@ EFFECTS = (
         amplitude=Amplitude("excess", "-", "twice the relative excess in the middle", 0.4, -0.9, 0.9),
         source="definition",
         checked=True,
+        tags=("inflow",),
     ),
     Effect(
         name="inflow_peak",
@@ -114,6 +116,7 @@ EFFECTS = (
         ),
         source="definition",
         checked=True,
+        tags=("inflow",),
         mirrored=False,
     ),
     Effect(
@@ -140,6 +143,7 @@ EFFECTS = (
         ),
         source="definition",
         checked=True,
+        tags=("inflow",),
         mirrored=False,
     ),
     Effect(

@@ -205,7 +205,8 @@ class Effect:
     mirrored
         Whether a mirrored flow feels the mirrored effect; if not, `equation` contains what breaks the mirror.
     tags
-        "search": something at a place; "law": of the grammar; "negative control"; "common": an omission that is common.
+        "search": something at a place; "law": of the grammar; "negative control"; "common": an omission that is common;
+        "inflow": how the discharge is distributed where it enters.
     seen
         Where a discovered effect was found to hold; elsewhere it is an extrapolation, of which commands warn.
     needs
