@@ -1,9 +1,11 @@
 """Remarks on boundaries, outlet levels, Froude numbers, directions and discharges."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from open_cases import imported
 from reach import write_reach
@@ -11,6 +13,7 @@ from sound_case import ROWS, SOUND, found_in, odd, read_case
 
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
+from vegglue.case.site_schema import Inflow
 from vegglue.diagnosis.case_check import check_case, critical_remarks
 from vegglue.diagnosis.flow_check import (
     ComponentsExchanged,
@@ -30,6 +33,7 @@ from vegglue.diagnosis.flow_check import (
     floor_slope,
     remarks_on_directions,
     remarks_on_discharges,
+    remarks_on_measured_discharges,
     remarks_on_outlet_levels,
     remarks_on_steep_flow,
     remarks_on_turned_probes,
@@ -244,6 +248,33 @@ def other(folder: Path, text: str) -> list[object]:
     found = list(remarks_on_discharges(case, site, observations))
     assert found == [one for one in check_case(case, site, observations) if one in found]
     return found
+
+
+@pytest.mark.parametrize(
+    ("gauged", "changed", "off"),
+    [
+        (1.43, "", False), (0.6, "", True), (2.8, "", True), (0.6, "inflow between", False),
+        (14.0, "", False), (0.6, "levels of another datum", False),
+    ],
+)  # fmt: skip
+def test_a_gauging_that_the_sections_contradict(tmp_path, gauged, changed, off):
+    """All four sections of an experiment carry 1.4 m3/s; 14 is refused as a wrong unit, which is another remark."""
+    case = imported("open-b", tmp_path)
+    observations = read_observations(case)
+    row = observations.table[observations.table["experiment"] == "low"].iloc[[0]]
+    row = row.assign(kind="discharge", section="Q", value=gauged, standard_error=0.07, x=50.0)
+    table = pd.concat([observations.table, row], ignore_index=True)
+    if changed.startswith("levels"):
+        is_level = table["kind"] == "level"
+        table = table.assign(value=table["value"].where(~is_level, table["value"] + 410.0))
+    if changed.startswith("inflow"):
+        inflows = case.inflows | {"all along": Inflow(side="north", range=(0.0, 100.0))}
+        flow = case.experiments["low"]
+        more = flow.model_copy(update={"discharge": {**flow.discharge, "all along": 0.1}})
+        case = case.model_copy(update={"inflows": inflows, "experiments": {**case.experiments, "low": more}})
+    observations = replace(observations, table=table)
+    found = list(remarks_on_measured_discharges(case, build_site(case), observations))
+    assert [(one.experiment, one.x, one.value) for one in found] == [("low", 50.0, gauged)] * off
 
 
 def test_a_discharge_far_from_the_measured_one(tmp_path):

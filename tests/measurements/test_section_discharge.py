@@ -245,6 +245,15 @@ def test_what_was_not_measured_makes_it_less_certain(tmp_path: Path) -> None:
     assert np.ptp(narrow.interval95) > 3.0 * np.ptp(whole.interval95)
 
 
+def test_levels_above_another_datum_are_none_of_a_section(tmp_path: Path) -> None:
+    """At 410 m sections were said to carry 800 times the stated discharge, beside the remark on the datum."""
+    case, table = read(imported("open-b", tmp_path))
+    above_sea = table.assign(value=table["value"].where(table["kind"] != "level", table["value"] + 410.0))
+    found = carried(case, above_sea)
+    assert not any(one.gauged for one in found)
+    assert [one.value for one in found] == [one.value for one in carried(case, table[table["kind"] != "level"])]
+
+
 def test_without_a_gauge_the_water_may_be_higher(tmp_path: Path) -> None:
     case, table = read(imported("open-b", tmp_path))
     for one in carried(case, table[table["kind"] != "level"]):

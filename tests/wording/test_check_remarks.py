@@ -34,6 +34,7 @@ EXAMPLES = [
     values(Symptom.LEVEL_UNIT, "ft", 2.2, 1),
     ImplausibleOutlet("June", 95.0, 95.0, 9.0, 0.0024),
     DischargeMismatch((CARRIED, CARRIED)),
+    flow_check.DischargeUnlike("low", 50.0, 0.6, CARRIED),
     DeadProbe(25, 0.009, 0.48, 0.004, 0.068),
     UNSTATED,
     channel_check.ErrorsRefused(("infer", "diagnose", "run"), UNSTATED),

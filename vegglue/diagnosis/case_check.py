@@ -86,6 +86,7 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[objec
         *station_check.remarks_on_walls(case, observations),
         *station_check.remarks_on_errors_across_plants(case, observations),
         *flow_check.remarks_on_discharges(case, site, observations),
+        *flow_check.remarks_on_measured_discharges(case, site, observations),
     ]
 
 

@@ -12,16 +12,26 @@ import numpy as np
 import pandas as pd
 
 from vegglue.arrays import Array
-from vegglue.case.channel_geometry import chezy, expected_depth, half_width
+from vegglue.case.channel_geometry import chezy, discharges_upstream_of, expected_depth, half_width
 from vegglue.case.grid import curvature_of
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import middle_value, prior_range
 from vegglue.case.schema import Case, Experiment
 from vegglue.case.zones import centres_within, inflow_cells
 from vegglue.effects.physical_constants import GRAVITY
-from vegglue.measurements.kinds import STREAMWISE, TRANSVERSE, WATER_LEVEL, kind_of
+from vegglue.measurements.kinds import STREAMWISE, THROUGH_SECTION, TRANSVERSE, WATER_LEVEL, kind_of
 from vegglue.measurements.observations import Observations
-from vegglue.measurements.section_discharge import DischargeMismatch, discharge_mismatches, mismatched_discharges
+from vegglue.measurements.plausibility import implausible_values
+from vegglue.measurements.section_discharge import (
+    SURELY_OTHERWISE,
+    CarriedDischarge,
+    DischargeMismatch,
+    carried_discharges,
+    changing_discharge,
+    discharge_mismatches,
+    mismatched_discharges,
+)
+from vegglue.normal_range import NORMAL95
 
 # Width of the grid over the radius of its centreline [-] from which its ends should be straight: chosen, not measured.
 LEAST_TURN = 0.02
@@ -49,6 +59,16 @@ SURE_OF_A_PROBE = 6.0
 FEWEST_CROSSED, MOST_ON_ONE_SIDE = 3, 0.9
 # Fewest places of a section whose mean is that of the section.
 FEWEST_OF_A_MEAN = 3
+
+
+@dataclass(frozen=True)
+class DischargeUnlike:
+    """A measured discharge [m3/s] at x [m] that all sections contradict, and what the nearest of these carries."""
+
+    experiment: str
+    x: float
+    value: float
+    nearest: CarriedDischarge
 
 
 @dataclass(frozen=True)
@@ -236,6 +256,36 @@ def remarks_on_discharges(case: Case, site: Site, observations: Observations) ->
     """
     off, excused = mismatched_discharges(case, site, observations.table), misdirected(case, observations)
     yield from discharge_mismatches([one for one in off if one.experiment not in excused])
+
+
+def remarks_on_measured_discharges(case: Case, site: Site, observations: Observations) -> Iterator[DischargeUnlike]:
+    """|Q - Q_s| > SURELY_OTHERWISE (se^2 + se_s^2)^(1/2) of measured discharges Q and what all sections Q_s carry past
+    which the same water flows; none of an experiment whose velocities run the wrong way, or beside values that no flow
+    can have.
+    """
+    table, excused = observations.table, misdirected(case, observations)
+    rows = table[table["used"] & (table["kind"] == THROUGH_SECTION) & ~table["experiment"].isin(list(excused))]
+    if rows.empty or implausible_values(case, site, table):
+        return
+    carried = carried_discharges(case, site, table)
+    for row in rows.itertuples():
+        name, x, value = str(row.experiment), float(row.x), float(row.value)
+        stated = case.experiments[name]
+        own, error = discharges_upstream_of(case, stated, x), float(np.nan_to_num(row.standard_error))
+        alike = [
+            one
+            for one in carried
+            if one.experiment == name
+            and own is not None
+            and discharges_upstream_of(case, stated, one.x) == own
+            and not changing_discharge(case, name, max(x, one.x))
+        ]
+        off = [
+            (value - one.value) / math.hypot(error, 0.5 * (one.interval95[1] - one.interval95[0]) / NORMAL95)
+            for one in alike
+        ]
+        if off and (min(off) > SURELY_OTHERWISE or max(off) < -SURELY_OTHERWISE):
+            yield DischargeUnlike(name, x, value, min(alike, key=lambda one: abs(one.x - x)))
 
 
 def remarks_on_steep_flow(case: Case, site: Site) -> Iterator[Supercritical]:

@@ -88,8 +88,8 @@ class UnstatedErrors:
     usual: tuple[float, str]
 
 
-# Kinds that code refers to by name: velocities along x and along y, and levels.
-STREAMWISE, TRANSVERSE, WATER_LEVEL = "velocity", "velocity_across", "level"
+# Kinds that code refers to by name: velocities along x and along y, levels, and discharges through a section.
+STREAMWISE, TRANSVERSE, WATER_LEVEL, THROUGH_SECTION = "velocity", "velocity_across", "level", "discharge"
 # Usual errors: 0.015 m/s for the mean of a vertical of ADV points, in any direction; 3 mm for a gauge read by eye;
 # 0.1 m3/s, 5 % of 2 m3/s, for a gauging by verticals.
 KINDS = {
@@ -99,7 +99,7 @@ KINDS = {
         Kind(TRANSVERSE, "velocity across", "m/s", "v", "velocities_across.csv", "probe", True, 0.015),
         Kind("speed", "speed", "m/s", "speed", "speeds.csv", "probe", True, 0.015),
         Kind(WATER_LEVEL, "level", "m", "level", "levels.csv", "gauge", False, 0.003),
-        Kind("discharge", "discharge", "m3/s", "discharge", "discharges.csv", "section", False, 0.1),
+        Kind(THROUGH_SECTION, "discharge", "m3/s", "discharge", "discharges.csv", "section", False, 0.1),
     )
 }
 

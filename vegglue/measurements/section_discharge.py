@@ -21,7 +21,7 @@ from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds, middle_value, prior_range
 from vegglue.case.schema import Case
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
-from vegglue.measurements.plausibility import implausible_values, plausible_flow
+from vegglue.measurements.plausibility import implausible_levels, implausible_values, plausible_flow
 from vegglue.measurements.vertical_profile import Column, linear_weights
 from vegglue.normal_range import NORMAL95
 
@@ -321,11 +321,12 @@ def section_discharges(
 
 
 def carried_discharges(case: Case, site: Site, station: pd.DataFrame) -> list[CarriedDischarge]:
-    """Of each section across the channel with FEWEST_VERTICALS in the water, in the order of the table.
+    """Of each section across the channel with FEWEST_VERTICALS in the water, in the order of the table; without levels
+    that its experiment cannot have.
 
     station: as Observations.table [SI].
     """
-    used = station[station["used"]]
+    used = station[station["used"] & ~implausible_levels(case, site, station)]
     velocity = used[(used["kind"] == STREAMWISE) & (used["section"] != "")]
     found = []
     for (experiment, section), rows in velocity.groupby(["experiment", "section"], sort=False):
