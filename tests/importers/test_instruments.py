@@ -271,6 +271,52 @@ def test_records_of_one_vertical_keep_errors_of_their_own(tmp_path: Path) -> Non
     assert pd.read_csv(case.observations[0].file)["u_se"].tolist() == [0.01, 0.0, 0.04]
 
 
+def samples(mean: float, headings: str = "Time,Vx,Vy,Corr1,Corr2") -> str:
+    """A table of a probe at 25 Hz: of each fifty samples one has a low correlation, and one of 300 is a spike."""
+    rng = np.random.default_rng(round(100 * mean))
+    rows = [
+        f"{0.04 * n:.2f},{9.0 if n == 170 else mean + u:.4f},{0.02 + v:.4f},{20 if n % 50 == 0 else 95},96"
+        for n, (u, v) in enumerate(rng.normal(0.0, 0.03, (300, 2)))
+    ]
+    return "\n".join([headings, *rows])
+
+
+def test_tables_of_samples_stand_at_the_position_of_their_probe(tmp_path: Path) -> None:
+    files = [f"p{n}.csv: {{position: [12, 0.5, {z}]}}" for n, z in enumerate((0.2, 0.4, 0.6))]
+    folder = folder_of(tmp_path / "flume", f"{SITE}files: {{{', '.join(files)}}}\n")
+    for number, mean in enumerate((0.30, 0.36, 0.40)):
+        written(folder / f"p{number}.csv", samples(mean))
+    found = imported(folder)
+    points = pd.read_csv(found.case.observations[0].file)
+    assert points[["x", "y", "z"]].to_numpy().tolist() == [[12, 0.5, 0.2], [12, 0.5, 0.4], [12, 0.5, 0.6]]
+    assert points["u"].tolist() == pytest.approx([0.30, 0.36, 0.40], abs=0.005)
+    assert points["v"].tolist() == pytest.approx([0.02] * 3, abs=0.005)
+    assert points["u_se"].tolist() == pytest.approx([0.03 / np.sqrt(293)] * 3, rel=0.1)
+    assert "7 left out" in found.taken["p1.csv"]
+
+
+def test_a_table_of_samples_and_a_record_make_one_vertical(tmp_path: Path) -> None:
+    folder = flume(tmp_path, ["position: [12, 0.5, 0.1]"], [(0.3, 0.02)], more="")
+    site = folder / "site.yaml"
+    site.write_text(site.read_text(encoding="utf-8").replace("files: {", "files: {a.csv: {position: [12, 0.5, 0.4]}, "))
+    written(folder / "a.csv", samples(0.4))
+    points = pd.read_csv(imported(folder).case.observations[0].file)
+    assert dict(zip(points["z"], points["u"], strict=True)) == pytest.approx({0.1: 0.3, 0.4: 0.4}, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("table", "word"),
+    [
+        ("x,u\n1,0.4\n2,0.5\n", "places in x"),
+        ("z,Vx\n0.1,0.4\n", "places in z"),
+        ("time,level\n1,0.4\n", "no velocity"),
+    ],
+)
+def test_a_position_is_for_samples_of_one_point(tmp_path: Path, table: str, word: str) -> None:
+    folder = folder_of(tmp_path / "flume", f"{SITE}files: {{a.csv: {{position: [12, 0.5, 0.4]}}}}\n", a__csv=table)
+    assert word in refusal(folder)
+
+
 @pytest.mark.parametrize(
     ("axes", "directions", "velocity"),
     [("XYZ", "", (0.4, 0.05)), ("", "", (0.4, 0.05)), ("XYZ", ", directions: map", (0.05, -0.4)),

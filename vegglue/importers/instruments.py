@@ -10,12 +10,13 @@ from vegglue.errors import InputError, shown_path
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.gaugings import ZIP_BEGINS, is_gauging, read_flowtracker2, read_gauging
 from vegglue.importers.library_files import load_matlab, readable_text
-from vegglue.importers.measured_rows import MeasuredRows, read_placed_rows
+from vegglue.importers.measured_rows import MeasuredRows
 from vegglue.importers.nortek import (
     PROFILER_VARIABLES,
     VECTOR_BEGINS,
     is_nortek,
     read_nortek,
+    read_table,
     read_vector,
     rows_of_profiler,
 )
@@ -69,7 +70,7 @@ BY_BEGINNING: Mapping[bytes, FileReader] = {
 def reader_of(path: Path) -> FileReader:
     """The reader of a file, by how it begins. InputError for a record that none reads."""
     if path.suffix.lower() in WORKBOOKS:
-        return read_placed_rows
+        return read_table
     try:
         with path.open("rb") as file:
             begin = file.read(LONGEST_PREAMBLE)
@@ -90,4 +91,4 @@ def reader_of(path: Path) -> FileReader:
         return read_qrev_summary
     if is_gauging(text):
         return read_gauging
-    return read_nortek if is_nortek(path, text) else read_placed_rows
+    return read_nortek if is_nortek(path, text) else read_table

@@ -370,7 +370,8 @@ def joined_rows(parts: Sequence[MeasuredRows]) -> MeasuredRows:
     first = parts[0]
     shared = [role for role in first.numbers if all(role in one.numbers for one in parts)]
     numbers = {role: np.concatenate([one.numbers[role] for one in parts]) for role in shared}
-    texts = {role: [text for one in parts for text in one.texts[role]] for role in first.texts}
+    named = [role for role in first.texts if all(role in one.texts for one in parts)]
+    texts = {role: [text for one in parts for text in one.texts[role]] for role in named}
     unread = [name for name in first.others if all(name in one.others for one in parts)]
     others = {name: [text for one in parts for text in one.others[name]] for name in unread}
     return replace(first, numbers=numbers, texts=texts, others=others, lines=first.lines if len(parts) == 1 else ())

@@ -18,10 +18,12 @@ import numpy as np
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import words_of
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.library_files import numbers_of_variable, open_raw, readable_text, reading_structures
-from vegglue.importers.measured_rows import MeasuredRows
+from vegglue.importers.measured_rows import MeasuredRows, read_placed_rows
+from vegglue.importers.table_parser import numbers_of
 
 # How a binary record of a Vector begins: its hardware configuration, with its serial number.
 VECTOR_BEGINS = b"\xa5\x05\x18\x00VEC"
@@ -32,6 +34,7 @@ SPIKE = 6.0  # robust standard deviations beyond which a sample is a spike; of n
 OF_THE_MEDIAN = 1.4826
 # Least median deviation [m/s]: a record that is rounded may have none, and all else would be a spike.
 LEAST_DEVIATION = 1e-4
+OF_CORRELATION = re.compile(r"cor(r|relation)?( ?\d| beam| |$)")  # headings of samples, as words
 PROFILER_VARIABLES = ("Data", "Config")  # of a file of a Vectrino Profiler
 BEAMS = 2  # `coordSystem` of velocities along the beams; 1 for x, y and z
 SOUND_SHARE = 0.5  # of the samples of a cell: a mean of fewer is one of those that happen to be strong
@@ -180,10 +183,37 @@ def _record_mean(
     return MeasuredRows(numbers, texts, columns, dict.fromkeys("uvw", "m/s"), notes, of_probe=True)
 
 
+def read_table(path: Path, options: FileOptions) -> MeasuredRows:
+    """What a table of measurements holds; with a `position`, samples of a probe there without spikes and those of low
+    correlation. InputError also for a `position` of a table that has places of its own, or no velocities.
+    """
+    taken = read_placed_rows(path, replace(options, position=None))
+    if options.position is None:
+        return taken
+    places = [taken.columns[role] for role in ("x", "y", "z", "tape", "height", "below") if role in taken.columns]
+    moving = [role for role in ("u", "v", "w", "east_velocity", "north_velocity") if role in taken.numbers]
+    if places or not moving:
+        got = f"places in {' and '.join(places)}" if places else "no velocity"
+        raise InputError(
+            f"{shown_path(path)}: expected samples of one point for `position` in its entry of `files`, got a table "
+            f"with {got}; take `position` out."
+        )
+    velocity = np.column_stack([taken.numbers[role] for role in moving])
+    beams = [numbers_of(texts) for name, texts in taken.others.items() if OF_CORRELATION.match(words_of(name))]
+    correlation = np.array([one for one in beams if one is not None]).reshape(-1, taken.size).T
+    trusted = _trusted_samples(velocity, correlation)
+    if not trusted.any():
+        raise InputError(f"{shown_path(path)}: no sample has a correlation of {LEAST_CORRELATION:g} %; leave it out.")
+    kept = replace(taken.only(trusted), of_probe="u" in moving)
+    at = {axis: np.full(kept.size, one) for axis, one in zip("xyz", options.position, strict=True)}
+    lost = taken.size - kept.size
+    return kept.having(at, *([ImportNote(Noted.SAMPLES_LOST, lost)] if lost else []))
+
+
 def _trusted_samples(velocity: Array, correlation: Array) -> Mask:
     """Samples of sound correlation in all beams, and within SPIKE robust standard deviations in any direction (n,).
 
-    velocity: x, y, z (n, 3) [m/s]; correlation: of the beams (n, beams) [%].
+    velocity: components (n, 1 to 3) [m/s]; correlation: of the beams, if known (n, beams) [%].
     """
     known = np.asarray(np.isfinite(velocity).all(axis=1))
     sound = (correlation >= LEAST_CORRELATION) & (correlation <= 100.0)
