@@ -74,6 +74,16 @@ def test_shapes_calibrated_with_the_amplitude_are_parameters_of_a_case_and_numbe
     assert set(child_tree(CASE, tmp_path / "child.yaml", [(one, {"mode": 2.0})])["parameters"]) == added
 
 
+def test_discharges_may_be_off_together() -> None:
+    """One current meter, or one rating, gives them all: a reach with both 3 % high was told to be steeper."""
+    names = {one.name for one in candidates_of(CASE, STATION) if one.effect.name == "discharge_error"}
+    assert names == {"discharge_error", *(f"discharge_error[{name}]" for name in CASE.experiments)}
+    one = next(iter(CASE.experiments))
+    alone = CASE.model_copy(update={"experiments": {one: CASE.experiments[one]}})
+    names = {each.name for each in candidates_of(alone, STATION) if each.effect.name == "discharge_error"}
+    assert names == {f"discharge_error[{one}]"}
+
+
 def test_an_excluded_effect_is_no_candidate() -> None:
     both = {one.name for one in candidates_of(CASE, STATION)}
     without = CASE.model_copy(update={"exclude": {"wind": "indoors", "unlisted_bed": "a flume of glass"}})

@@ -73,6 +73,8 @@ def site_of_nature(perfect: Site, case: Case, seed: int, hide: Sequence[str] = (
     mean = float(np.average(stems, weights=truth.channel.density))
     sizes = {f"patch_density[{name}]": each / mean - 1.0 for name, each in zip(patches, stems, strict=True)}
     sizes |= {f"discharge_error[{name}]": each - 1.0 for name, each in zip(case.experiments, discharges, strict=True)}
+    off = discharges - 1.0
+    sizes["discharge_error"] = float(off[np.abs(off).argmin()]) if np.ptp(np.sign(off)) == 0.0 else 0.0  # in each
     named = {
         name: float(size)
         for name, size in sizes.items()

@@ -150,6 +150,8 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
             found += [patch_candidate(effect, index, case) for index in range(len(case.plants.patches))]
         else:
             found += [acting_in(effect, effect.each, (name,)) for name in possible[effect.each]]
+            if effect.each == "experiment" and len(possible["experiment"]) > 1:
+                found.append(Candidate(effect))
     return [one for one in found if not at_work(case, one)]
 
 
