@@ -5,9 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from linear_baseline import CASE_OF_TWINS as CASE
+from surveyed_twin import OF_BED, surveyed_twin
 
 from vegglue.arrays import Array
 from vegglue.case.bed import read_bed_survey
+from vegglue.case.channel_geometry import site_scales
 from vegglue.case.site_schema import CovarianceOfBed
 from vegglue.case.survey_error import (
     BedSurvey,
@@ -24,6 +27,8 @@ from vegglue.case.survey_error import (
     root_of_covariance,
     stands_out,
 )
+from vegglue.effects.library import library
+from vegglue.effects.scales import at_site, rounded
 from vegglue.errors import InputError
 
 SMOOTH = CovarianceOfBed(chance=1.0, rough=False, along=6.0, across=2.5, sd=0.1, point_error=0.01)
@@ -264,3 +269,13 @@ def test_surveys_without_a_wrong_line_name_none() -> None:
         left = lines_left_out(survey, covariances_beside_wrong_line(survey), np.full(len(survey.points), 0.1))
         found.append(stands_out(left))
     assert sum(found) <= 3  # of 16; 0.05 of each is expected, and more than three are one in 140
+
+
+def test_the_slope_of_a_surveyed_bed_is_known_to_an_error_of_a_point(tmp_path: Path) -> None:
+    """A slope that differs by a fifth of itself was as plausible as on a channel that is stated by its numbers."""
+    model, _ = surveyed_twin(tmp_path)
+    low, high = model.case.grid.x
+    assert site_scales(model.case).slope_error == pytest.approx(OF_BED.point_error / (high - low))
+    stated = site_scales(CASE)
+    assert stated.slope_error == pytest.approx(0.2 * stated.slope)
+    assert at_site(library()["bed_slope_error"], stated).amplitude.scale == rounded(0.2 * stated.slope)

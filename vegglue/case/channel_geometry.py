@@ -17,7 +17,7 @@ from vegglue.case.schema import Case, Experiment
 from vegglue.case.site_schema import FrictionClass
 from vegglue.case.zones import BANK_SLOPE, beyond_slope_break
 from vegglue.effects.physical_constants import GRAVITY
-from vegglue.effects.scales import SiteScales
+from vegglue.effects.scales import SLOPE_ERROR, SiteScales
 from vegglue.effects.surroundings import ChannelGeometry
 
 # Least distance of the centre of a cell from the front or side of a patch, over the size of the cell [-]: the mean over
@@ -254,6 +254,8 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
     has_floor = (~banks).any(axis=1)
     fall = -float(np.polyfit(site.grid.x[has_floor], level[has_floor], 1)[0]) if has_floor.sum() > 1 else 0.0
     slope = fall if slopes[0] <= fall <= slopes[2] else slopes[1]
+    surveys = [layer.survey for layer in case.bed if layer.survey is not None]
+    of_points = [sum(one.chance * one.point_error for one in survey.covariances) for survey in surveys]
     heights = [middle_value(case, one.canopy_height) for one in case.plants.stands.values()]
     patches = [site.patch == index for index in np.unique(site.patch[site.patch >= 0])]
     lengths = [float(one.any(axis=1).sum() * site.grid.dx) for one in patches]
@@ -265,6 +267,7 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
         speed=speed,
         shear_velocity=(GRAVITY * depth * slope) ** 0.5,
         slope=slope,
+        slope_error=max(of_points) / (case.grid.x[1] - case.grid.x[0]) if of_points else SLOPE_ERROR * slope,
         discharge=float(np.mean(discharges)) if discharges else speed * depth * width,
         viscosity=middle_value(case, case.eddy_viscosity),
         canopy=float(np.median(heights)) if heights else 0.5 * depth,

@@ -10,6 +10,8 @@ from vegglue.effects.definition import Amplitude, Effect, Shape
 SIZE_DIGITS = 2
 # Diameter of a stem over the height of its plant [-]: shrubs and reeds of 1 to 2 m have stems of some centimetre.
 SLENDER = 0.01
+# Error of the slope of a bed that is stated by its numbers, over the slope of the flow [-]. Chosen, not measured.
+SLOPE_ERROR = 0.2
 # Half width of a spot over that of the floor [-].
 SPOT_WIDTH = 0.3
 
@@ -32,6 +34,9 @@ class SiteScales:
         u* = (g h S)^(1/2) [m/s].
     slope
         S [-]: that of the bed where the friction of the prior can balance it, else that of its middle.
+    slope_error
+        Standard error of the slope of the bed [-]: SLOPE_ERROR of a stated slope; of a surveyed bed, one end of the
+        reach a standard error of a point higher than the other.
     discharge
         Q [m3/s].
     viscosity
@@ -52,6 +57,7 @@ class SiteScales:
     speed: float
     shear_velocity: float
     slope: float
+    slope_error: float
     discharge: float
     viscosity: float
     canopy: float

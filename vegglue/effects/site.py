@@ -77,7 +77,7 @@ EFFECTS = (
         title="The bed falls more steeply than surveyed",
         equation="z_b -> z_b + s (x_end - x)",
         act=bed_slope,
-        amplitude=Amplitude("slope", "-", "additional slope s along the channel", 0.2, -2.0, 2.0, of="slope"),
+        amplitude=Amplitude("slope", "-", "additional slope s along the channel", 1.0, -10.0, 10.0, of="slope_error"),
         source="definition",
         checked=True,
     ),
