@@ -3,24 +3,32 @@
     python tests/studies/sensitivity.py [--cases open-a ...] [--constants field_odds ...]
     python tests/studies/sensitivity.py --page
 
-The first diagnoses what is not recorded yet, the constants that matter most first, and may be stopped at any time. The
-second writes the table of docs/sensitivity.md from the records, as the first does at its end. A share near 1 is halved
-and doubled in its distance from 1.
+The first diagnoses each case that is not recorded yet, and may be stopped at any time. Until a constant is read, its
+value changes nothing: when a diagnosis reads one for the first time, the process forks, and each child goes on with
+another value of it. So half and twice cost only what follows, they share nothing that was computed with the constant,
+and one that is never read needs no run. The second writes the table of docs/sensitivity.md from the records, as the
+first does at its end. A share near 1 is halved and doubled in its distance from 1.
 """
 
 import argparse
 import json
+import os
+import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, cast
 
 import vegglue
 from vegglue.decision_constants import DecisionConstants, Described, described, using
+from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.errors import InputError
+from vegglue.parallel import at_most, one_thread
+from vegglue.workflow.case_run import case_run
 
 ROOT = Path(__file__).parents[2]
 CASES, RECORDS, PAGE = ROOT / "data/open_cases", ROOT / "data/sensitivity/records.jsonl", ROOT / "docs/sensitivity.md"
@@ -42,32 +50,77 @@ def varied(one: Described, factor: float) -> float:
     return min(found, 0.99) if "correlation" in one.name else found
 
 
-def diagnosed(case: str, constant: str, factor: float) -> Record:
-    """The verdict of one open case, with one constant varied or with all as they are."""
-    by_name = {one.name: one for one in described()}
-    values = DecisionConstants()
-    if constant != AS_IS:
-        values = replace(values, **{constant: varied(by_name[constant], factor)})
-    began = time.perf_counter()
-    with tempfile.TemporaryDirectory() as place, using(values):
-        imported = vegglue.import_folder(CASES / case, Path(place) / f"{case}.yaml")
-        found = vegglue.diagnose(imported, runs=Path(place) / "runs")
-    return {
-        "case": case, "constant": constant, "factor": factor, "kind": found.verdict.kind,
-        "set": sorted(found.set),
-        "places": [one.effect for one in found.places], "instruments": [one.kind for one in found.instruments],
-        "seconds": round(time.perf_counter() - began, 1),
-    }  # fmt: skip
+@dataclass
+class Forking:
+    """Constants that fork this process when one of `wanted` is read for the first time, once for each factor: the child
+    goes on with the constant times that factor, and forks no more.
+    """
+
+    values: DecisionConstants
+    wanted: dict[str, tuple[float, ...]]
+    constant: str = AS_IS
+    factor: float = 1.0
+    read: set[str] = field(default_factory=lambda: {AS_IS})
+
+    def __getattr__(self, name: str) -> float:
+        self.read.add(name)
+        for factor in self.wanted.pop(name, ()):
+            child = os.fork()
+            if child:
+                os.waitpid(child, 0)
+                continue
+            self.constant, self.factor, self.wanted = name, factor, {}
+            one = next(one for one in described(self.values) if one.name == name)
+            self.values = replace(self.values, **{name: varied(one, factor)})
+            break
+        return cast(float, getattr(self.values, name))
 
 
-def missing(
-    cases: Sequence[str], constants: Sequence[str], records: Sequence[Record]
-) -> Iterator[tuple[str, str, float]]:
-    """What is not recorded yet: each case as it is, then the constants in their order."""
-    known = {(one["case"], one["constant"], one["factor"]) for one in records}
-    wanted = [(case, AS_IS, 1.0) for case in cases]
-    wanted += [(case, constant, factor) for constant in constants for factor in FACTORS for case in cases]
-    return (one for one in wanted if one not in known)
+def diagnose_all(case: str, wanted: Mapping[str, tuple[float, ...]], commit: str) -> None:
+    """Record the verdict of one open case as it is and with each wanted constant times each of its factors."""
+    of, parent = Forking(DecisionConstants(), dict(wanted)), os.getpid()
+    answered: Record = {"kind": "refused", "set": [], "places": [], "instruments": []}
+    with tempfile.TemporaryDirectory() as place:
+        run = case_run(vegglue.import_folder(CASES / case, Path(place) / f"{case}.yaml"), Path(place) / "runs")
+        try:
+            with using(cast(DecisionConstants, of)), at_most(1), one_thread():  # a fork keeps one thread
+                found = diagnose_model(run.commanded_model, unseen=run.validation_model)
+                answered = {
+                    "kind": found.verdict.kind, "set": sorted(found.set),
+                    "places": [one.effect for one in found.places],
+                    "instruments": [one.kind for one in found.instruments],
+                }  # fmt: skip
+        except InputError as error:
+            print(f"{case}, {of.constant} x {of.factor:g}: {error}", flush=True)
+        except BaseException:
+            if os.getpid() == parent:
+                raise
+            traceback.print_exc()
+            os._exit(1)
+        record({"case": case, "constant": of.constant, "factor": of.factor, **answered, "read": True,
+                "seconds": round(time.process_time(), 1), "commit": commit})  # fmt: skip
+        if os.getpid() != parent:
+            os._exit(0)  # the folder and all else belong to the parent
+    for name in wanted.keys() - of.read:
+        for factor in wanted[name]:
+            record({"case": case, "constant": name, "factor": factor, **answered, "read": False, "seconds": 0.0,
+                    "commit": commit})  # fmt: skip
+
+
+def record(one: Record) -> None:
+    """Add it to the records."""
+    with RECORDS.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(one) + "\n")
+    if one["read"]:
+        print(f"{one['case']}, {one['constant']} x {one['factor']:g}: {one['kind']}, {one['seconds']} s", flush=True)
+
+
+def missing(case: str, constants: Sequence[str], records: Sequence[Record]) -> dict[str, tuple[float, ...]]:
+    """The factors of each constant that are not recorded for a case, and the case as it is."""
+    known = {(one["constant"], one["factor"]) for one in records if one["case"] == case}
+    left = {name: tuple(one for one in FACTORS if (name, one) not in known) for name in constants}
+    left |= {AS_IS: () if (AS_IS, 1.0) in known else (1.0,)}
+    return {name: factors for name, factors in left.items() if factors}
 
 
 def read_records() -> list[Record]:
@@ -137,15 +190,16 @@ def main() -> None:
     RECORDS.parent.mkdir(exist_ok=True)
     kept = "".join(json.dumps(one) + "\n" for one in read_records())
     RECORDS.write_text(kept, encoding="utf-8")
-    for case, constant, factor in [] if given.page else missing(given.cases, given.constants, read_records()):
-        try:
-            record = diagnosed(case, constant, factor)
-        except InputError as error:
-            print(f"{case}, {constant} x {factor:g}: {error}", flush=True)
-            continue
-        with RECORDS.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(record) + "\n")
-        print(f"{case}, {constant} x {factor:g}: {record['kind']}, {record['seconds']} s", flush=True)
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short=8", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.strip()
+    for case in [] if given.page else given.cases:
+        wanted = missing(case, given.constants, read_records())
+        if wanted and not (child := os.fork()):  # a process for each case: what one keeps in memory, no other sees
+            diagnose_all(case, wanted, commit)
+            os._exit(0)
+        elif wanted:
+            os.waitpid(child, 0)
     write_page(read_records())
 
 

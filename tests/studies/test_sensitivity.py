@@ -1,5 +1,9 @@
 """The study of constants: what is still to be run, how a constant is varied, and which verdicts count as others."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 import sensitivity
 
@@ -15,9 +19,28 @@ def record(constant: str, factor: float, kind: str = "identified", effects: tupl
 
 def test_what_is_recorded_is_not_run_again() -> None:
     made = [record(sensitivity.AS_IS, 1.0), record("field_odds", 0.5)]
-    left = list(sensitivity.missing(["open-b", "open-c"], ["field_odds"], made))
-    assert left == [("open-c", sensitivity.AS_IS, 1.0), ("open-c", "field_odds", 0.5), ("open-b", "field_odds", 2.0),
-                    ("open-c", "field_odds", 2.0)]  # fmt: skip
+    assert sensitivity.missing("open-b", ["field_odds", "spot_drag"], made) == {
+        "field_odds": (2.0,), "spot_drag": (0.5, 2.0)
+    }  # fmt: skip
+    assert sensitivity.missing("open-c", [], made) == {sensitivity.AS_IS: (1.0,)}
+
+
+def test_a_constant_forks_when_it_is_first_read() -> None:
+    read_twice = """
+import os, sensitivity
+from vegglue.decision_constants import DecisionConstants
+of = sensitivity.Forking(DecisionConstants(), {"field_odds": (0.5, 2.0), "spot_drag": (2.0,), "set_chance": (0.5,)})
+found = [of.field_odds, of.spot_drag, of.field_odds]
+print(of.constant, of.factor, *found, sorted(of.read), flush=True)
+"""
+    printed = subprocess.run(
+        [sys.executable, "-c", read_twice], cwd=Path(sensitivity.__file__).parent, capture_output=True, text=True
+    )
+    asked = "['as it is', 'field_odds', 'spot_drag']"
+    assert printed.stdout.splitlines() == [
+        f"field_odds 0.5 50.0 1.0 50.0 {asked}", f"field_odds 2.0 200.0 1.0 200.0 {asked}",
+        f"spot_drag 2.0 100.0 2.0 100.0 {asked}", f"as it is 1.0 100.0 1.0 100.0 {asked}",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
