@@ -230,7 +230,7 @@ def page() -> str:
 TEXT = """# Full disks, kills and damaged files
 
 The tests cause each of these faults, and then run the same command again, undisturbed
-(`tests/end_to_end/test_fault_table.py`; `python tests/fault_table.py` writes this page).
+(`tests/end_to_end/test_fault_table.py`).
 
 ## Faults and their outcome
 
@@ -253,27 +253,22 @@ A hanging worker cannot be distinguished from a slow one: the command waits. Sto
   library never finishes reading some damaged files.
 - Members are kept chunk by chunk in `ensemble.h5.part`; the next run reuses the chunks whose checksum is right.
 - A lock of the operating system allows one process at a time to write an ensemble. If locks of a network disk do not
-  reach other machines, the first of two runs stops with a message. Of two processes that write a diagnosis, a posterior
-  or a page, the later one wins.
+  reach other machines, the first of two runs stops. Of two processes that write another result, the later one wins.
 - A file with links or with data in other files is refused; a link in the folder of a run is replaced, not followed.
-- Configs of `import`, `extend` and `twin` that you edited are replaced only with `--force`.
 
 ## Damaged files from others
 
-`import` reads such a file and counts what it leaves out, or refuses it with exit code 2 and writes nothing. See also
-[how tables are read](own_files.md#how-tables-are-read) and [invalid predictions](own_engine.md#invalid-predictions).
+Beside [the rules of tables](own_files.md#how-tables-are-read), `import`
 
-- **Left out**: values marked as missing, with their row or cell; codes of gauging offices (Ice, Eqp, -999999); raw
-  ensembles of a boat with a wrong checksum or size, cut short, or without bottom track or ranges.
-- **Used**: three of four beams if the file allows it; cells of two sizes; scale and offset of a raster; 3.7D-01.
-- **Refused**: velocities relative to the boat (reference NONE); a jump of the boat; another coordinate system, datum or
-  unit of a map; missing-value codes in the site file, stems and corners; damaged MATLAB files, and files that unpack to
-  more than 100 MB, by a separate process.
+- **leaves out** codes of gauging offices (Ice, Eqp, -999999), and raw ensembles of a boat with a wrong checksum or
+  size, cut short, or without bottom track or ranges;
+- **refuses** velocities relative to the boat (reference NONE), a jump of the boat, another coordinate system, datum or
+  unit of a map, missing-value codes in the site file, stems and corners, damaged MATLAB files, and files that unpack to
+  more than 100 MB.
 
 ## Following a run
 
-The growing file may be read at any time, also with HDF5's locks. `progress/finished` lists the finished chunks; other
-rows are NaN. Open it, read, and close it again:
+The growing file may be read at any time; rows that are not finished are NaN. Open it, read, and close it again:
 
 ```python
 import h5py

@@ -165,8 +165,6 @@ def _data_limits(
 
 PAGE = """# How often the diagnosis is right
 
-Causes were hidden in synthetic measurements, and each data set was diagnosed once without that knowledge.
-
 ## Protocol
 
 - **Truth.** A second solver (`tests/studies/second_solver.py`): explicit finite volumes with their own grid, waterline
@@ -179,8 +177,8 @@ Causes were hidden in synthetic measurements, and each data set was diagnosed on
   times Baptist's; bed under plants of 45 to 75 m^(1/2)/s (60 in the model); eddy viscosity 0.5 to 2.5 times the stated
   one; sides of patches up to 0.1 m off; stems 12 %, the bed 1 cm, probes 2 cm and discharges 1 % off. Every cause is
   hidden on such sites; with nothing hidden half of the sites are exact.
-- **Errors allowed to the model** (`model_error`): friction 5 %, bed 1 cm, edges of patches 5 cm, probes 2 cm,
-  discharges 1 %, stems 12 %. The eddy viscosity is calibrated with a prior of a factor of two.
+- **Errors allowed to the model**: friction 5 %, bed 1 cm, edges of patches 5 cm, probes 2 cm, discharges 1 %, stems
+  12 %. The eddy viscosity is calibrated with a prior of a factor of two.
 - **Hidden causes**: an effect of the library, an object in no list (a pier, a hole, ...), an instrument that is off,
   or two of these, with a signal of 3 or 6 standard errors (s.e.): the norm of the change of the predictions that
   calibration cannot absorb, in standard errors of data, grid, model and site together.
@@ -208,7 +206,7 @@ its 95 % interval (Clopper and Pearson), in at least 20 data sets. All {sets} da
 - **Chosen on the data.** Some rules for local anomalies, instruments and lists of what is not excluded were chosen
   after parts of these data sets. Only the lines "not inspected" are free of that, and only for objects.
 - **Several states of the code.** Data sets that a later change could affect were diagnosed again, as far as time
-  allowed; what `extend --auto` keeps is counted by an earlier rule in all but 170. `make blind` computes the rest.
+  allowed; what `extend --auto` keeps is counted by an earlier rule in all but 170.
 - **Dependence.** True parameters lie at eight points of the prior, 0.3 to 1 standard deviations from its middle. `own
   equations` in the figures ({own} data sets) have the model's own equations as truth, an easier test.
 - **Few data sets** of a campaign with something hidden (shares of fewer than {few} are not shown), of pairs and of bad
@@ -216,5 +214,4 @@ its 95 % interval (Clopper and Pearson), in at least 20 data sets. All {sets} da
 {kept}
 {data_limits}
 {left_out}
-- **Others**: [laws](discover.md#how-often-it-is-right), [natural reaches](diagnosis.md#drawn-natural-reaches).
 """

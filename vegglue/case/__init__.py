@@ -1,5 +1,4 @@
-"""A case: the YAML file, read, checked and hashed, the priors of its parameters, and its site on the grid: bed levels,
-friction classes, patches of plants and the channel.
+"""A case: the YAML file, read, checked and hashed, the priors of its parameters, and its site on the grid.
 
 May import: effects, wording.
 Open first: schema.py, config.py, gridded_site.py.

@@ -1,5 +1,5 @@
-"""The shallow-water equations of a case, their residual and their steady states: Newton for one member, chord steps for
-its neighbours, marching where both fail; tangents, adjoints and sensors.
+"""The shallow-water equations of a case and their steady states: Newton for one member, chord steps for its neighbours,
+marching if both fail; tangents, adjoints and sensors.
 
 May import: case, effects, measurements.
 Open first: problem.py, equations.py, newton.py, batch.py.
