@@ -98,33 +98,20 @@ class Places:
 
 @dataclass(frozen=True)
 class Fingerprints:
-    """S = d prediction / d gain of candidates, one column for each setting of their shapes.
+    """S = d prediction / d gain of candidates, one column for each setting of their shapes."""
 
-    Attributes
-    ----------
-    point, candidates
-        Where it is taken, and of what.
-    columns
-        Of each candidate.
-    settings, amplitudes, causes
-        Of each column (c,).
-    values
-        S (station, c) [m/s or m per unit of gain].
-    places
-        The spots of each term.
-    lines, of_lines
-        Surveyed lines, and what a measurement exceeds its prediction by for each m that a line is too high,
-        (station, lines) [unit of the station per m].
-    """
-
+    # point, candidates: where it is taken, and of what
     point: Point
     candidates: list[Candidate]
-    columns: list[np.ndarray]
+    columns: list[np.ndarray]  # of each candidate
+    # settings, amplitudes, causes: of each column (c,)
     settings: list[dict[str, float]]
     amplitudes: list[Amplitude]
     causes: list[Cause]
-    values: Array
-    places: tuple[Places, ...]
+    values: Array  # S (station, c) [m/s or m per unit of gain]
+    places: tuple[Places, ...]  # the spots of each term
+    # lines, of_lines: surveyed lines, and what a measurement exceeds its prediction by for each m that a line is too
+    # high, (station, lines) [unit of the station per m]
     lines: SurveyedLines | None = None
     of_lines: Array = field(default_factory=lambda: np.zeros((0, 0)))
 

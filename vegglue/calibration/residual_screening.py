@@ -67,41 +67,21 @@ OFF, MOST_CONDITIONAL = 0.25, 2
 
 @dataclass(frozen=True)
 class Screening:
-    """Score tests of the residual of a calibrated model against all that could be missing, or wrong with the data.
+    """Score tests of the residual of a calibrated model against all that could be missing, or wrong with the data."""
 
-    Attributes
-    ----------
-    base
-        The model, with the noise as estimated here, at the place of its fit.
-    search
-        Its model that is fitted again and again.
-    flagged
-        Readings of instruments found to be off, indices among the used ones.
-    fingerprints, whitened_fingerprints
-        S of candidates, and W S (n, c).
-    whitened_slopes
-        W df/dz (n, p).
-    projected
-        W S with W df/dz projected out.
-    effects
-        Score tests of candidates.
-    kinds
-        Evidence of all kinds: of listed effects, of places by term, and of `instruments`, in this order.
-    errors
-        Whitened errors alone (draws, n).
-    """
-
-    base: Baseline
-    search: SearchModel
-    flagged: tuple[int, ...]
+    base: Baseline  # the model, with the noise as estimated here, at the place of its fit
+    search: SearchModel  # its model that is fitted again and again
+    flagged: tuple[int, ...]  # readings of instruments found to be off, indices among the used ones
+    # fingerprints, whitened_fingerprints: S of candidates, and W S (n, c)
     fingerprints: Fingerprints
-    whitened_slopes: Array
+    whitened_slopes: Array  # W df/dz (n, p)
     whitened_fingerprints: Array
-    projected: score_test.Projected
-    effects: Family
+    projected: score_test.Projected  # W S with W df/dz projected out
+    effects: Family  # score tests of candidates
+    # Evidence of all kinds: of listed effects, of places by term, and of `instruments`, in this order
     kinds: tuple[HypothesisKind, ...]
     instruments: dict[str, tuple[Instrument, ...]]
-    errors: Array
+    errors: Array  # whitened errors alone (draws, n)
 
     def best_column(self, candidate: int) -> int:
         """Column of the fingerprint of a candidate with the largest |T|, among the settings of its shapes."""

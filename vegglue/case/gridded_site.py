@@ -22,31 +22,16 @@ RIMS_KEPT = 32
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """A site on its grid. Compared by identity, so that what is computed of a site can be cached.
-
-    Attributes
-    ----------
-    grid : Grid
-    bed : array (nx, ny)
-        Level of the bed [m].
-    friction_class : array (nx, ny)
-        Index into class_names.
-    class_names : tuple of str
-    patch : array (nx, ny)
-        Index into the patches of the case, of the one that covers most of a cell, -1 without plants.
-    cover : array (nx, ny)
-        Share of a cell that plants cover [-].
-    own : mapping of str to Site
-        The site in experiments with another bed.
-    """
+    """A site on its grid. Compared by identity, so that what is computed of a site can be cached."""
 
     grid: Grid
-    bed: Array
-    friction_class: NDArray[np.int64]
+    bed: Array  # level of the bed [m]
+    friction_class: NDArray[np.int64]  # index into class_names
     class_names: tuple[str, ...]
+    # Index into the patches of the case, of the one that covers most of a cell, -1 without plants
     patch: NDArray[np.int64]
-    cover: Array
-    own: Mapping[str, "Site"] = field(default_factory=dict)
+    cover: Array  # share of a cell that plants cover [-]
+    own: Mapping[str, "Site"] = field(default_factory=dict)  # the site in experiments with another bed
 
     @property
     def main_patch(self) -> NDArray[np.int64]:

@@ -231,30 +231,14 @@ class PlanAnswer:
 
 @dataclass(frozen=True)
 class DesignCriterion:
-    """How well measurements answer a question, by the lengths of the traces that they would leave.
+    """How well measurements answer a question, by the lengths of the traces that they would leave."""
 
-    Attributes
-    ----------
-    question
-        What is asked. Of two effects there are three traces, the third the sum of both.
-    candidates
-        Number of hypotheses about listed effects.
-    level
-        Of the alarm.
-    amplitudes
-        Of the effects that the question is about (k,).
-    beyond
-        By how much the score of each has to be above that of the alarm to be named (k,) [standard errors].
-    bending
-        See `bending_of` (k,).
-    """
-
-    question: PlanQuestion
-    candidates: int
-    level: float
-    amplitudes: tuple[Amplitude, ...]
-    beyond: Array
-    bending: Array
+    question: PlanQuestion  # what is asked. Of two effects there are three traces, the third the sum of both.
+    candidates: int  # number of hypotheses about listed effects
+    level: float  # of the alarm
+    amplitudes: tuple[Amplitude, ...]  # of the effects that the question is about (k,)
+    beyond: Array  # by how much the score of each has to be above that of the alarm to be named (k,) [standard errors]
+    bending: Array  # see `bending_of` (k,)
 
     def sizes(self, squares: Array) -> Array:
         """Lengths of traces at places of the priors (place, ..., k), or the distance of two, of squares at each draw:
@@ -313,25 +297,14 @@ class DesignCriterion:
 
 @dataclass(frozen=True)
 class PlanSearch:
-    """The search for pieces of field work to add.
+    """The search for pieces of field work to add."""
 
-    Attributes
-    ----------
-    wide
-        All pieces that are possible.
-    criterion
-        What is maximised.
-    present, another
-        Flows that are measured in anyhow, and hours of another one [h].
-    base
-        Given the plan as it is, at each draw of the priors (draw, ...).
-    """
-
-    wide: PlanModel
-    criterion: DesignCriterion
+    wide: PlanModel  # all pieces that are possible
+    criterion: DesignCriterion  # what is maximised
+    # present, another: flows that are measured in anyhow, and hours of another one [h]
     present: frozenset[str]
     another: float
-    base: PossibleMeasurements
+    base: PossibleMeasurements  # given the plan as it is, at each draw of the priors (draw, ...)
 
     @cached_property
     def start(self) -> PlanAnswer:
@@ -383,7 +356,7 @@ class PlanSearch:
         """
         found = []
         moves = self.moves()
-        # A flow that the case does not have is known in the middle of the priors: elsewhere traces keep their ratio.
+        # a flow that the case does not have is known in the middle of the priors: elsewhere traces keep their ratio.
         size = self.criterion.sizes(self.with_each(moves))
         for k, move in enumerate(moves):
             after = self.criterion.answer(size[:, k])
@@ -457,7 +430,7 @@ class PlanSearch:
     def _filled(self, budget: float, chosen: list[int], flows: Flows[str]) -> list[int]:
         """More pieces in some flows, or of none, by gain per hour."""
         pieces, left = self.wide.pieces, self._left(budget, chosen, flows)
-        # A flow that the case does not have cannot be ordered: it is shown, and not planned.
+        # a flow that the case does not have cannot be ordered: it is shown, and not planned.
         possible = [j for j, one in enumerate(pieces) if one.hours <= left and not one.new
                     and one.experiment in {*flows, ""}]  # fmt: skip
         kept = np.unique(self.rows_of(possible))

@@ -68,36 +68,21 @@ def rivals_in(undecided: Undecided) -> tuple[Rival, ...]:
 
 @dataclass(frozen=True)
 class SearchState:
-    """What a search has accepted so far.
+    """What a search has accepted so far."""
 
-    Attributes
-    ----------
-    steps, places, instruments
-        Accepted effects, places and faulty instruments.
-    prior_weights
-        Of all that is held.
-    flagged
-        Excluded readings, indices among the used stations.
-    of_shape
-        ln evidence of places as they competed, less that in the model, whose covariance holds the error of their shape.
-    p, rate
-        Of the last alarm, and the rate below which it is sounded.
-    undecided
-        What competed last and led to nothing.
-    implausible
-        Values that no flow of the case can have.
-    """
-
+    # steps, places, instruments: accepted effects, places and faulty instruments
     steps: tuple[Step, ...] = ()
     places: tuple[LocalAnomaly, ...] = ()
     instruments: tuple[FaultyInstrument, ...] = ()
-    prior_weights: tuple[PriorWeight, ...] = ()
-    flagged: tuple[int, ...] = ()
+    prior_weights: tuple[PriorWeight, ...] = ()  # of all that is held
+    flagged: tuple[int, ...] = ()  # excluded readings, indices among the used stations
+    # Ln evidence of places as they competed, less that in the model, whose covariance holds the error of their shape
     of_shape: float = 0.0
+    # p, rate: of the last alarm, and the rate below which it is sounded
     p: float = 1.0
     rate: float = 0.0
-    undecided: Undecided | None = None
-    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()
+    undecided: Undecided | None = None  # what competed last and led to nothing
+    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()  # values that no flow of the case can have
 
     @property
     def alarmed(self) -> bool:

@@ -55,69 +55,39 @@ AT_BOUND = 0.01
 
 @dataclass(frozen=True)
 class VerdictInputs:
-    """What a verdict rests on.
+    """What a verdict rests on."""
 
-    Attributes
-    ----------
-    candidates
-        Every tested effect, the strongest first.
-    errors, misfit
-        As estimated, and of the model with all that was accepted.
-    steps, places, instruments, field, laws, model_error
-        What was accepted, or found beside it.
-    undecided
-        Hypotheses of which none leads.
-    implausible
-        Values that no flow can have.
-    not_excluded
-        Groups of effects among which one that is there undetected is.
-    held_out, by_chance
-        Errors at held-out measurements over the expected ones [-], NaN without any, infinite without a flow; and what
-        of that errors alone exceed in 5 % of cases.
-    neighbours
-        Whether readings side by side are excluded.
-    strained
-        The parameter furthest off its prior, and how far [standard deviations].
-    between
-        Errors between the sections over those of the data [-].
-    carried
-        Sections that clearly carry another discharge than stated.
-    significant_effects, remainder
-        Those that were not accepted, with p [-], and whether all of them may be a remainder of what was.
-    surroundings
-        Notes on the map, the measured stretch, the depth and the parameters.
-    excluded
-        Effects that cannot act at the site, with the reason of each.
-    hangs_on
-        The section without which another name leads.
-    bed
-        Where it differs from the surveyed one, the clearest first.
-    """
-
-    candidates: tuple[CandidateEffect, ...]
+    candidates: tuple[CandidateEffect, ...]  # every tested effect, the strongest first
+    # errors, misfit: as estimated, and of the model with all that was accepted
     errors: EstimatedErrors
     misfit: ChiSquare
+    # steps, places, instruments, field, laws, model_error: what was accepted, or found beside it
     steps: tuple[Step, ...] = ()
     places: tuple[LocalAnomaly, ...] = ()
     instruments: tuple[FaultyInstrument, ...] = ()
-    undecided: tuple[Rival, ...] = ()
-    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()
+    undecided: tuple[Rival, ...] = ()  # hypotheses of which none leads
+    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()  # values that no flow can have
     field: FieldFound | None = None
     laws: CandidateLaws | None = None
     model_error: ModelErrorUsed | None = None
-    not_excluded: tuple[tuple[str, ...], ...] = ()
+    not_excluded: tuple[tuple[str, ...], ...] = ()  # groups of effects among which one that is there undetected is
+    # held_out, by_chance: errors at held-out measurements over the expected ones [-], NaN without any, infinite without
+    # a flow; and what of that errors alone exceed in 5 % of cases
     held_out: float = float("nan")
     by_chance: float = 1.0
-    neighbours: bool = False
-    strained: tuple[str, float] = ("", 0.0)
-    between: float = 1.0
-    carried: tuple[CarriedDischarge, ...] = ()
+    neighbours: bool = False  # whether readings side by side are excluded
+    strained: tuple[str, float] = ("", 0.0)  # the parameter furthest off its prior, and how far [standard deviations]
+    between: float = 1.0  # errors between the sections over those of the data [-]
+    carried: tuple[CarriedDischarge, ...] = ()  # sections that clearly carry another discharge than stated
+    # significant_effects, remainder: those that were not accepted, with p [-], and whether all of them may be a
+    # remainder of what was
     significant_effects: Mapping[str, float] = by_default(default_factory=dict)
     remainder: bool = False
-    surroundings: tuple[Note, ...] = ()
+    surroundings: tuple[Note, ...] = ()  # notes on the map, the measured stretch, the depth and the parameters
+    # Effects that cannot act at the site, with the reason of each
     excluded: Mapping[str, str] = by_default(default_factory=dict)
-    hangs_on: NameHangsOnSection | None = None
-    bed: tuple[BedCorrected, ...] = ()
+    hangs_on: NameHangsOnSection | None = None  # the section without which another name leads
+    bed: tuple[BedCorrected, ...] = ()  # where it differs from the surveyed one, the clearest first
 
 
 def make_verdict(inputs: VerdictInputs) -> Verdict:

@@ -97,22 +97,13 @@ def put_rows(
 
 @dataclass(frozen=True)
 class SolvedMembers:
-    """Members in the order of their problem, filled in place while they are solved.
+    """Members in the order of their problem, filled in place while they are solved."""
 
-    Parameters
-    ----------
-    state
-        (nx, 3, ny, m), each member in one piece of memory.
-    status, reason
-        How each ended (m,), see `status`, and why if it failed.
-    iterations
-        Newton and chord steps of each (m,).
-    """
-
-    state: Array
+    state: Array  # (nx, 3, ny, m), each member in one piece of memory
+    # status, reason: how each ended (m,), see `status`, and why if it failed
     status: np.ndarray
     reason: list[str]
-    iterations: np.ndarray
+    iterations: np.ndarray  # Newton and chord steps of each (m,)
 
 
 @dataclass(frozen=True)

@@ -35,43 +35,21 @@ FASTEST_SHRINKING, SLOWEST_SHRINKING = 0.2, 0.9
 
 @dataclass(frozen=True)
 class IterationLimits:
-    """When members that have not converged are left to another reference.
+    """When members that have not converged are left to another reference."""
 
-    Parameters
-    ----------
-    most
-        Steps of a member at most.
-    pace
-        Its correction [m, m/s] in step n stays below 4 LONGEST_CORRECTION pace^n.
-    few
-        All end once so many or less are at work, if at least half as many need another reference anyway.
-    """
-
-    most: int
-    pace: float = 1.0
-    few: int = 0
+    most: int  # steps of a member at most
+    pace: float = 1.0  # its correction [m, m/s] in step n stays below 4 LONGEST_CORRECTION pace^n
+    few: int = 0  # all end once so many or less are at work, if at least half as many need another reference anyway
 
 
 @dataclass(frozen=True)
 class ChordSolution:
-    """Where members ended.
+    """Where members ended."""
 
-    Parameters
-    ----------
-    state
-        (nx, 3, ny, m).
-    correction
-        Least correction of each (m,) [m, m/s], infinite if it strayed.
-    iterations
-        Steps of each (m,).
-    converged
-        Whether it did (m,).
-    """
-
-    state: Array
-    correction: Array
-    iterations: np.ndarray
-    converged: np.ndarray
+    state: Array  # (nx, 3, ny, m)
+    correction: Array  # least correction of each (m,) [m, m/s], infinite if it strayed
+    iterations: np.ndarray  # steps of each (m,)
+    converged: np.ndarray  # whether it did (m,)
 
 
 StartsOf = Callable[[np.ndarray], Array]

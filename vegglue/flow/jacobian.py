@@ -201,18 +201,11 @@ class SparseJacobian:
 
 @dataclass(frozen=True)
 class Factors:
-    """J^-1 of one member, and what chord steps need of the state it was made at.
+    """J^-1 of one member, and what chord steps need of the state it was made at."""
 
-    Parameters
-    ----------
-    inverse
-        Of J, in single precision.
-    slope, thick, answer
-        Slopes of friction (nx, 3, ny, 1) [1/s], depths of faces [m] and changes of velocities with levels [1/s] there
-        (nx, 3, ny), see `thin_water`.
-    """
-
-    inverse: BlockFactors | SharedFactors
+    inverse: BlockFactors | SharedFactors  # of J, in single precision
+    # slope, thick, answer: slopes of friction (nx, 3, ny, 1) [1/s], depths of faces [m] and changes of velocities with
+    # levels [1/s] there (nx, 3, ny), see `thin_water`
     slope: Array
     thick: Array
     answer: Array

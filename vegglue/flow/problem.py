@@ -91,33 +91,19 @@ SMOOTH_WALLS = SideWalls(np.zeros(0), np.zeros(0), np.zeros(0))
 
 @dataclass(frozen=True)
 class InflowSegment:
-    """An inflow through one side of the grid.
+    """An inflow through one side of the grid."""
 
-    Parameters
-    ----------
-    side
-        "west", "south" or "north".
-    start, stop
-        It enters by the cells start .. stop - 1 of that side.
-    discharge
-        Q (m,) [m3/s].
-    by_conveyance
-        Whether Q is shared over its cells by h^(5/3), not evenly.
-    spread
-        Factor on the share of each cell (cell, m) or (cell, 1) [-].
-    along
-        Through a side: velocity along x over that through the side, the cotangent of the angle of the confluence [-].
-    rim
-        How high the rim of the hollow that a cell lies in stands over its bed (cell, 1), 0 outside of one [m].
-    """
-
-    side: str
+    side: str  # "west", "south" or "north"
+    # start, stop: it enters by the cells start .. stop - 1 of that side.
     start: int
     stop: int
-    discharge: Array
-    by_conveyance: bool = True
+    discharge: Array  # Q (m,) [m3/s]
+    by_conveyance: bool = True  # whether Q is shared over its cells by h^(5/3), not evenly
+    # Factor on the share of each cell (cell, m) or (cell, 1) [-]
     spread: Array = field(default_factory=lambda: np.ones((1, 1)))
+    # Through a side: velocity along x over that through the side, the cotangent of the angle of the confluence [-]
     along: float = 0.0
+    # How high the rim of the hollow that a cell lies in stands over its bed (cell, 1), 0 outside of one [m]
     rim: Array = field(default_factory=lambda: np.zeros((1, 1)))
 
 
@@ -136,51 +122,28 @@ class Boundaries:
 
 @dataclass(frozen=True)
 class Problem:
-    """One experiment for m members on one grid.
+    """One experiment for m members on one grid."""
 
-    Parameters
-    ----------
-    dx, dy
-        Size of a cell [m].
-    bed
-        Bed level (nx, ny) [m].
-    friction, plants, walls
-        Friction of bed, plants and sides of the grid.
-    viscosity
-        Eddy viscosity (m,) [m2/s].
-    boundaries
-        What enters and leaves.
-    film
-        A tenth of it stays on dry land [m].
-    smallest_shear_depth
-        Whether shear acts over the smallest depth of the cells around a point, not the mean: over a step with a wall
-        it acts above the step alone.
-    bed_rise
-        By how much members' beds lie higher (nx, ny, m) [m], or empty.
-    effects
-        Effects in the flow and its readings.
-    geometry
-        What effects see of the channel; None without effects.
-    bend
-        Curvature of a grid along a centreline; None if it is straight.
-    half_range
-        Of rows that were cut out, `bed_half_range` of the whole grid; else empty.
-    """
-
+    # dx, dy: size of a cell [m]
     dx: float
     dy: float
-    bed: Array
+    bed: Array  # bed level (nx, ny) [m]
+    # friction, plants, walls: friction of bed, plants and sides of the grid
     friction: BedFriction
     plants: VegetatedCells
-    viscosity: Array
-    boundaries: Boundaries
-    film: float
+    viscosity: Array  # eddy viscosity (m,) [m2/s]
+    boundaries: Boundaries  # what enters and leaves
+    film: float  # a tenth of it stays on dry land [m]
+    # Whether shear acts over the smallest depth of the cells around a point, not the mean: over a step with a wall it
+    # acts above the step alone
     smallest_shear_depth: bool
+    # By how much members' beds lie higher (nx, ny, m) [m], or empty
     bed_rise: Array = field(default_factory=lambda: EMPTY)
-    effects: tuple[ActiveEffect, ...] = ()
-    geometry: ChannelGeometry | None = None
+    effects: tuple[ActiveEffect, ...] = ()  # effects in the flow and its readings
+    geometry: ChannelGeometry | None = None  # what effects see of the channel; None without effects
     walls: SideWalls = SMOOTH_WALLS
-    bend: Bend | None = None
+    bend: Bend | None = None  # curvature of a grid along a centreline; None if it is straight
+    # Of rows that were cut out, `bed_half_range` of the whole grid; else empty
     half_range: Array = field(default_factory=lambda: EMPTY)
 
     @property

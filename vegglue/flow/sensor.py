@@ -63,21 +63,11 @@ OfStations = Callable[[GriddedFlow, Array, Array], Array]
 
 @dataclass(frozen=True)
 class Reader:
-    """How stations of one kind are read off a flow of m members; each function takes the flow and x, y (station,) [m].
+    """How stations of one kind are read off a flow of m members; functions take the flow and x, y (station,) [m]."""
 
-    Parameters
-    ----------
-    read
-        Readings (station, m) [unit of the kind].
-    slope_across
-        d reading/dy (station, m) [that per m]: the change of a station beside its place.
-    weights
-        d reading / d state (nx, 3, ny, station) of the first member.
-    """
-
-    read: OfStations
-    slope_across: OfStations
-    weights: OfStations
+    read: OfStations  # readings (station, m) [unit of the kind]
+    slope_across: OfStations  # d reading/dy (station, m) [that per m]: the change of a station beside its place
+    weights: OfStations  # d reading / d state (nx, 3, ny, station) of the first member
 
 
 def bilinear(field: Array, grid: Grid, x: Array, y: Array) -> Array:

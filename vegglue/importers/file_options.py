@@ -70,66 +70,38 @@ OfMap = Literal["map", "channel"]
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class FileOptions:
-    """One entry of `files`.
+    """One entry of `files`."""
 
-    Attributes
-    ----------
-    columns, units
-        Heading of the column, and unit, of each role.
-    missing
-        Numbers that mark no value; given as none, `[]`, a velocity of 0 counts as measured.
-    experiment, section
-        Of all rows.
-    standard_error
-        By the SI unit of the values that it is of.
-    coordinates, directions
-        Whether places and components of velocity are those of the map or of the channel; None for those of the map if
-        the site has a frame.
-    flip
-        Coordinates that run the other way.
-    zero
-        Where in the channel the coordinates of the file are 0, after `flip` [m].
-    x
-        Of all rows of a table without a column of it [m].
-    line
-        Ends of a tape, first its zero, for tables along one [m].
-    start
-        Where a boat started [m].
-    position
-        Of a probe whose record holds no place [m].
-    sheet
-        Of a workbook.
-    floor, surface
-        z of the file at the lowest bed and at the water [m].
-    draft
-        Depth of a raw ADCP in the water, None for that in the file [m].
-    declination
-        Of its compass: how far magnetic north lies east of true north [degrees].
-    factor
-        Mean velocity of the vertical over the one measured, such as 0.85 for velocities of the surface [-].
-    """
-
+    # columns, units: heading of the column, and unit, of each role
     columns: ByRole = field(default_factory=dict)
     units: Annotated[ByRole, AfterValidator(_known_units)] = field(default_factory=dict)
+    # Numbers that mark no value; given as none, `[]`, a velocity of 0 counts as measured
     missing: Annotated[tuple[Number, ...] | None, BeforeValidator(_as_list)] = None
+    # experiment, section: of all rows
     experiment: Label | None = None
     section: Label | None = None
+    # By the SI unit of the values that it is of
     standard_error: Annotated[dict[str, Annotated[Number, Field(ge=0)]], BeforeValidator(_errors_by_unit)] = field(
         default_factory=dict
     )
+    # coordinates, directions: whether places and components of velocity are those of the map or of the channel; None
+    # for those of the map if the site has a frame
     coordinates: OfMap | None = None
     directions: OfMap | None = None
-    flip: Annotated[tuple[Literal["x", "y"], ...], BeforeValidator(_as_list)] = ()
-    zero: PointInPlan | None = None
-    x: LengthInSI | None = None
+    flip: Annotated[tuple[Literal["x", "y"], ...], BeforeValidator(_as_list)] = ()  # coordinates that run the other way
+    zero: PointInPlan | None = None  # where in the channel the coordinates of the file are 0, after `flip` [m]
+    x: LengthInSI | None = None  # of all rows of a table without a column of it [m]
+    # Ends of a tape, first its zero, for tables along one [m]
     line: Annotated[tuple[PointInPlan, PointInPlan], BeforeValidator(_two_ends)] | None = None
-    start: PointInPlan | None = None
-    position: tuple[LengthInSI, LengthInSI, LengthInSI] | None = None
-    sheet: Label | None = None
+    start: PointInPlan | None = None  # where a boat started [m]
+    position: tuple[LengthInSI, LengthInSI, LengthInSI] | None = None  # of a probe whose record holds no place [m]
+    sheet: Label | None = None  # of a workbook
+    # floor, surface: z of the file at the lowest bed and at the water [m]
     floor: LengthInSI | None = None
     surface: LengthInSI | None = None
-    draft: LengthInSI | None = None
-    declination: AngleInSI = 0.0
+    draft: LengthInSI | None = None  # depth of a raw ADCP in the water, None for that in the file [m]
+    declination: AngleInSI = 0.0  # of its compass: how far magnetic north lies east of true north [degrees]
+    # Mean velocity of the vertical over the one measured, such as 0.85 for velocities of the surface [-]
     factor: Annotated[Number, Field(gt=0, le=LARGEST_FACTOR)] | None = None
 
 

@@ -16,7 +16,7 @@ from vegglue.importers.nortek import (
     VECTOR_BEGINS,
     is_nortek,
     read_nortek,
-    read_table,
+    read_samples,
     read_vector,
     rows_of_profiler,
 )
@@ -70,7 +70,7 @@ BY_BEGINNING: Mapping[bytes, FileReader] = {
 def reader_of(path: Path) -> FileReader:
     """The reader of a file, by how it begins. InputError for a record that none reads."""
     if path.suffix.lower() in WORKBOOKS:
-        return read_table
+        return read_samples
     try:
         with path.open("rb") as file:
             begin = file.read(LONGEST_PREAMBLE)
@@ -91,4 +91,4 @@ def reader_of(path: Path) -> FileReader:
         return read_qrev_summary
     if is_gauging(text):
         return read_gauging
-    return read_nortek if is_nortek(path, text) else read_table
+    return read_nortek if is_nortek(path, text) else read_samples

@@ -82,34 +82,17 @@ class Placement:
 
 @dataclass(frozen=True)
 class MeasuredRows:
-    """Rows of one file.
+    """Rows of one file."""
 
-    Attributes
-    ----------
-    numbers
-        By role (rows,) in SI, NaN for missing.
-    texts
-        By role, one a row.
-    columns, units
-        The heading that each role came from, and its unit.
-    notes
-        What was done, in short clauses.
-    others
-        Texts of the columns without a role, by heading.
-    lines
-        The row of the file that each row stands in, none if it has none.
-    of_probe
-        Whether u and v are along the axes of a probe, which is set up in the channel.
-    """
-
-    numbers: Mapping[str, Array]
-    texts: Mapping[str, Sequence[str]]
+    numbers: Mapping[str, Array]  # by role (rows,) in SI, NaN for missing
+    texts: Mapping[str, Sequence[str]]  # by role, one a row
+    # columns, units: the heading that each role came from, and its unit
     columns: Mapping[str, str]
     units: Mapping[str, str]
-    notes: tuple[FileNote, ...]
-    others: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    lines: Sequence[int] = ()
-    of_probe: bool = False
+    notes: tuple[FileNote, ...]  # what was done, in short clauses
+    others: Mapping[str, Sequence[str]] = field(default_factory=dict)  # texts of the columns without a role, by heading
+    lines: Sequence[int] = ()  # the row of the file that each row stands in, none if it has none
+    of_probe: bool = False  # whether u and v are along the axes of a probe, which is set up in the channel
 
     @property
     def size(self) -> int:

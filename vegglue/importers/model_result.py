@@ -31,44 +31,27 @@ FILLS_OF_CODES = (-999.0, -999.999, -9999.0, -99999.0)  # that codes write witho
 
 @dataclass(frozen=True, eq=False)
 class ModelResult:
-    """The final state of a model run, at the places where its velocities lie.
+    """The final state of a model run, at the places where its velocities lie."""
 
-    Parameters
-    ----------
-    code
-        The program, such as HEC-RAS.
-    x, y
-        Places on the map of the file (n,) [m].
-    bed, depth, level
-        (n,) [m]; depth is 0 and level NaN where it is dry.
-    u, v
-        Depth-averaged velocity to the east and to the north of that map (n,) [m/s], 0 where it is dry.
-    corners
-        Nodes of the mesh (k, 2) [m]: how far it reaches.
-    roughness, roughness_kind
-        (n,) in the unit of its kind [s m^(-1/3), m^(1/3)/s, m^(1/2)/s, m]; None if the file has none.
-    crs
-        Coordinate system as the file states it, '' if it does not.
-    time
-        Of the final state, as the file states it.
-    notes
-        What was converted or left out.
-    """
-
-    code: str
+    code: str  # the program, such as HEC-RAS
+    # x, y: places on the map of the file (n,) [m]
     x: Array
     y: Array
+    # bed, depth, level: (n,) [m]; depth is 0 and level NaN where it is dry
     bed: Array
     depth: Array
     level: Array
+    # u, v: depth-averaged velocity to the east and to the north of that map (n,) [m/s], 0 where it is dry
     u: Array
     v: Array
-    corners: Array
+    corners: Array  # nodes of the mesh (k, 2) [m]: how far it reaches
+    # roughness, roughness_kind: (n,) in the unit of its kind [s m^(-1/3), m^(1/3)/s, m^(1/2)/s, m]; None if the file
+    # has none
     roughness: Array | None = None
     roughness_kind: RoughnessKind = "not-stated"
-    crs: str = ""
-    time: str = ""
-    notes: tuple[FileNote, ...] = field(default=())
+    crs: str = ""  # coordinate system as the file states it, '' if it does not
+    time: str = ""  # of the final state, as the file states it
+    notes: tuple[FileNote, ...] = field(default=())  # what was converted or left out
 
     @property
     def wet(self) -> Mask:

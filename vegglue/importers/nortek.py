@@ -183,7 +183,7 @@ def _record_mean(
     return MeasuredRows(numbers, texts, columns, dict.fromkeys("uvw", "m/s"), notes, of_probe=True)
 
 
-def read_table(path: Path, options: FileOptions) -> MeasuredRows:
+def read_samples(path: Path, options: FileOptions) -> MeasuredRows:
     """What a table of measurements holds; with a `position`, samples of a probe there without spikes and those of low
     correlation. InputError also for a `position` of a table that has places of its own, or no velocities.
     """

@@ -66,36 +66,27 @@ JITTER = 1e-9
 
 @dataclass(frozen=True)
 class Difference:
-    """d of m runs, see the head of this file.
+    """d of m runs, see the head of this file."""
 
-    Parameters
-    ----------
-    names, station
-        Parameters of the command, and the stations (n rows).
-    centre, lower
-        u = lower^-1 (z - centre), z (q,) those of the command.
-    u, length, nugget
-        Places of the runs (m, q), l and t^2.
-    factor, projected, inner
-        Lower Cholesky factor of K (m, m), factor^-1 H (m, q + 1), and that of its square (q + 1, q + 1).
-    trend, weights
-        B (q + 1, n) and K^-1 (D - H B) (m, n).
-    directions, size
-        Whitened by C, S = directions' diag(size) directions: (r, used stations) and (r,).
-    """
-
+    # names, station: parameters of the command, and the stations (n rows)
     names: tuple[str, ...]
     station: pd.DataFrame
+    # centre, lower: u = lower^-1 (z - centre), z (q,) those of the command
     centre: Array
     lower: Array
+    # u, length, nugget: places of the runs (m, q), l and t^2
     u: Array
     length: float
     nugget: float
+    # factor, projected, inner: lower Cholesky factor of K (m, m), factor^-1 H (m, q + 1), and that of its square (q +
+    # 1, q + 1)
     factor: Array
     projected: Array
     inner: Array
+    # trend, weights: B (q + 1, n) and K^-1 (D - H B) (m, n)
     trend: Array
     weights: Array
+    # directions, size: whitened by C, S = directions' diag(size) directions: (r, used stations) and (r,)
     directions: Array
     size: Array
 

@@ -64,21 +64,13 @@ class Section:
 
 @dataclass(frozen=True)
 class DeadProbe:
-    """A probe that reads near zero at all heights.
+    """A probe that reads near zero at all heights."""
 
-    Attributes
-    ----------
-    heights
-        Number of points.
-    largest, expected
-        Largest |u|, and mean u between its neighbours [m/s].
-    deviation, expected_deviation
-        Median of u_std here and between its neighbours [m/s], None if unknown.
-    """
-
-    heights: int
+    heights: int  # number of points
+    # largest, expected: largest |u|, and mean u between its neighbours [m/s]
     largest: float
     expected: float
+    # deviation, expected_deviation: median of u_std here and between its neighbours [m/s], None if unknown
     deviation: float | None
     expected_deviation: float | None
 

@@ -30,20 +30,11 @@ class SurveyedQuantity:
 
 @dataclass(frozen=True)
 class RigidCylinder:
-    """phi of a stand of rigid cylinders.
+    """phi of a stand of rigid cylinders."""
 
-    Attributes
-    ----------
-    draws
-        Of phi (draws,) [-].
-    parts
-        Mean contribution of stems, branches and undergrowth to phi [-].
-    undergrowth_density
-        Assumed range, as it was not surveyed [1/m2]; None without undergrowth.
-    """
-
-    draws: Array
-    parts: dict[str, float]
+    draws: Array  # of phi (draws,) [-]
+    parts: dict[str, float]  # mean contribution of stems, branches and undergrowth to phi [-]
+    # Assumed range, as it was not surveyed [1/m2]; None without undergrowth
     undergrowth_density: tuple[float, float] | None
 
     @property

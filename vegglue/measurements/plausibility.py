@@ -91,36 +91,20 @@ class Symptom(Enum):
 
 @dataclass(frozen=True)
 class ImplausibleValues:
-    """Used values of one kind of observation with one problem.
+    """Used values of one kind of observation with one problem."""
 
-    Attributes
-    ----------
-    quantity
-        The kind in words.
-    instrument, si_unit
-        As in Kind, and the unit of its values.
-    symptom : Symptom
-    unit
-        The unit in which they would be plausible; empty for none.
-    size
-        Median over the values, see Symptom.
-    count, total
-        Number of these and of all used values of the kind.
-    first
-        Value, x and y of the first [SI]; y None if the kind has none.
-    places
-        Experiments and sections; '' for a gauge without a name, None for all values of the experiment.
-    """
-
-    quantity: str
+    quantity: str  # the kind in words
+    # instrument, si_unit: as in Kind, and the unit of its values
     instrument: str
     si_unit: str
     symptom: Symptom
-    unit: str
-    size: float
+    unit: str  # the unit in which they would be plausible; empty for none
+    size: float  # median over the values, see Symptom
+    # count, total: number of these and of all used values of the kind
     count: int
     total: int
-    first: tuple[float, float, float | None]
+    first: tuple[float, float, float | None]  # value, x and y of the first [SI]; y None if the kind has none
+    # Experiments and sections; '' for a gauge without a name, None for all values of the experiment
     places: tuple[tuple[str, str | None], ...]
 
 
@@ -137,44 +121,28 @@ class ImplausibleOutlet:
 
 @dataclass(frozen=True)
 class PlausibleFlow:
-    """Bounds for one experiment on the grid.
+    """Bounds for one experiment on the grid."""
 
-    Attributes
-    ----------
-    x, y
-        Columns (nx,) and rows (ny,) [m].
-    slowest, fastest
-        Q / A (nx,) [m/s], infinite if the section may be dry.
-    lowest, highest
-        Water level (nx,) [m].
-    smoothest, thickest
-        The same without what is left for gauges that are off, on smooth walls and in growth (nx,) [m].
-    floor
-        Lowest bed of the section (nx,) [m].
-    discharge
-        Least, of one inflow alone, and most, of all [m3/s].
-    depth, level
-        Largest depth, and level at the outlet [m].
-    width
-        Of the grid [m].
-    depths
-        Expected (nx, ny) [m].
-    """
-
+    # x, y: columns (nx,) and rows (ny,) [m]
     x: Array
     y: Array
+    # slowest, fastest: Q / A (nx,) [m/s], infinite if the section may be dry
     slowest: Array
     fastest: Array
+    # lowest, highest: water level (nx,) [m]
     lowest: Array
     highest: Array
+    # smoothest, thickest: the same without what is left for gauges that are off, on smooth walls and in growth (nx,)
+    # [m]
     smoothest: Array
     thickest: Array
-    floor: Array
-    discharge: Bounds
+    floor: Array  # lowest bed of the section (nx,) [m]
+    discharge: Bounds  # least, of one inflow alone, and most, of all [m3/s]
+    # depth, level: largest depth, and level at the outlet [m]
     depth: float
     level: Bounds
-    width: float
-    depths: Array
+    width: float  # of the grid [m]
+    depths: Array  # expected (nx, ny) [m]
 
     def column(self, x: float) -> int:
         """Index of the column of cells nearest to x [m]."""

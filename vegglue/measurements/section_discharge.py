@@ -52,21 +52,11 @@ Verticals = tuple[Array, Array, Array]
 
 @dataclass(frozen=True)
 class CrossSection:
-    """A section of regular cells under a flat water level.
+    """A section of regular cells under a flat water level."""
 
-    Attributes
-    ----------
-    y
-        Middles of the cells across the channel (cells,) [m].
-    bed
-        (cells,) [m]
-    surface
-        Water level [m].
-    """
-
-    y: Array
-    bed: Array
-    surface: float
+    y: Array  # middles of the cells across the channel (cells,) [m]
+    bed: Array  # (cells,) [m]
+    surface: float  # water level [m]
 
     @property
     def width(self) -> float:
@@ -89,33 +79,19 @@ class Discharge:
 
 @dataclass(frozen=True)
 class CarriedDischarge:
-    """What the verticals of one section carry.
+    """What the verticals of one section carry."""
 
-    Attributes
-    ----------
-    experiment, section, x
-        Of the section; x [m].
-    value, interval95
-        Discharge [m3/s].
-    stated
-        What has entered upstream, 95 % of its priors [m3/s]; None if that is not known.
-    share
-        Of the wet width that lies between the outermost verticals [-].
-    verticals
-        Their number.
-    gauged
-        Whether the level was measured.
-    """
-
+    # experiment, section, x: of the section; x [m]
     experiment: str
     section: str
     x: float
+    # value, interval95: discharge [m3/s]
     value: float
     interval95: Bounds
-    stated: Bounds | None
-    share: float
-    verticals: int
-    gauged: bool
+    stated: Bounds | None  # what has entered upstream, 95 % of its priors [m3/s]; None if that is not known
+    share: float  # of the wet width that lies between the outermost verticals [-]
+    verticals: int  # their number
+    gauged: bool  # whether the level was measured
 
     @property
     def ratio(self) -> float:

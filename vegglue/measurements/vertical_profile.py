@@ -31,46 +31,24 @@ TINY = 1e-300  # keeps 0 / 0 from points that all lie below the top; their slope
 
 @dataclass(frozen=True)
 class Column:
-    """The points of one vertical.
+    """The points of one vertical."""
 
-    Attributes
-    ----------
-    height
-        Above the bed (points,) [m].
-    velocity, standard_error
-        (points,) [m/s]
-    depth
-        Of the water [m].
-    """
-
-    height: Array
+    height: Array  # above the bed (points,) [m]
+    # velocity, standard_error: (points,) [m/s]
     velocity: Array
     standard_error: Array
-    depth: float
+    depth: float  # of the water [m]
 
 
 @dataclass(frozen=True)
 class ProfileFit:
-    """u(z) = within + slope ln(max(z / top, 1)), slope = u* / kappa.
+    """u(z) = within + slope ln(max(z / top, 1)), slope = u* / kappa."""
 
-    Attributes
-    ----------
-    within
-        Uniform velocity below the top [m/s]; 0 without plants.
-    slope
-        Of the logarithmic part above it [m/s].
-    top
-        Canopy height inside plants, else the roughness height z_0 [m].
-    covariance
-        Of (within, slope, top), times scatter^2 (3, 3).
-    scatter
-        Root of the reduced chi-square, at least 1 [-]: scatter of the points over what their sampling errors explain.
-    """
-
-    within: float
-    slope: float
-    top: float
-    covariance: Array
+    within: float  # uniform velocity below the top [m/s]; 0 without plants
+    slope: float  # of the logarithmic part above it [m/s]
+    top: float  # canopy height inside plants, else the roughness height z_0 [m]
+    covariance: Array  # of (within, slope, top), times scatter^2 (3, 3)
+    # Root of the reduced chi-square, at least 1 [-]: scatter of the points over what their sampling errors explain
     scatter: float
 
     def velocity(self, height: Array) -> Array:
@@ -98,22 +76,13 @@ class CanopyUnknown(Enum):
 
 @dataclass(frozen=True)
 class CanopyHeight:
-    """Deflected canopy height above the bed.
+    """Deflected canopy height above the bed."""
 
-    Attributes
-    ----------
-    value, standard_error
-        [m]; NaN if the verticals show no canopy top.
-    columns
-        Number of verticals.
-    unknown
-        Why they show none, or None.
-    """
-
+    # value, standard_error: [m]; NaN if the verticals show no canopy top
     value: float
     standard_error: float
-    columns: int
-    unknown: CanopyUnknown | None = None
+    columns: int  # number of verticals
+    unknown: CanopyUnknown | None = None  # why they show none, or None
 
 
 def sampling_error(deviation: Array, duration: Array, time_scale: Array | float) -> Array:

@@ -25,43 +25,21 @@ TOO_SMALL = 0.001
 
 @dataclass(frozen=True)
 class ChiSquare:
-    """chi2 = |W (y - f)|^2 of a model, with W'W the inverse covariance of the errors of y - f.
+    """chi2 = |W (y - f)|^2 of a model, with W'W the inverse covariance of the errors of y - f."""
 
-    Attributes
-    ----------
-    value
-        chi2 [-].
-    freedom
-        Its degrees of freedom.
-    p
-        Chance of a chi2 as large under errors alone [-], NaN where it was not asked for.
-    """
-
-    value: float
-    freedom: int
-    p: float = float("nan")
+    value: float  # chi2 [-]
+    freedom: int  # its degrees of freedom
+    p: float = float("nan")  # chance of a chi2 as large under errors alone [-], NaN where it was not asked for
 
 
 @dataclass(frozen=True)
 class EstimatedErrors:
-    """The errors as estimated from the residuals.
+    """The errors as estimated from the residuals."""
 
-    Attributes
-    ----------
-    correlation
-        Of neighbours [-].
-    scale
-        True over stated errors [-].
-    grid_error
-        Root mean square error of the grid in velocities [m/s], NaN without any.
-    flagged
-        Rows of the stations rejected as outliers.
-    """
-
-    correlation: float
-    scale: float
-    grid_error: float
-    flagged: tuple[int, ...]
+    correlation: float  # of neighbours [-]
+    scale: float  # true over stated errors [-]
+    grid_error: float  # root mean square error of the grid in velocities [m/s], NaN without any
+    flagged: tuple[int, ...]  # rows of the stations rejected as outliers
 
     @property
     def clearly_larger(self) -> bool:
@@ -205,32 +183,20 @@ Reason = (
 
 @dataclass(frozen=True)
 class EffectFound:
-    """An accepted effect, and what it may be instead.
+    """An accepted effect, and what it may be instead."""
 
-    Attributes
-    ----------
-    name, title
-        Its name, with the place or instrument that it is limited to, and its title.
-    amplitude, interval95, unit
-        Size with its 95 % interval.
-    probability
-        Of it and of those alike together, among all that was tried [-].
-    alike
-        Effects that leave the same trace in these data.
-    rivals
-        Others with their probabilities, the likeliest first.
-    likelier, likelier_probability
-        A place that is likelier than every group of effects, and its probability [-]; None and NaN without one.
-    """
-
+    # name, title: its name, with the place or instrument that it is limited to, and its title
     name: str
     title: str
+    # amplitude, interval95, unit: size with its 95 % interval
     amplitude: float
     interval95: tuple[float, float]
     unit: str
-    probability: float
-    alike: tuple[str, ...] = ()
-    rivals: tuple[Rival, ...] = ()
+    probability: float  # of it and of those alike together, among all that was tried [-]
+    alike: tuple[str, ...] = ()  # effects that leave the same trace in these data
+    rivals: tuple[Rival, ...] = ()  # others with their probabilities, the likeliest first
+    # likelier, likelier_probability: a place that is likelier than every group of effects, and its probability [-];
+    # None and NaN without one
     likelier: LocalAnomaly | None = None
     likelier_probability: float = float("nan")
 
@@ -242,21 +208,11 @@ class EffectFound:
 
 @dataclass(frozen=True)
 class EffectsTested:
-    """How many effects were tested.
+    """How many effects were tested."""
 
-    Attributes
-    ----------
-    effects
-        How many.
-    candidates
-        As how many: one effect in one experiment, section, device or patch each.
-    testable
-        Effects that would be seen at twice a plausible size.
-    """
-
-    effects: int
-    candidates: int
-    testable: int
+    effects: int  # how many
+    candidates: int  # as how many: one effect in one experiment, section, device or patch each
+    testable: int  # effects that would be seen at twice a plausible size
 
 
 # What the model still lacks with all that was accepted.
@@ -271,18 +227,10 @@ class ErrorsStillLarger:
 
 @dataclass(frozen=True)
 class EffectsStillSignificant:
-    """Effects that are significant and were not accepted.
+    """Effects that are significant and were not accepted."""
 
-    Attributes
-    ----------
-    effects
-        Names with the family-wise p of each [-], the clearest first.
-    remainder
-        Whether they may be a remainder of what was accepted.
-    """
-
-    effects: tuple[tuple[str, float], ...]
-    remainder: bool
+    effects: tuple[tuple[str, float], ...]  # names with the family-wise p of each [-], the clearest first
+    remainder: bool  # whether they may be a remainder of what was accepted
 
 
 Remaining = ErrorsStillLarger | EffectsStillSignificant
@@ -318,66 +266,41 @@ class ImplausibleAmplitude:
 
 @dataclass(frozen=True)
 class EstimateAtBound:
-    """A calibrated parameter within PRESSES of an end of its prior: the bound decides its value.
+    """A calibrated parameter within PRESSES of an end of its prior: the bound decides its value."""
 
-    Attributes
-    ----------
-    parameter, value, unit
-        Its name and calibrated value.
-    low, high
-        The ends of its prior.
-    lower
-        Whether it is the lower one.
-    """
-
+    # parameter, value, unit: its name and calibrated value
     parameter: str
     value: float
     unit: str
+    # low, high: the ends of its prior
     low: float
     high: float
-    lower: bool
+    lower: bool  # whether it is the lower one
 
 
 @dataclass(frozen=True)
 class BeyondHandbook:
-    """A calibrated parameter beyond what a handbook has.
+    """A calibrated parameter beyond what a handbook has."""
 
-    Attributes
-    ----------
-    parameter, value, unit
-        Its name and calibrated value.
-    low, high
-        The range of the handbook.
-    source
-        Which handbook, and for what.
-    """
-
+    # parameter, value, unit: its name and calibrated value
     parameter: str
     value: float
     unit: str
+    # low, high: the range of the handbook
     low: float
     high: float
-    source: str
+    source: str  # which handbook, and for what
 
 
 @dataclass(frozen=True)
 class InflowDevelops:
-    """An accepted fault of the probes of a section near the inflow, where the profile over the depth may develop.
+    """An accepted fault of the probes of a section near the inflow, where the profile over the depth may develop."""
 
-    Attributes
-    ----------
-    effect
-        The fault.
-    distance, depths
-        Of the section behind the inflow [m], and over the depth [-].
-    length
-        Over which the profile develops [depths].
-    """
-
-    effect: str
+    effect: str  # the fault
+    # distance, depths: of the section behind the inflow [m], and over the depth [-]
     distance: float
     depths: float
-    length: float
+    length: float  # over which the profile develops [depths]
 
 
 @dataclass(frozen=True)
@@ -449,41 +372,23 @@ class StatedErrorsTooSmall:
 
 @dataclass(frozen=True)
 class InstrumentExcluded:
-    """An instrument whose readings are excluded.
+    """An instrument whose readings are excluded."""
 
-    Attributes
-    ----------
-    instrument
-        Which, and by how much it is off.
-    clear
-        Whether by more than `least`.
-    least
-        What chance or the model may make [standard errors].
-    """
-
-    instrument: FaultyInstrument
-    clear: bool
-    least: float
+    instrument: FaultyInstrument  # which, and by how much it is off
+    clear: bool  # whether by more than `least`
+    least: float  # what chance or the model may make [standard errors]
 
 
 @dataclass(frozen=True)
 class EffectsUntestable:
-    """Effects that these data cannot show.
+    """Effects that these data cannot show."""
 
-    Attributes
-    ----------
-    groups
-        Their names by the parameter whose change leaves their trace, '' for none.
-    effects, candidates
-        How many there are.
-    also
-        Whether others that are named elsewhere are untestable, too.
-    """
-
+    # Their names by the parameter whose change leaves their trace, '' for none
     groups: tuple[tuple[str, tuple[str, ...]], ...]
+    # effects, candidates: how many there are
     effects: int
     candidates: int
-    also: bool
+    also: bool  # whether others that are named elsewhere are untestable, too
 
 
 @dataclass(frozen=True)
@@ -495,55 +400,33 @@ class PlacesOnMap:
 
 @dataclass(frozen=True)
 class BedCorrected:
-    """A spot in which flow and survey put the bed elsewhere than the survey alone.
+    """A spot in which flow and survey put the bed elsewhere than the survey alone."""
 
-    Attributes
-    ----------
-    x, y, x_error, y_error
-        Middle with its standard errors [m].
-    length, width
-        Half length and half width [m].
-    change, interval95
-        Mean rise of the bed with its 95 % interval [m].
-    log_factor
-        ln of the Bayes factor against no mean error there [-].
-    local_log_factor
-        ln of that of a local error beside all that the survey leaves open [-].
-    between
-        x of the surveyed lines on both sides [m], NaN beyond the last.
-    """
-
+    # x, y, x_error, y_error: middle with its standard errors [m]
     x: float
     y: float
     x_error: float
     y_error: float
+    # length, width: half length and half width [m]
     length: float
     width: float
+    # change, interval95: mean rise of the bed with its 95 % interval [m]
     change: float
     interval95: tuple[float, float]
-    log_factor: float
-    local_log_factor: float
-    between: tuple[float, float]
+    log_factor: float  # ln of the Bayes factor against no mean error there [-]
+    local_log_factor: float  # ln of that of a local error beside all that the survey leaves open [-]
+    between: tuple[float, float]  # x of the surveyed lines on both sides [m], NaN beyond the last
 
 
 @dataclass(frozen=True)
 class MeasuredStretch:
-    """Velocities lie in a stretch of the model only.
+    """Velocities lie in a stretch of the model only."""
 
-    Attributes
-    ----------
-    low, high
-        Least and largest x of them [m].
-    length
-        Of the model [m].
-    effects
-        Of the case, those that act along the channel.
-    """
-
+    # low, high: least and largest x of them [m]
     low: float
     high: float
-    length: float
-    effects: tuple[str, ...]
+    length: float  # of the model [m]
+    effects: tuple[str, ...]  # of the case, those that act along the channel
 
 
 @dataclass(frozen=True)
@@ -562,72 +445,36 @@ class MisfitRemains:
 
 @dataclass(frozen=True)
 class CommandCompared:
-    """How the linear model of a command of `engine` was made, and how far it is from the command.
+    """How the linear model of a command of `engine` was made, and how far it is from the command."""
 
-    Attributes
-    ----------
-    repeated
-        How often its differences were taken.
-    parameters
-        How many there are.
-    errors
-        Root mean square difference at the last parameters [standard errors], NaN when unknown.
-    failure
-        Why the command gave nothing, '' when it did.
-    rough
-        Parameters whose differences are mostly noise.
-    settled
-        Whether the search for the best place settled.
-    careful
-        Whether sizes and chances have to be taken with care.
-    """
-
-    repeated: int
-    parameters: int
-    errors: float
-    failure: str
-    rough: tuple[str, ...]
-    settled: bool
-    careful: bool
+    repeated: int  # how often its differences were taken
+    parameters: int  # how many there are
+    errors: float  # root mean square difference at the last parameters [standard errors], NaN when unknown
+    failure: str  # why the command gave nothing, '' when it did
+    rough: tuple[str, ...]  # parameters whose differences are mostly noise
+    settled: bool  # whether the search for the best place settled
+    careful: bool  # whether sizes and chances have to be taken with care
 
 
 @dataclass(frozen=True)
 class ResultCompared:
-    """The flow of a finished run of another model beside that of the built-in engine, parameters alike, over wet cells.
+    """The flow of a finished run of another model beside that of the built-in engine, over wet cells."""
 
-    Attributes
-    ----------
-    code
-        The program.
-    velocity_share, level_share
-        Root mean square difference of the velocity vector over its mean size, and of the level over the mean depth [-].
-    area_share
-        Cells that are wet in one flow only, over those wet in theirs [-].
-    velocity, level
-        The root mean square differences [m/s, m].
-    beyond_mesh
-        Cells wet in ours where they have no mesh, over those wet in theirs [-].
-    discharge_spread
-        Standard deviation of their discharge along the channel over its mean [-].
-    measured
-        Root mean square difference of theirs, as it is, from the measured velocities [m/s], NaN without any.
-    alike
-        Whether all shares are within their limits, so that a diagnosis may use slopes of the built-in engine.
-    limits
-        Of the three shares [-].
-    """
-
-    code: str
+    code: str  # the program
+    # velocity_share, level_share: root mean square difference of the velocity vector over its mean size, and of the
+    # level over the mean depth [-]
     velocity_share: float
     level_share: float
-    area_share: float
+    area_share: float  # cells that are wet in one flow only, over those wet in theirs [-]
+    # velocity, level: the root mean square differences [m/s, m]
     velocity: float
     level: float
-    beyond_mesh: float
-    discharge_spread: float
+    beyond_mesh: float  # cells wet in ours where they have no mesh, over those wet in theirs [-]
+    discharge_spread: float  # standard deviation of their discharge along the channel over its mean [-]
+    # Root mean square difference of theirs, as it is, from the measured velocities [m/s], NaN without any
     measured: float
-    alike: bool
-    limits: tuple[float, float, float]
+    alike: bool  # whether all shares are within their limits, so that a diagnosis may use slopes of the built-in engine
+    limits: tuple[float, float, float]  # of the three shares [-]
 
 
 Note = (
