@@ -1,45 +1,44 @@
-"""One competition of everything that could explain a misfit: listed effects, places and instruments.
+"""The comparison of everything that could explain a misfit: listed effects, local anomalies and instruments.
 
     E_j = ln B_j + ln prior_j
     p_j ~ exp((E_j - max E) / w_j),   w_j = 1 + e^2 2 E_j
 
-Of each kind the most promising hypotheses are calibrated in earnest, and their evidence E is Laplace's (`refits`); of
-those of its kind that were not, it is the one to first order, corrected as that of the best of them. Instruments change
-no flow: to first order is exact for them but for the parameters; a surveyed line does, and the likeliest is calibrated
-without its level. Prior weights are in `score_test`. Chances are tempered: e is the relative error of a fingerprint.
-That of an effect in nature differs from the model's, whose cells and laws are not nature's: if much is explained,
-errors count as w^(1/2) times as large.
+The most promising hypotheses of each kind are calibrated with the model; their evidence E is Laplace's (`refits`). The
+others of that kind keep their evidence to first order, corrected as that of the best of them was. Instruments do not
+change the flow, so that first order is exact for them but for the parameters; of surveyed lines, which do, the most
+probable is calibrated without its level. Prior weights are in `score_test`. Probabilities are tempered by e, the
+relative error of a fingerprint: the cells and laws of a model are not those of nature, and the more a hypothesis
+explains the more this counts, as if errors were w^(1/2) times as large.
 
-Where something at a place lies is searched between the spots of the screening, in the flow that it leaves:
+The position of a local anomaly is searched between the spots of the screening, in the flow with that anomaly:
 
     ln B(x, y) = ln B_refit + b(x, y) - b(x_refit, y_refit)
 
-b is ln B to first order of the same thing at another place, in the flow with it (`score_test`): there its own wake is
-seen at its true size. The best of such places is refitted, until none promises more. Of the evidence, the spots of the
-screening near by are replaced by the mean over these places, which stand closer.
+b is ln B to first order of the same anomaly at another position (`score_test`), computed in the flow that has its wake
+at full size. The best position is refitted until no other is better. The spots of the screening nearby are then
+replaced by the mean over these positions, which are closer together.
 
-Hypotheses nearly as likely as the best are followed a step further, with all that would be taken then, as it competes
-there: to first order it promises more than it keeps. What is vaguer has to lead. Something at a
-place says "none of what is known", which is vague: all places together have to lead all that is known by
-known_first_odds. Which of the places is taken need not be sure: they say the same. A place that nothing rivals within
-strong_odds is taken as it is: nothing is followed beside it.
+Hypotheses almost as probable as the best are followed one step further, together with what would be accepted next:
+first order overestimates what that will explain. The less specific hypothesis has to lead. A local anomaly says "none
+of the known causes", so all positions together must lead all known causes by known_first_odds; which position is taken
+need not be certain. No other hypothesis is followed beside one that nothing rivals within strong_odds.
 
-An alarm names nothing by itself: it is sounded at its rate by errors alone. Only where all hypotheses together lead
-nothing by missing_odds is any taken, and that under errors as large as what the best of them leaves:
+A significant misfit alone names nothing: errors alone give one at a stated rate. A hypothesis is accepted only if all
+of them together lead "nothing is missing" by missing_odds, with errors as large as the best of them leaves:
 
     E'_j = E_j - (1 - 1/w) L_j,   w = max(1, chi2 / n)
 
-L is the part of E that is likelihood, and w the square of Birge's ratio, 1 unless errors alone would not leave as much.
-Effects that leave the same trace compete by E', too: their misfits differ by less than the model errs, and what is left
-then decides is how likely each is beforehand, at the size it needs.
+L is the part of E that is likelihood, and w the square of Birge's ratio, 1 unless errors alone would leave less. E'
+also compares effects with the same fingerprint: their misfits differ by less than the error of the model, and their
+prior probabilities, at the sizes they need, decide.
 
-What cannot be has no evidence: a bed that would move by more than the water is deep, water that would enter by more
-than flows (`possible_change`), and a listed effect beyond implausible_size that these data could not show at a
-plausible one. Something at a place keeps from the ends of the grid as the spots of
-the screening do, since nearer it only changes how the water enters or leaves.
+Impossible causes have no evidence: a bed that moves by more than the depth, water that enters by more than the
+discharge (`possible_change`), and a listed effect beyond implausible_size that these data could not show at a plausible
+one. Local anomalies stay as far from the ends of the grid as the spots of the screening, since nearer ones only change
+the boundary conditions.
 
-Smooth fields of a term (`field_scan`) are so free that they explain much of whatever is missing. They do not compete
-with a single cause, but with all that was accepted in the end.
+Smooth fields of a term (`field_scan`) explain much of any missing cause. They are compared with all that was accepted
+in the end, not with a single cause.
 """
 
 from collections.abc import Callable, Mapping, Sequence
