@@ -435,6 +435,7 @@ IMPORTED = [
     UnitsAssumed(("x", "y"), ("stems",)), ConfluenceAssumptions(0.02, 0.01, 0.001, 0.011, 0.15),
 ]  # fmt: skip
 CSV = Path("adv.csv")
+FILES = "site.yaml: `files.adv.csv`"
 AT_ROW = {"file": CSV, "row": 3}
 OF_SITE = {"known": ("low", "high"), "site": "site.yaml", "key": "experiments"}
 REFUSED = [
@@ -454,9 +455,17 @@ REFUSED = [
         )
     ),
     *(
-        InputError("invalid_json", file=Path("site.json"), line=2, column=14, why=why)
-        for why in ("Expecting property name enclosed in double quotes", "Extra data", "of another version of Python")
+        InputError("invalid_json", file=Path("site.json"), line=2, column=14, problem=problem)
+        for problem in ("key", "end", None)
     ),
+    InputError("no_options", where=FILES, got="'low'"),
+    InputError("unknown_option", where=FILES, key="experimnet", known=["columns", "experiment"]),
+    InputError("unknown_option", where=f"{FILES}.columns", key="Q3", known=["u", "x"]),
+    InputError("unexpected_option", where=f"{FILES}.line", expected="two points", got="[1, 2]"),
+    InputError("zero_on_map", where=FILES),
+    InputError("unknown_unit", where=f"{FILES}.units.u", quantity="velocity", got="cm/sek", known=["m/s", "cm/s"]),
+    InputError("no_scale", where=f"{FILES}.units.x", quantity="length", got="0 m"),
+    InputError("no_number_in_si", where=f"{FILES}.start[0]", unit="m", got="'far'"),
     *(InputError("no_result", file=Path("map.nc"), mesh=mesh) for mesh in (True, False)),
     InputError("no_geojson", file=Path("p.geojson"), what="polygons"),
     *(

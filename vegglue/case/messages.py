@@ -1,6 +1,5 @@
 """Why the schema refuses a file, as one sentence: where, what was expected, what came, what to do."""
 
-import difflib
 import json
 import re
 import textwrap
@@ -12,7 +11,6 @@ from vegglue.case.site_schema import Part
 from vegglue.case.text_files import case_name
 from vegglue.wording.sentences import phrase
 
-MOST_NAMED = 30  # words that one sentence lists; no part of a case has more keys
 OF_A_PAIR = 2  # numbers in a range, or in a place
 KeyPath = tuple[str | int, ...]
 
@@ -94,22 +92,12 @@ def refuse_unknown_without_value(tree: Mapping[str, Any], above: KeyPath = ()) -
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """The end of a sentence about an unknown word: the known word most like it, else all known ones."""
-    known = list(known)
-    if near := _most_like(word, known):
-        return f"did you mean `{near}`?"
-    more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
-    return f"known here are {', '.join(known[:MOST_NAMED]) or 'none'}{more}"
+    return phrase("nearest", word, list(known))
 
 
 def nearest_effect(word: str, known: Iterable[str]) -> str:
     """The end of a sentence about an unknown effect: the known one most like it, else where they are listed."""
-    near = _most_like(word, list(known))
-    return f"did you mean `{near}`?" if near else phrase("effects_listed")
-
-
-def _most_like(word: str, known: list[str]) -> str:
-    """The known word most like another, '' where none is."""
-    return next(iter(difflib.get_close_matches(word, known, n=1, cutoff=0.6)), "")
+    return phrase("nearest_effect", word, list(known))
 
 
 def dotted(place: KeyPath) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from vegglue.case.messages import nearest
 from vegglue.errors import InputError
 
 _FOOT, _SURVEY_FOOT = 0.3048, 1200.0 / 3937.0  # m, the international foot and that of the U.S. survey
@@ -105,7 +104,7 @@ def si_factor(word: str, quantity: str, where: str) -> float:
     """SI value of one unit [SI unit per unit]. InputError, which begins with `where`, for an unknown word."""
     unit = unit_named(word, quantity)
     if unit is None:
-        raise InputError(f"{where} expected a unit of {quantity}, got {word!r}: {nearest(word, UNITS[quantity])}")
+        raise InputError("unknown_unit", where=where, quantity=quantity, got=word, known=list(UNITS[quantity]))
     return UNITS[quantity][unit]
 
 
@@ -118,7 +117,7 @@ def scale_of_column(word: str, quantity: str, where: str) -> float:
         return si_factor(word, quantity, where)
     size = in_si(word, quantity, where)
     if not 0.0 < size < math.inf:
-        raise InputError(f"{where} expected a unit of {quantity}, or a scale above 0 such as 0.7 m, got {word!r}.")
+        raise InputError("no_scale", where=where, quantity=quantity, got=word)
     return size
 
 
@@ -132,8 +131,7 @@ def in_si(value: object, quantity: str, where: str) -> float:
     except ValueError:
         number = None
     if stated is None or number is None:
-        si = next(iter(UNITS[quantity]))
-        raise InputError(f"{where} expected a number in {si}, or one with its unit, got {value!r}; correct it.")
+        raise InputError("no_number_in_si", where=where, unit=next(iter(UNITS[quantity])), got=repr(value))
     # 82 cm is 0.82 m, and not 0.8200000000000001.
     return float(f"{number * si_factor(stated[2], quantity, where):.12g}")
 

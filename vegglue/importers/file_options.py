@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from vegglue.case.messages import dotted, expected_in_words, nearest, shown_value
+from vegglue.case.messages import dotted, expected_in_words, shown_value
 from vegglue.case.site_schema import Number
 from vegglue.errors import InputError
 from vegglue.importers.column_names import ROLES, UNITS, in_si, scale_of_column
@@ -25,7 +25,7 @@ def _by_role(given: Any) -> dict[str, str]:
         if name not in ROLES and str(value) in ROLES:
             raise ValueError(f"what is measured first, `{value}: {name}`")
         if name not in ROLES:
-            raise InputError(f" does not know `{name}`: {nearest(str(name), ROLES)}")
+            raise InputError("unknown_option", where="", key=str(name), known=list(ROLES))
     return {str(name): str(value) for name, value in given.items()}
 
 
@@ -108,22 +108,22 @@ class FileOptions:
 def read_file_options(given: Any, where: str) -> FileOptions:
     """The options in one entry of `files`. InputError, which begins with `where`, for what makes no sense."""
     if not isinstance(given, Mapping):
-        raise InputError(f"{where} expected keys and values, such as `experiment: low`, got {given!r}.")
-    known = FileOptions.__dataclass_fields__
+        raise InputError("no_options", where=where, got=repr(given))
+    known = list(FileOptions.__dataclass_fields__)
     for key in given:
         if key not in known:
-            raise InputError(f"{where} does not know `{key}`: {nearest(str(key), known)}")
+            raise InputError("unknown_option", where=where, key=str(key), known=known)
     try:
         options = TypeAdapter(FileOptions).validate_python(given)
     except ValidationError as error:
         problem = error.errors()[0]
         place, own = f"{where}.{dotted(problem['loc'])}", problem.get("ctx", {}).get("error")
-        if isinstance(own, InputError):  # which goes on from the name of the key
-            raise InputError(f"{place}{own}") from None
+        if isinstance(own, InputError):  # of a part of this key
+            raise InputError(own.kind, **(own.values | {"where": f"{place}{own.values['where']}"})) from None
         expected, got = expected_in_words(problem), shown_value(problem["input"])
-        raise InputError(f"{place} expected {expected}, got {got}; correct it.") from None
+        raise InputError("unexpected_option", where=place, expected=expected, got=got) from None
     if options.zero is None:
         return options
     if options.coordinates == "map":
-        raise InputError(f"{where} expected either `zero`, a place in the channel, or `coordinates: map`, got both.")
+        raise InputError("zero_on_map", where=where)
     return replace(options, coordinates="channel")

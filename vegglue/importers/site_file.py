@@ -292,6 +292,14 @@ OTHER_WORDS = {
 }  # fmt: skip
 
 
+# What is wrong with a text that is no JSON, by the messages of Python's parser, which has no other names for it.
+JSON_PROBLEMS = {
+    "Expecting property name": "key", "Expecting ':'": "colon", "Expecting ','": "comma", "Expecting value": "value",
+    "Extra data": "end", "Unterminated string": "quote", "Invalid control character": "line", "Invalid \\": "backslash",
+    "Illegal trailing comma": "last-comma",
+}  # fmt: skip
+
+
 def site_file(folder: Path) -> Path:
     """The site file of a folder: site.yaml if it is there, else site.json, which need not be."""
     return folder / "site.yaml" if (folder / "site.yaml").is_file() else folder / "site.json"
@@ -399,7 +407,8 @@ def read_keys(path: Path) -> Any:
     except RecursionError:
         raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
     except json.JSONDecodeError as error:
-        raise InputError("invalid_json", file=path, line=error.lineno, column=error.colno, why=error.msg) from None
+        found = next((one for start, one in JSON_PROBLEMS.items() if error.msg.startswith(start)), None)
+        raise InputError("invalid_json", file=path, line=error.lineno, column=error.colno, problem=found) from None
     except InputError:
         raise
     except ValueError:  # of Python's limit of digits
