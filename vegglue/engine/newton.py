@@ -147,21 +147,22 @@ def linearised_around(model: Model, z: Array, near: Point) -> list[Point | None]
     """
     flows = {experiment: near.flows[experiment] for experiment in model.case.experiments}
 
-    def solve(experiment: str, flow: SteadyFlow) -> ChordSolution:
+    def solve(experiment: str, flow: SteadyFlow) -> tuple[Problem, ChordSolution]:
         problem, start = problem_at(model, experiment, z), flow.state + flow.slopes @ (z - near.z).T
-        return chord_in_band(problem, start, flow.factors, flow.band, model.case.numerics.tolerance, MOST_STEPS_AROUND)
+        tolerance = model.case.numerics.tolerance
+        return problem, chord_in_band(problem, start, flow.factors, flow.band, tolerance, MOST_STEPS_AROUND)
 
     ends = in_threads(solve, list(flows.items()))
 
     def point(k: int) -> Point | None:
-        if not all(end.converged[k] for end in ends):
+        if not all(end.converged[k] for _, end in ends):
             return linearised(model, z[k], near, always) or linearised(model, z[k], None, always)
         found = {}
-        for (experiment, flow), end in zip(flows.items(), ends, strict=True):
+        for (experiment, flow), (problem, end) in zip(flows.items(), ends, strict=True):
             state = np.ascontiguousarray(end.state[..., [k]])
             moved = flow.moved + float(np.abs(state - flow.state).max())
             there = replace(flow, state=state, moved=moved)
-            read = _read_stations(model, experiment, problem_at(model, experiment, z[k]), state, flow.band)
+            read = _read_stations(model, experiment, take(problem, np.array([k])), state, flow.band)
             found[experiment] = there, read[0]
         return _point(model, z[k], found, always)
 
