@@ -187,13 +187,37 @@ def linearise(model: Model, z: Array, near: Point | None = None, wanted: Wanted 
 
 
 def linearise_from(model: Model, z: Array, near: Point | None) -> Point | None:
-    """`linearise` from a point nearby, and from afar if that fails or there is none."""
+    """f(z) and df/dz from a point nearby, and from afar if that fails or there is none.
+
+    Parameters
+    ----------
+    model, z, near
+        As `linearise`.
+
+    Returns
+    -------
+    Point or None
+        None if a flow has no steady state.
+    """
     found = None if near is None else linearise(model, z, near)
     return found or linearise(model, z)
 
 
 def linearise_around(model: Model, z: Array, near: Point) -> list[Point | None]:
-    """`linearise_from` a point at z (m, p) around it, for less than one by one."""
+    """f and df/dz at places around a point, for less than `linearise_from` one by one.
+
+    Parameters
+    ----------
+    model : Model
+    z : (m, p) [standard deviations of the prior]
+    near : Point
+        Of this model.
+
+    Returns
+    -------
+    list of Point or None
+        One for each place; None if a flow has no steady state.
+    """
     return model.engine.linearise_around(model, z, near)
 
 
@@ -233,7 +257,20 @@ def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
 
 
 def responses_at(model: Model, points: Sequence[Point], causes: Sequence[Cause]) -> Array:
-    """`responses` at points of the same experiments (points, n, causes), for less than one by one."""
+    """df / d(amplitude - off)^power at off, for less than `responses` at one point after the other.
+
+    Parameters
+    ----------
+    model : Model
+    points : sequence of Point
+        Of the same experiments.
+    causes : sequence of Cause
+
+    Returns
+    -------
+    (points, n, causes)
+        [unit of each station per unit of the gain]
+    """
     return model.engine.responses(model, points, causes)
 
 
@@ -258,14 +295,36 @@ def responses_to_cells(model: Model, point: Point, experiment: str, terms: Seque
 
 
 def relinearised(model: Model, point: Point) -> Point:
-    """The point with nothing reused from a flow nearby: its responses to cells are exact to a per cent."""
+    """The point with nothing reused from a flow nearby: its responses to cells are exact to a per cent.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+
+    Returns
+    -------
+    Point
+        The same z and predictions.
+    """
     return model.engine.relinearised(model, point)
 
 
 def linearise_as_coarse(model: Model, point: Point, before: Point, after: Point) -> Point | None:
-    """`linearise` at the z of `after`, a point on cells of twice the size, from a point whose own on these is `before`.
+    """f(z) and df/dz at the z of a point on coarser cells, from the flow that moved as the coarse one did.
 
-    The case may have an effect more or less at `after`.
+    Parameters
+    ----------
+    model : Model
+    point : Point
+        To start from.
+    before, after : Point
+        On cells of twice the size: at the z of `point`, and where f is wanted, maybe with an effect more or less.
+
+    Returns
+    -------
+    Point or None
+        None if a flow has no steady state.
     """
     start = model.engine.with_coarse_correction(point, before, after)
     return linearise(model, after.z, start) or linearise_from(model, after.z, after)

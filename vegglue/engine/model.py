@@ -31,20 +31,50 @@ LONG_CELL = 2.0
 
 
 def model_of(case: Case, observations: Observations, engine: Engine = NEWTON) -> Model:
-    """The case on its grid, read where it was measured."""
+    """The case on its grid, read where it was measured.
+
+    Parameters
+    ----------
+    case : Case
+    observations : Observations
+    engine : Engine
+        How flows are computed, by the built-in solver if not given.
+
+    Returns
+    -------
+    Model
+    """
     return Model(case, build_site(case), observations.table, engine)
 
 
 def coarser(model: Model) -> Model | None:
-    """The model on coarser cells, see `coarser_grid`; None where there are none."""
+    """The model on cells of twice the size.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    Model or None
+        None if there are no such cells, see `coarser_grid`.
+    """
     found = coarser_grid(model.case, model.site)
     return None if found is None else replace(model, case=found[0], site=found[1])
 
 
 def coarser_grid(case: Case, site: Site) -> tuple[Case, Site] | None:
-    """The case on cells of twice the size, or of twice the width only where they are more than twice as long as wide.
+    """The case on cells of twice the size, or of twice the width only if they are more than twice as long as wide.
 
-    None where their number is odd or would become too small, or an inflow or the outlet would hold no cell centre.
+    Parameters
+    ----------
+    case : Case
+    site : Site
+
+    Returns
+    -------
+    (Case, Site) or None
+        None if their number is odd or would become too small, or an inflow or the outlet would have no cell centre.
     """
     grid = site.grid
     along = 1 if grid.dx > LONG_CELL * grid.dy else 2

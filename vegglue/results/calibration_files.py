@@ -202,7 +202,17 @@ def write_spotpy(
     """Write members as SPOTPY's CSV database, which `spotpy.analyser.load_csv_results` reads: like1, one column for
     each parameter (par...), one for each station (simulation_...), and chain.
 
-    names: of the columns by parameter; theta: (member,) each; prediction (member, station); like, chain (member,).
+    Parameters
+    ----------
+    path : Path
+    names : mapping of str to str
+        Of the columns, by parameter.
+    theta : mapping of str to (member,)
+        By parameter [its unit].
+    prediction : (member, station)
+        [unit of the kind]
+    like, chain : (member,)
+        Log-likelihood [-], and number of the chain.
     """
     heading = ["like1", *(f"par{names[one]}" for one in theta)]
     heading += [*(f"simulation_{number}" for number in range(prediction.shape[1])), "chain"]
@@ -236,6 +246,16 @@ def solved_rows(ensemble: Ensemble) -> NDArray[np.int64]:
 def read_parameters(path: Path, case: Case) -> dict[str, Array]:
     """Members of a CSV with one row each: a column for each parameter, by its name, or that of `pest_names` in any
     case, and at most one that names the members.
+
+    Parameters
+    ----------
+    path : Path
+    case : Case
+
+    Returns
+    -------
+    dict of str to (member,)
+        By parameter [its unit].
 
     Raises
     ------

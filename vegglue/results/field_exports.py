@@ -34,10 +34,23 @@ LONGEST_ATTRIBUTE = 60_000  # bytes of a text of fixed length; HDF5 has room for
 
 
 def write_geotiff(path: Path, values: Array, grid: Grid, frame: Frame | None) -> None:
-    """Write values (nx, ny) at cell centres, NaN where there is none, as float64.
+    """Write a GeoTIFF of float64, whose pixel (column, row) lies at x = x_0 + column dx, y = y_1 - row dy.
 
-    A pixel (column, row) lies at x = x_0 + column dx, y = y_1 - row dy, which the frame turns onto the map.
-    Errors: InputError without tifffile; StorageError.
+    Parameters
+    ----------
+    path : Path
+    values : (nx, ny)
+        At cell centres; NaN where there is none.
+    grid : Grid
+    frame : Frame, optional
+        Turns x and y onto the map.
+
+    Raises
+    ------
+    InputError
+        Without tifffile.
+    StorageError
+        If it cannot be written.
     """
     try:
         import tifffile
@@ -101,12 +114,28 @@ def on_the_map(x: Array, y: Array, grid: Grid, frame: Frame | None) -> tuple[Arr
 def write_mesh(
     path: Path, flows: Mapping[str, FlowFields], grid: Grid, frame: Frame | None, attributes: Mapping[str, str]
 ) -> None:
-    """Write the fields of all experiments, one variable for each quantity and experiment, u_June; NaN where dry.
+    """Write a UGRID mesh with one variable for each quantity and experiment, such as u_June; NaN where dry.
 
     For map programs all text has a fixed length, the components of the velocity on the map have long names that make
     them a vector, and nodes name the coordinate system: QGIS's reader of meshes finds these in no other way.
 
-    Errors: InputError without xarray; StorageError.
+    Parameters
+    ----------
+    path : Path
+    flows : mapping of str to FlowFields
+        By experiment.
+    grid : Grid
+    frame : Frame, optional
+        Turns x and y onto the map.
+    attributes : mapping of str to str
+        Of the file.
+
+    Raises
+    ------
+    InputError
+        Without xarray.
+    StorageError
+        If it cannot be written.
     """
     xarray = extra_library("xarray", "field", "vegglue export")
     extra_library(ENGINE, "field", "vegglue export")
@@ -204,7 +233,16 @@ def _system(frame: Frame | None) -> dict[str, Any]:
 
 
 def write_field_table(path: Path, flow: FlowFields, grid: Grid, frame: Frame | None) -> None:
-    """One row a cell: x, y, east, north of its centre [m], then the quantities with their units; nothing where dry."""
+    """Write a CSV with one row a cell: x, y, east, north of its centre [m], then the quantities; nothing where dry.
+
+    Parameters
+    ----------
+    path : Path
+    flow : FlowFields
+    grid : Grid
+    frame : Frame, optional
+        Turns x and y onto the map.
+    """
     x, y = (part.ravel() for part in np.meshgrid(flow.x, flow.y, indexing="ij"))
     found = quantities(flow, grid, frame)
     heading = [f"{name} [{QUANTITIES_OF_FLOW[name]}]" for name in found]
@@ -215,9 +253,18 @@ def write_field_table(path: Path, flow: FlowFields, grid: Grid, frame: Frame | N
 def write_station_table(
     path: Path, station: Mapping[str, Array], predicted: Array | None, grid: Grid, frame: Frame | None
 ) -> None:
-    """One row a station, as the case reads them, with places on the map; and what the model gives there, if known.
+    """Write a CSV with one row a station, as the case reads them, with places on the map.
 
-    station: columns (station,) of Observations.table.
+    Parameters
+    ----------
+    path : Path
+    station : mapping of str to (station,)
+        Columns of `Observations.table`.
+    predicted : (station,), optional
+        What the model gives there [unit of the kind].
+    grid : Grid
+    frame : Frame, optional
+        Turns x and y onto the map.
     """
     x, y = station["x"].astype(float), station["y"].astype(float)
     names = ("experiment", "kind", "section", "value", "standard_error", "used", "reason")

@@ -112,9 +112,22 @@ def read_fields(path: Path, expected_hash: str | None = None) -> Fields:
 
 
 def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: str) -> None:
-    """Write a posterior with the resolved config it was inferred under, replacing an older file only when it is whole.
+    """Write a posterior with its config, replacing an older file only when it is whole.
 
-    Errors: StorageError when it cannot be written.
+    Parameters
+    ----------
+    path : Path
+        `posterior.h5`.
+    posterior : Posterior
+    config : str
+        The resolved config that it was inferred under, as YAML.
+    config_hash : str
+        Of that config and its data.
+
+    Raises
+    ------
+    StorageError
+        If it cannot be written.
     """
     own = {"config": config, "config_hash": config_hash, "format": POSTERIOR_FORMAT}
     write_whole(path, posterior_groups(posterior), posterior_attributes(posterior) | own)
@@ -141,7 +154,21 @@ def read_posterior(path: Path, expected_hash: str | None = None, config: Path | 
 
 
 def write_diagnosis(path: Path, diagnosis: Diagnosis, config: str, config_hash: str) -> None:
-    """Write a diagnosis with the resolved config it was made under; errors as those of write_posterior."""
+    """Write a diagnosis with its config, replacing an older file only when it is whole.
+
+    Parameters
+    ----------
+    path : Path
+        `diagnosis.h5`.
+    diagnosis : Diagnosis
+    config, config_hash
+        As `write_posterior`.
+
+    Raises
+    ------
+    StorageError
+        If it cannot be written.
+    """
     own = {"config": config, "config_hash": config_hash, "format": DIAGNOSIS_FORMAT}
     write_whole(path, diagnosis_groups(diagnosis), diagnosis_attributes(diagnosis) | own)
 
@@ -167,7 +194,20 @@ def read_diagnosis(path: Path, expected_hash: str | None = None) -> Diagnosis:
 
 
 def diagnosis_that_fits(path: Path, config_hash: str) -> Diagnosis | None:
-    """The diagnosis of exactly this config, None when there is none or only one of another state or another format."""
+    """The diagnosis of exactly this config, if it is kept.
+
+    Parameters
+    ----------
+    path : Path
+        `diagnosis.h5`.
+    config_hash : str
+        That of the config which it has to be of.
+
+    Returns
+    -------
+    Diagnosis or None
+        None without one, or with one of another config or format.
+    """
     fits = stored_hash(path) == config_hash and stored_attribute(path, "format") == DIAGNOSIS_FORMAT
     return read_diagnosis(path) if fits else None
 
@@ -175,13 +215,44 @@ def diagnosis_that_fits(path: Path, config_hash: str) -> Diagnosis | None:
 def write_flow(
     path: Path, flow: Mapping[str, FlowFields], theta: Mapping[str, float], config: str, config_hash: str
 ) -> None:
-    """Write the flow by experiment that was solved with the parameters theta; errors as those of write_posterior."""
+    """Write the flow of all experiments with its config.
+
+    Parameters
+    ----------
+    path : Path
+        `flow.h5`.
+    flow : mapping of str to FlowFields
+        By experiment.
+    theta : mapping of str to float
+        The parameters that it was solved with [their units].
+    config, config_hash
+        As `write_posterior`.
+
+    Raises
+    ------
+    StorageError
+        If it cannot be written.
+    """
     own = {"config": config, "config_hash": config_hash, "format": FLOW_FORMAT}
     write_whole(path, flow_groups(flow), flow_attributes(theta) | own)
 
 
 def flow_that_fits(path: Path, config_hash: str, theta: Mapping[str, float]) -> dict[str, FlowFields] | None:
-    """The flow of exactly this config and these parameters, None when there is none or only another one."""
+    """The flow of exactly this config and these parameters, if it is kept.
+
+    Parameters
+    ----------
+    path : Path
+        `flow.h5`.
+    config_hash : str
+    theta : mapping of str to float
+        [their units]
+
+    Returns
+    -------
+    dict of str to FlowFields, or None
+        By experiment.
+    """
     wanted = flow_attributes(theta) | {"config_hash": config_hash, "format": FLOW_FORMAT}
     if any(stored_attribute(path, name) != value for name, value in wanted.items()):
         return None
