@@ -15,9 +15,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from vegglue.arrays import Array
-from vegglue.calibration.candidates import Candidate, instruments_of, offset_columns, plausible_offset
+from vegglue.calibration.candidates import Candidate, cause_of, instruments_of, offset_columns, plausible_offset
 from vegglue.calibration.detection import PLANNED_POWER, detected_length, detection_chance, single_threshold
-from vegglue.calibration.fingerprints import Fingerprints, places_of
+from vegglue.calibration.fingerprints import Fingerprints, consecutive_columns, places_of
 from vegglue.calibration.model_error import EFFECT_AT_PLACE
 from vegglue.calibration.noise import Noise, draw_whitened_errors, noise_of, with_grid_error, with_model_error
 from vegglue.calibration.residual_screening import kind_of_listed, kinds_of_instruments, kinds_of_places
@@ -37,7 +37,7 @@ from vegglue.diagnosis.plan_model import (
     with_chosen,
 )
 from vegglue.diagnosis.plan_search import NAMED_AT, chances_named, first_competition, plan_search
-from vegglue.engine.interface import Model, Point
+from vegglue.engine.interface import Model, Point, responses
 from vegglue.errors import InputError
 from vegglue.normal_range import NORMAL95
 from vegglue.progress import Progress, Watch, silent
@@ -62,6 +62,8 @@ SIMILAR_FROM = 0.7
 SIMILAR_SHOWN = 3
 # Sizes at which a chance is computed, down to 1e-4 of the furthest, and of the prior [-].
 SIZES_TRIED, SIZES_OF_PRIOR = 120, 40
+# Shapes between its settings at which an effect is thought to be, for each that has any.
+SETTINGS_BETWEEN = 3
 # Draws of errors alone for the alarm [-]: 50 lie beyond the 95 % point.
 ALARM_DRAWS = 1000
 
@@ -201,15 +203,23 @@ def shown_by(wide: PlanModel) -> ShownByPlan:
     point = Point(draw.point.z, draw.point.prediction[known], draw.point.slope[known], flows)
     noise = with_grid_error(noise_of(station), wide.grid_error[known] / constants().grid_error_share)
     noise = with_model_error(noise, _after_survey(draw.shared, known, wide.surveyed, wide.error))
+    numbers = [len(one.settings()) for one in wide.candidates]
+    drawn = [SETTINGS_BETWEEN if number > 1 else 0 for number in numbers]
     settings = [(one, shapes) for one in wide.candidates for shapes in one.settings()]
+    between = [
+        (one, one.drawn_shapes(np.random.default_rng((j, k))))
+        for j, one in enumerate(wide.candidates) for k in range(drawn[j])
+    ]  # fmt: skip
+    causes = [cause_of(draw.model.case, one, shapes) for one, shapes in (*settings, *between)]
+    values = responses(replace(draw.model, station=station), point, causes)
     prints = Fingerprints(
         point=point,
         candidates=list(wide.candidates),
-        columns=wide.columns,
+        columns=consecutive_columns(numbers),
         settings=[shapes for _, shapes in settings],
         amplitudes=[one.amplitude for one, _ in settings],
-        causes=[],
-        values=wide.values[known],
+        causes=causes[: len(settings)],
+        values=values[:, : len(settings)],
         places=places_of(model, point, half_width(model.site)),
     )
     slope = noise.whiten(point.slope)
@@ -235,9 +245,8 @@ def shown_by(wide: PlanModel) -> ShownByPlan:
         str(term): np.abs(units.T @ one.units).max(axis=1, initial=0.0) for term, one in in_places.items()
     }
     whole = np.maximum(np.linalg.norm(white, axis=0), 1e-300), np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
-    between = [wide.between[known][:, wide.between_of == j] for j in range(len(wide.candidates))]
-    truths = [against(some if some.size else prints.values[:, own])
-              for some, own in zip(between, prints.columns, strict=True)]  # fmt: skip
+    truths = [against(values[:, len(settings) + others if others.size else own])
+              for others, own in zip(consecutive_columns(drawn), prints.columns, strict=True)]  # fmt: skip
     competition = first_competition(kinds, prints.columns, list(in_places), errors, level)
     return ShownByPlan(
         noise=noise,
@@ -276,15 +285,16 @@ def _effects(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedEffect, ...]:
         one, column = prints.candidates[j], best[j]
         amplitude, relative = one.amplitude, shown.relative[:, j]
 
-        def chances(size: float) -> Array:
-            """That a size is named, of each draw."""
+        def chances(size: Array) -> Array:
+            """That sizes (k,) are named, at each draw (k, draw)."""
             gain = size**amplitude.power
-            bent = 1.0 + bending[j] * gain / amplitude.plausible_gain
-            length = gain / bent * shown.lengths[j][:, None] * relative
-            return np.asarray(np.interp(length, NAMED_AT, shown.named[j]).mean(axis=0))
+            bent = gain / (1.0 + bending[j] * gain / amplitude.plausible_gain)
+            length = bent[:, None, None] * shown.lengths[j][:, None] * relative
+            return np.asarray(np.interp(length, NAMED_AT, shown.named[j]).mean(axis=1))
 
         sizes = amplitude.furthest * np.geomspace(1e-4, 1.0, SIZES_TRIED)
-        of_sizes = np.array([chances(float(size)) for size in sizes])
+        of_sizes = chances(sizes)
+        of_prior = chances(np.minimum(amplitude.scale * quantiles, amplitude.furthest))
         of_draws = [_first_at(sizes, one, PLANNED_POWER) for one in of_sizes.T]
         others = [
             Confusion(other.name, float(cosines[column, best[k]]))
@@ -303,8 +313,8 @@ def _effects(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedEffect, ...]:
             worst=max(of_draws),
             plausible=amplitude.scale,
             furthest=amplitude.furthest,
-            chance_plausible=float(chances(min(amplitude.scale, amplitude.furthest)).mean()),
-            chance=float(np.mean([chances(min(amplitude.scale * size, amplitude.furthest)) for size in quantiles])),
+            chance_plausible=float(chances(np.array([min(amplitude.scale, amplitude.furthest)])).mean()),
+            chance=float(of_prior.mean()),
             visibility=float(shown.visible[column]),
             confused=tuple(sorted(others, key=lambda other: -other.cosine)[:SIMILAR_SHOWN]),
             place=Confusion(nearest, terms[nearest]) if terms.get(nearest, 0.0) > SIMILAR_FROM else None,

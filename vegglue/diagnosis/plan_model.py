@@ -12,13 +12,13 @@ from scipy.linalg import hadamard
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import FEWEST_CELLS_ACROSS, START_SPREAD
-from vegglue.calibration.candidates import Candidate, candidates_of, cause_of, effect_entry
+from vegglue.calibration.candidates import Candidate, candidates_of, cause_of
 from vegglue.calibration.detection import own_and_shared, trace_lengths
-from vegglue.calibration.fingerprints import consecutive_columns
 from vegglue.calibration.fit import prediction_at
 from vegglue.calibration.model_error import error_bases, model_error_columns
 from vegglue.case.channel_geometry import cells_across, expected_depth
 from vegglue.case.gridded_site import build_site, in_experiment
+from vegglue.case.parameter_space import z_of
 from vegglue.case.schema import Case, Planned, PlannedDischarge, PlannedGauge, PlannedPoint, PlannedTransect
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
@@ -30,6 +30,7 @@ from vegglue.engine.interface import (
     linearise,
     linearise_around,
     linearise_from,
+    predict,
     responses,
     responses_at,
 )
@@ -38,7 +39,7 @@ from vegglue.engine.newton import on_half_as_many_cells
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import KINDS, STREAMWISE
 from vegglue.measurements.observations import section_places, station_table
-from vegglue.parallel import in_threads
+from vegglue.parallel import in_threads, submit
 from vegglue.results.plan import KIND_OF_WORK, PlannedPiece, Work
 
 # Places around the middle of the prior at which lengths of traces are computed, on the coarsest cells [-]: of up to
@@ -49,8 +50,6 @@ LARGEST_LENGTH_RATIO = 10.0
 # Stages whose effects leave shorter traces than to first order: 0.2 to 0.95 of them at a plausible size in the channel
 # and the reach of docs/plan.md; at the others both signs together leave 0.97 to 1.08 of them.
 BENDING_STAGES = ("plants", "resistance", "exchange", "force")
-# Shapes between its settings at which an effect is thought to be, for each that has any.
-SETTINGS_BETWEEN = 3
 # Other discharges that are thought of, relative to the lowest one of the case; above the highest one HIGHER.
 LOWER_DISCHARGES = (0.5,)
 # Depth below which no velocity is measured [m]: a propeller is covered.
@@ -66,9 +65,9 @@ TWELFTHS, MOST_ADDED_PLACES, MOST_PATCHES = 12, 20, 8
 
 @dataclass(frozen=True)
 class PlanDraw:
-    """A place of the prior on some cells: the slopes (N, p), fingerprints of one setting of each candidate (N, k),
-    shared errors (N, q), and errors as `errors_of` gives them of all rows: stations of the plan and of what could be
-    added, and behind them the bed levels of lines that could be surveyed.
+    """A place of the prior on some cells: the slopes (N, p), fingerprints of one setting of each candidate (N, k), and
+    shared errors (N, q) of all rows: stations of the plan and of what could be added, and behind them the bed levels
+    of lines that could be surveyed.
     """
 
     model: Model
@@ -76,7 +75,6 @@ class PlanDraw:
     slope: Array
     values: Array
     shared: Array
-    errors: tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -84,11 +82,10 @@ class PlanModel:
     """All that is needed of a case before measuring.
 
     case: on its own cells; known: rows of the stations of the plan; surveyed: those of the bed levels of its lines;
-    rows: of each piece that could be added; error (N,): standard errors; grid_error (N,), see `noise`. values (N, c):
-    fingerprints of every setting of the candidates, by column: `columns`; between: more of each candidate with shapes,
-    drawn between its settings as nature does (N, b), and the candidate of each (b,). draws: the middle of the priors on
-    the cells of the search, with every flow that is or could be measured; then the middle and places around it on the
-    coarsest cells. at_plausible_size (N, c, 2), see `bending_of`.
+    rows: of each piece that could be added; error (N,): standard errors; grid_error (N,), see `noise`. draws: the
+    middle of the priors on the cells of the search, with every flow that is or could be measured; then the middle and
+    places around it on the coarsest cells; errors: of all rows at each, see `errors_of`. at_plausible_size (N, c, 2),
+    see `bending_of`.
     """
 
     case: Case
@@ -99,26 +96,14 @@ class PlanModel:
     error: Array
     grid_error: Array
     candidates: tuple[Candidate, ...]
-    values: Array
-    between: Array
-    between_of: np.ndarray
     draws: tuple[PlanDraw, ...]
+    errors: tuple[tuple[Array, Array], ...]
     at_plausible_size: Array
 
     @property
     def model(self) -> Model:
         """On the cells of the search."""
         return self.draws[0].model
-
-    @property
-    def columns(self) -> list[np.ndarray]:
-        """Columns of `values` of each candidate."""
-        return setting_columns(self.candidates)
-
-
-def setting_columns(candidates: Sequence[Candidate]) -> list[np.ndarray]:
-    """Columns of all settings of each candidate, side by side."""
-    return consecutive_columns([len(one.settings()) for one in candidates])
 
 
 def water_across(model: Model, experiment: str, x: float) -> tuple[Array, Array]:
@@ -377,7 +362,26 @@ def _plan_model(
     coarsest = in_own_flows(coarser(search) or search)
     places_of_prior = places_of_draws(len(model.names))
     middle, around = places_of_prior[0], places_of_prior[1:]
+    usual = [(one, usual_shapes(one)) for one in candidates]
+
+    def draws(of: Model, points: Sequence[Point]) -> list[PlanDraw]:
+        of_each = responses_at(of, points, _causes(of, usual)) if points else ()
+
+        def draw(point: Point, values: Array) -> PlanDraw:
+            of_model = model_error_columns(of, point, of.case.model_error)
+            levels = _bed_levels(of, np.reshape(places, (-1, 2)), of_model.shape[1])
+            slope = _with_rows(np.nan_to_num(point.slope), len(places))
+            return PlanDraw(of, point, slope, _with_rows(values, len(places)), np.vstack([of_model, levels]))
+
+        return in_threads(draw, list(zip(points, of_each, strict=True)))
+
+    def draws_around(below: Point) -> list[PlanDraw]:
+        near = [below, *linearise_around(coarsest, around, below)]
+        return draws(coarsest, [one for one in near if one is not None])
+
     below = linearise(coarsest, middle)
+    # Beside what follows: on few cells most is done by the interpreter, on many by compiled loops.
+    on_coarsest = None if below is None else submit(draws_around, below)
     start = linearise_from(search, middle, None if coarsest.site is search.site else below)
     if start is None:
         return None
@@ -389,27 +393,10 @@ def _plan_model(
     of_stations = here.station["standard_error"].to_numpy(float)
     error = np.concatenate([of_stations, np.full(len(places), planned.errors.survey)])
     grid_error = constants().grid_error_share * np.concatenate([difference, np.zeros(len(places))])
-    settings = [(one, shapes) for one in candidates for shapes in one.settings()]
-    shaped = [j for j, one in enumerate(candidates) if len(one.settings()) > 1]
-    seeds = [(j, k) for j in shaped for k in range(SETTINGS_BETWEEN)]
-    between = [(seed[0], candidates[seed[0]].drawn_shapes(np.random.default_rng(seed))) for seed in seeds]
-    wanted = [*settings, *((candidates[j], shapes) for j, shapes in between)]
-    every = _with_rows(responses(search, start, _causes(search, wanted)), len(places))
-    one_each = np.array([columns[columns.size // 2] for columns in setting_columns(candidates)], dtype=int)
-
-    def draw(of: Model, point: Point, values: Array) -> PlanDraw:
-        of_model = model_error_columns(of, point, of.case.model_error)
-        levels = _bed_levels(of, np.reshape(places, (-1, 2)), of_model.shape[1])
-        slope = _with_rows(np.nan_to_num(point.slope), len(places))
-        shared = np.vstack([of_model, levels])
-        return PlanDraw(of, point, slope, values, shared, errors_of(error, grid_error, slope, shared))
-
-    near = [] if below is None else [below, *linearise_around(coarsest, around, below)]
-    points = [one for one in near if one is not None]
-    of_each = responses_at(coarsest, points, _causes(coarsest, [settings[j] for j in one_each])) if points else ()
-    tasks = [(coarsest, *one) for one in zip(points, (_with_rows(one, len(places)) for one in of_each), strict=True)]
-    of_search, *drawn_there = in_threads(draw, [(search, start, every[:, one_each]), *tasks])
-    unknown = np.full((error.size, len(candidates), 2), np.nan)
+    of_search = draws(search, [start])
+    changes = None if below is None else _at_plausible_size(coarsest, below, candidates)
+    unknown = np.full((len(here.station), len(candidates), 2), np.nan)
+    every = (*of_search, *(on_coarsest() if on_coarsest else ()))
     return PlanModel(
         case=model.case,
         known=np.arange(len(stations)),
@@ -419,12 +406,16 @@ def _plan_model(
         error=error,
         grid_error=grid_error,
         candidates=tuple(candidates),
-        values=every[:, : len(settings)],
-        between=every[:, len(settings) :],
-        between_of=np.array([j for j, _ in between], dtype=int),
-        draws=(of_search, *drawn_there),
-        at_plausible_size=_at_plausible_size(drawn_there[0], candidates) if drawn_there else unknown,
+        draws=every,
+        errors=tuple(in_threads(errors_of, [(error, grid_error, one.slope, one.shared) for one in every])),
+        at_plausible_size=_with_rows(unknown if changes is None else changes, len(places)),
     )
+
+
+def usual_shapes(candidate: Candidate) -> dict[str, float]:
+    """The middle one of its settings."""
+    settings = candidate.settings()
+    return settings[len(settings) // 2]
 
 
 def errors_of(error: Array, grid_error: Array, slope: Array, shared: Array) -> tuple[Array, Array]:
@@ -464,27 +455,25 @@ def ratios_of_lengths(lengths: Array) -> Array:
     return np.asarray(np.where(middle > 1e-9, ratio, 1.0))
 
 
-def _at_plausible_size(draw: PlanDraw, candidates: Sequence[Candidate]) -> Array:
-    """Changes of all rows by each candidate at a plausible size, up and down (N, c, 2), NaN where there is no flow, the
-    size is not possible, or the stage is none of BENDING_STAGES.
+def _at_plausible_size(model: Model, point: Point, candidates: Sequence[Candidate]) -> Array:
+    """Changes of predictions by each candidate at a plausible size, up and down (n, c, 2), 0 in flows that the point
+    does not have; NaN where there is no flow, the size is not possible, or the stage is none of BENDING_STAGES.
     """
-    case = draw.model.case
+    here = np.flatnonzero(model.station["experiment"].isin(list(point.flows)))
+    station = model.station.iloc[here].reset_index(drop=True)
+    found = np.full((len(model.station), len(candidates), 2), np.nan)
 
-    def change(one: Candidate, sign: float) -> Array | None:
-        amplitude = one.amplitude
-        value = amplitude.off + sign * min(amplitude.scale, amplitude.furthest)
-        if one.effect.stage not in BENDING_STAGES or not amplitude.low <= value <= amplitude.high:
-            return None
-        entry = effect_entry(one, value, one.settings()[len(one.settings()) // 2])
-        there = case.model_copy(update={"effects": {**case.effects, one.key: entry}})
-        found = prediction_at(replace(draw.model, case=there), draw.point.z, draw.point)
-        return None if found is None else np.nan_to_num(found - draw.point.prediction)
+    def change(j: int, one: Candidate) -> None:
+        amplitude, cause = one.amplitude, cause_of(model.case, one, usual_shapes(one))
+        sizes = amplitude.off + min(amplitude.scale, amplitude.furthest) * np.array([1.0, -1.0])
+        prior = cause.case.parameters[cause.parameter]
+        possible = np.flatnonzero((amplitude.low <= sizes) & (sizes <= amplitude.high))
+        z = np.array([[*point.z, z_of(prior, float(size))] for size in sizes[possible]])
+        there = predict(replace(model, case=cause.case, station=station), [point], z)
+        found[:, j, possible] = 0.0
+        found[np.ix_(here, np.array([j]), possible)] = (there - point.prediction[here]).T[:, None]
 
-    found = np.full((len(draw.values), len(candidates), 2), np.nan)
-    wanted = [(one, sign) for one in candidates for sign in (1.0, -1.0)]
-    for k, values in enumerate(in_threads(change, wanted)):
-        if values is not None:
-            found[:, k // 2, k % 2] = np.concatenate([values, np.zeros(len(found) - values.size)])
+    in_threads(change, [(j, one) for j, one in enumerate(candidates) if one.effect.stage in BENDING_STAGES])
     return found
 
 
@@ -508,7 +497,7 @@ def bending_of(wide: PlanModel) -> Array:
     traces = np.hstack([draw.values * gains, *np.moveaxis(np.nan_to_num(wide.at_plausible_size), 2, 0)])
     lengths = trace_lengths(variance, nuisances, traces[rows])
     first_order, *whole = lengths.reshape(3, -1)
-    known = np.isfinite(wide.at_plausible_size[0])
+    known = np.isfinite(wide.at_plausible_size).all(axis=0)
     mean = np.sum(whole, axis=0) / np.maximum(known.sum(axis=1), 1)
     return np.where(mean > 0.0, np.maximum(first_order / np.maximum(mean, 1e-300) - 1.0, 0.0), 0.0)
 
@@ -528,7 +517,7 @@ def _causes(model: Model, wanted: Sequence[tuple[Candidate, dict[str, float]]]) 
 
 def _with_rows(values: Array, count: int) -> Array:
     """With as many rows of bed levels, which no flow changes."""
-    return np.vstack([values, np.zeros((count, values.shape[1]))])
+    return np.vstack([values, np.zeros((count, *values.shape[1:]))])
 
 
 def with_chosen(wide: PlanModel, chosen: Sequence[int]) -> PlanModel:
@@ -547,19 +536,16 @@ def with_chosen(wide: PlanModel, chosen: Sequence[int]) -> PlanModel:
     order = np.argsort([before.get(one.name, len(before)) for one in candidates], kind="stable")
     candidates = [candidates[j] for j in order]
     kept = [before[one.name] for one in candidates if one.name in before]
-    settings = [(one, shapes) for one in new for shapes in one.settings()]
     count = wide.error.size - len(station)
     unknown = np.full((wide.error.size, len(new), 2), np.nan)  # effects of sections change readings alone
 
     def with_new(draw: PlanDraw) -> PlanDraw:
-        first = [(one, one.settings()[0]) for one in new]
         model = replace(draw.model, station=station)
-        values = _with_rows(responses(model, draw.point, _causes(model, first)), count)
+        causes = _causes(model, [(one, usual_shapes(one)) for one in new])
+        values = _with_rows(responses(model, draw.point, causes), count)
         return replace(draw, model=model, values=np.hstack([draw.values[:, kept], values]))
 
     draws = tuple(in_threads(with_new, [(one,) for one in wide.draws]))
-    values = _with_rows(responses(draws[0].model, draws[0].point, _causes(wide.model, settings)), count)
-    columns = np.concatenate([np.zeros(0, dtype=int), *(wide.columns[j] for j in kept)])
     taken = {one.place for one in pieces}
     left = [j for j, one in enumerate(wide.pieces) if one.place not in taken]
     return replace(
@@ -569,8 +555,6 @@ def with_chosen(wide: PlanModel, chosen: Sequence[int]) -> PlanModel:
         pieces=tuple(wide.pieces[j] for j in left),
         rows=tuple(wide.rows[j] for j in left),
         candidates=tuple(candidates),
-        values=np.hstack([wide.values[:, columns], values]),
-        between_of=np.array([kept.index(j) for j in wide.between_of], dtype=int),
         draws=draws,
         at_plausible_size=np.concatenate([wide.at_plausible_size[:, kept], unknown], axis=1),
     )

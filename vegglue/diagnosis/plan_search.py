@@ -77,7 +77,7 @@ class FirstCompetition:
         at_rest, of_all = self.at_rest
         others = of_all.copy()
         others[owner] -= np.add.reduceat(at_rest[near], first, axis=0, dtype=float)
-        evidence = np.log(np.maximum(np.repeat(others[None], NAMED_AT.size - 1, axis=0), LEAST_ODDS))
+        evidence = np.repeat(np.log(np.maximum(others, LEAST_ODDS))[None], NAMED_AT.size - 1, axis=0)
         of_near = self.only_sign[near], self.factor[near], self.constant[near], self.owner[near]
         for one, toward in enumerate(np.ascontiguousarray(cosine[near].T)):
             of_it = np.flatnonzero(truth == one)
@@ -477,9 +477,10 @@ def plan_search(
     traces = np.array([draw.values[:, kept] * gains for draw in wide.draws])
     if isinstance(question, TwoEffects):
         traces = np.concatenate([traces, traces.sum(axis=2, keepdims=True)], axis=2)
-    most = max(draw.errors[1].shape[1] for draw in wide.draws)
-    nuisances = np.array([np.pad(draw.errors[1], ((0, 0), (0, most - draw.errors[1].shape[1]))) for draw in wide.draws])
-    none = possible_measurements(np.array([draw.errors[0] for draw in wide.draws]), nuisances, traces)
+    variances, each = zip(*wide.errors, strict=True)
+    most = max(one.shape[1] for one in each)
+    nuisances = np.array([np.pad(one, ((0, 0), (0, most - one.shape[1]))) for one in each])
+    none = possible_measurements(np.array(variances), nuisances, traces)
     return PlanSearch(
         wide=wide,
         criterion=DesignCriterion(question, len(wide.candidates), level, amplitudes, beyond[kept], bending),

@@ -104,7 +104,8 @@ class Engine:
     linearise_around
         (model, z, near) -> the same at z (m, p) around a point of the same model.
     predict
-        (model, points, z) -> f (m, n) at z (m, p), NaN where no flow is found; points: some that are known.
+        (model, points, z) -> f (m, n) at z (m, p), NaN where no flow is found; points: some that are known, of the
+        model or of one without its last parameters.
     responses
         (model, points, causes) -> df / d(amplitude - off)^power at off (points, n, causes).
     responses_to_cells
@@ -228,7 +229,7 @@ def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
     ----------
     model : Model
     points : sequence of Point
-        Some that are known, to start from.
+        Some that are known, to start from, of the model or of one without its last parameters.
     z : (m, p) [standard deviations of the prior]
 
     Returns

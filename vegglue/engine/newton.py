@@ -285,7 +285,7 @@ def predict_members(model: Model, points: Sequence[Point], z: Array) -> Array:
 
     Sets of members that are as far from their point are solved together, the same whatever the number of cores.
     """
-    away = np.stack([np.linalg.norm(z - point.z, axis=1) for point in points])
+    away = np.stack([np.linalg.norm(z[:, : point.z.size] - point.z, axis=1) for point in points])
     nearest, sets = away.argmin(axis=0), []
     for k in range(len(points)):
         index = np.flatnonzero(nearest == k)[np.argsort(away[k, nearest == k], kind="stable")]
@@ -313,7 +313,7 @@ def predict_near(model: Model, point: Point, z: Array) -> Array:
         part = found[some]
         for experiment, flow in point.flows.items():
             problem = problem_at(model, experiment, z[some])
-            start = flow.state + flow.slopes @ (z[some] - point.z).T
+            start = flow.state + flow.slopes @ (z[some, : point.z.size] - point.z).T
             solution = chord_in_band(problem, start, flow.factors, flow.band, model.case.numerics.tolerance)
             part[:, model.rows[experiment]] = _read_stations(model, experiment, problem, solution.state, flow.band)
             part[~solution.converged] = np.nan
