@@ -193,7 +193,13 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
             "measurements out of the folder."
         )
     unread = [place for place in range(len(table.headings)) if place not in columns.values()]
-    _refuse_unit_elsewhere(path, table, assumed, unread)
+    # A unit in a line above the heading, in a comment or in an unread column, of what is taken for SI.
+    words_of = [set(filter(None, table.texts(place))) for place in unread]
+    of_columns = [(table.row_numbers[0], next(iter(words))) for words in words_of if len(words) == 1]
+    for row, text in (*table.beside, *of_columns):
+        unit, quantity = unit_in_words(text) or ("", "")
+        if roles := [role for role in assumed if ROLES[role].quantity == quantity]:
+            raise InputError("unit_elsewhere", file=path, row=row, roles=roles, unit=unit)
     return MeasuredRows(
         numbers=numbers,
         texts={role: table.texts(place) for role, place in columns.items() if not ROLES[role].quantity},
@@ -203,16 +209,6 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
         others={table.headings[place]: table.texts(place) for place in unread},
         lines=table.row_numbers,
     )
-
-
-def _refuse_unit_elsewhere(path: Path, table: ParsedTable, assumed: Sequence[str], unread: Sequence[int]) -> None:
-    """InputError if a column is taken for SI and a line above the heading, a comment or an unread column has a unit."""
-    columns = [set(filter(None, table.texts(place))) for place in unread]
-    of_columns = [(table.row_numbers[0], next(iter(texts))) for texts in columns if len(texts) == 1]
-    for row, text in (*table.beside, *of_columns):
-        unit, quantity = unit_in_words(text) or ("", "")
-        if roles := [role for role in assumed if ROLES[role].quantity == quantity]:
-            raise InputError("unit_elsewhere", file=path, row=row, roles=roles, unit=unit)
 
 
 def read_placed_rows(path: Path, options: FileOptions) -> MeasuredRows:
