@@ -22,74 +22,47 @@ NEEDS_MORE = 3.3
 
 @dataclass(frozen=True)
 class PatchOutline:
-    """Plants that are not on the map, as a rectangle.
+    """Plants that are not on the map, as a rectangle."""
 
-    Attributes
-    ----------
-    angle, height, proportional
-        Inclination to x [deg], height of the plants [m] and how they act where they stand out of the water, the shapes
-        of the effect beside those of a spot.
-    length_error, width_error, angle_error
-        Standard errors of half length, half width [m] and inclination [deg].
-    like
-        The patch of the map whose drag is the plausible size.
-    """
-
+    # angle, height, proportional: inclination to x [deg], height of the plants [m] and how they act where they stand
+    # out of the water, the shapes of the effect beside those of a spot
     angle: float
     height: float
     proportional: float
+    # length_error, width_error, angle_error: standard errors of half length, half width [m] and inclination [deg]
     length_error: float
     width_error: float
     angle_error: float
-    like: str
+    like: str  # the patch of the map whose drag is the plausible size
 
 
 @dataclass(frozen=True)
 class LocalAnomaly:
-    """A place where something unlisted changes a term of the equations.
+    """A place where something unlisted changes a term of the equations."""
 
-    Attributes
-    ----------
-    x, y, length, width
-        Middle, half length and half width of the spot, or of the outline [m].
-    term, effect
-        The term, and the effect that stands for the place in the library.
-    amplitude, interval95, unit
-        Size with its 95 % interval.
-    score
-        Of its fingerprint [standard errors].
-    experiments
-        Those that point at it.
-    odds
-        Over the best hypothesis of each other kind, by its name [-].
-    plausible
-        A plausible size there [unit].
-    x_error, y_error
-        Standard errors over all spots that could be it [m].
-    x_spread, y_spread
-        The same if traces are nature's own, over which `extend` spreads it [m]; 0 with an outline.
-    outline
-        Of plants that are not on the map; None for a spot.
-    """
-
+    # x, y, length, width: middle, half length and half width of the spot, or of the outline [m]
     x: float
     y: float
     length: float
     width: float
+    # term, effect: the term, and the effect that stands for the place in the library
     term: str
     effect: str
+    # amplitude, interval95, unit: size with its 95 % interval
     amplitude: float
     interval95: tuple[float, float]
     unit: str
-    score: float
-    experiments: tuple[str, ...]
-    odds: dict[str, float]
-    plausible: float
+    score: float  # of its fingerprint [standard errors]
+    experiments: tuple[str, ...]  # those that point at it
+    odds: dict[str, float]  # over the best hypothesis of each other kind, by its name [-]
+    plausible: float  # a plausible size there [unit]
+    # x_error, y_error: standard errors over all spots that could be it [m]
     x_error: float = 0.0
     y_error: float = 0.0
+    # x_spread, y_spread: the same if traces are nature's own, over which `extend` spreads it [m]; 0 with an outline
     x_spread: float = 0.0
     y_spread: float = 0.0
-    outline: PatchOutline | None = None
+    outline: PatchOutline | None = None  # of plants that are not on the map; None for a spot
 
     @property
     def nearest_odds(self) -> tuple[tuple[str, float], ...]:
@@ -109,77 +82,44 @@ class LocalAnomaly:
 
 @dataclass(frozen=True)
 class PlaceMap:
-    """Scores of a spot of one term everywhere, in the model as it was.
+    """Scores of a spot of one term everywhere, in the model as it was."""
 
-    Attributes
-    ----------
-    term
-        Of the first place that was found, else drag.
-    x, y
-        Middles of spots (spot,) [m]; those of one length stand together, in the order of x.
-    score
-        (spot,) [standard errors]
-    """
-
-    term: str
+    term: str  # of the first place that was found, else drag
+    # x, y: middles of spots (spot,) [m]; those of one length stand together, in the order of x
     x: Array
     y: Array
-    score: Array
+    score: Array  # (spot,) [standard errors]
 
 
 @dataclass(frozen=True)
 class FaultyInstrument:
-    """An instrument found to be off, whose readings are excluded.
+    """An instrument found to be off, whose readings are excluded."""
 
-    Attributes
-    ----------
-    kind
-        A reading, a position, a probe, a gauge, or a surveyed line of the bed.
-    x, y
-        Where it stood [m], NaN if at several places.
-    stations
-        Rows of its readings.
-    offset, interval95, unit
-        Excess of its readings with the 95 % interval [unit of its kind].
-    log_factor
-        ln of the Bayes factor against none [-].
-    factor
-        Reading over true value [-], NaN if that explains the readings no better than an offset.
-    """
-
-    kind: str
+    kind: str  # a reading, a position, a probe, a gauge, or a surveyed line of the bed
+    # x, y: where it stood [m], NaN if at several places
     x: float
     y: float
-    stations: tuple[int, ...]
+    stations: tuple[int, ...]  # rows of its readings
+    # offset, interval95, unit: excess of its readings with the 95 % interval [unit of its kind]
     offset: float
     interval95: tuple[float, float]
     unit: str
-    log_factor: float
+    log_factor: float  # ln of the Bayes factor against none [-]
+    # Reading over true value [-], NaN if that explains the readings no better than an offset
     factor: float = float("nan")
 
 
 @dataclass(frozen=True)
 class FieldFound:
-    """A smooth field of a term that would close the misfit.
-
-    Attributes
-    ----------
-    term
-    size
-        Standard deviation [unit of the term].
-    length, width
-        Half length and half width of its Gaussian basis functions [m].
-    log_factor
-        ln of its Bayes factor against none [-].
-    value, error, x, y
-        Value and standard error [unit of the term] at the place [m] of highest significance.
-    """
+    """A smooth field of a term that would close the misfit."""
 
     term: str
-    size: float
+    size: float  # standard deviation [unit of the term]
+    # length, width: half length and half width of its Gaussian basis functions [m]
     length: float
     width: float
-    log_factor: float
+    log_factor: float  # ln of its Bayes factor against none [-]
+    # value, error, x, y: value and standard error [unit of the term] at the place [m] of highest significance
     value: float
     error: float
     x: float
@@ -188,49 +128,32 @@ class FieldFound:
 
 @dataclass(frozen=True)
 class FieldMapKept:
-    """The smooth field of a term over the grid on which it was computed.
+    """The smooth field of a term over the grid on which it was computed."""
 
-    Attributes
-    ----------
-    x, y
-        Cell centres, (nx,) and (ny,) [m].
-    value, error
-        Value and standard error (nx, ny) [unit of the term].
-    """
-
+    # x, y: cell centres, (nx,) and (ny,) [m]
     x: Array
     y: Array
+    # value, error: value and standard error (nx, ny) [unit of the term]
     value: Array
     error: Array
 
 
 @dataclass(frozen=True)
 class CandidateLaw:
-    """A law of the grammar, to first order.
+    """A law of the grammar, to first order."""
 
-    Attributes
-    ----------
-    name, title, equation
-        Of the law in the library.
-    term, quantity
-        What it changes and with what, in words.
-    reference
-        r [unit of the quantity]; None for a law that has none.
-    scale, strength
-        A plausible strength a, and the one found [-].
-    chance
-        Probability among all that was compared [-].
-    """
-
+    # name, title, equation: of the law in the library
     name: str
+    # term, quantity: what it changes and with what, in words
     term: str
     quantity: str
     title: str
     equation: str
-    reference: float | None
+    reference: float | None  # r [unit of the quantity]; None for a law that has none
+    # scale, strength: a plausible strength a, and the one found [-]
     scale: float
     strength: float
-    chance: float
+    chance: float  # probability among all that was compared [-]
 
     @property
     def shapes(self) -> dict[str, float]:
@@ -240,30 +163,15 @@ class CandidateLaw:
 
 @dataclass(frozen=True)
 class CandidateLaws:
-    """Laws that are significant in what is left, whatever was accepted.
+    """Laws that are significant in what is left, whatever was accepted."""
 
-    Attributes
-    ----------
-    p
-        Chance that errors alone make laws as significant [-].
-    tried
-        Their number.
-    chance
-        Probability of all together among all that was compared [-].
-    laws
-        Those that hold 95 % of it, the most probable first.
-    calibrated
-        Whether the probabilities are those of calibrated laws, else to first order.
-    needed
-        Whether laws are significant beside the accepted effects, too: calibrated together with these. Else these and
-        the laws explain the same.
-    """
-
-    p: float
-    tried: int
-    chance: float
-    laws: tuple[CandidateLaw, ...]
-    calibrated: bool = False
+    p: float  # chance that errors alone make laws as significant [-]
+    tried: int  # their number
+    chance: float  # probability of all together among all that was compared [-]
+    laws: tuple[CandidateLaw, ...]  # those that hold 95 % of it, the most probable first
+    calibrated: bool = False  # whether the probabilities are those of calibrated laws, else to first order
+    # Whether laws are significant beside the accepted effects, too: calibrated together with these. Else these and the
+    # laws explain the same.
     needed: bool = True
 
     @property
@@ -285,22 +193,13 @@ class CandidateLaws:
 
 @dataclass(frozen=True)
 class ModelErrorUsed:
-    """The model's own error.
+    """The model's own error."""
 
-    Attributes
-    ----------
-    friction, bed
-        Relative error of friction [-] and error of the bed [m] as allowed.
-    needed
-        The share of both that is most likely for the last residual [-].
-    log_ratio
-        ln of its likelihood ratio against what is allowed [-].
-    """
-
+    # friction, bed: relative error of friction [-] and error of the bed [m] as allowed
     friction: float
     bed: float
-    needed: float
-    log_ratio: float
+    needed: float  # the share of both that is most likely for the last residual [-]
+    log_ratio: float  # ln of its likelihood ratio against what is allowed [-]
 
     @property
     def asks_for_more(self) -> bool:
@@ -317,30 +216,18 @@ NEVER = 1e100
 
 @dataclass(frozen=True)
 class AmplitudeEstimate:
-    """How large an effect is, in the unit of its amplitude.
+    """How large an effect is, in the unit of its amplitude."""
 
-    Attributes
-    ----------
-    value, interval95
-        From its own refit if `refitted`, else to first order; with its prior.
-    unit
-    off, scale
-        Value at which the effect is off, and a plausible distance from it.
-    refitted
-    objective
-        Least |W (y - f)|^2 + |z|^2 with the effect [-], predicted if it was not refitted.
-    support
-        Range within which the amplitude must lie.
-    """
-
+    # value, interval95: from its own refit if `refitted`, else to first order; with its prior
     value: float
     interval95: tuple[float, float]
     unit: str
+    # off, scale: value at which the effect is off, and a plausible distance from it
     off: float
     scale: float
     refitted: bool
-    objective: float
-    support: tuple[float, float] = (-np.inf, np.inf)
+    objective: float  # least |W (y - f)|^2 + |z|^2 with the effect [-], predicted if it was not refitted
+    support: tuple[float, float] = (-np.inf, np.inf)  # range within which the amplitude must lie
 
     @property
     def relative_size(self) -> float:
@@ -350,40 +237,22 @@ class AmplitudeEstimate:
 
 @dataclass(frozen=True)
 class ScoreTest:
-    """Score of an effect, and how often errors alone reach it.
+    """Score of an effect, and how often errors alone reach it."""
 
-    Attributes
-    ----------
-    score
-        T [standard errors].
-    p_family
-        Chance that errors alone make any effect score as high [-], counted among bootstrap draws and never below one
-        over their number; see `calibration/score_test`.
-    """
-
-    score: float
+    score: float  # T [standard errors]
+    # Chance that errors alone make any effect score as high [-], counted among bootstrap draws and never below one over
+    # their number; see `calibration/score_test`
     p_family: float
 
 
 @dataclass(frozen=True)
 class Detectability:
-    """Whether these data could show an effect.
+    """Whether these data could show an effect."""
 
-    Attributes
-    ----------
-    visibility
-        Share of its fingerprint that calibration cannot mimic [-].
-    smallest
-        Distance of the amplitude from off that is detected 19 times of 20 [unit of the amplitude].
-    testable
-        Whether that is less than twice a plausible one, and within its support.
-    confounder, cosine
-        The parameter whose slope is most like the fingerprint, and the cosine between both [-].
-    """
-
-    visibility: float
-    smallest: float
-    testable: bool
+    visibility: float  # share of its fingerprint that calibration cannot mimic [-]
+    smallest: float  # distance of the amplitude from off that is detected 19 times of 20 [unit of the amplitude]
+    testable: bool  # whether that is less than twice a plausible one, and within its support
+    # confounder, cosine: the parameter whose slope is most like the fingerprint, and the cosine between both [-]
     confounder: str
     cosine: float
 
@@ -400,21 +269,11 @@ class Detectability:
 
 @dataclass(frozen=True)
 class CandidateEffect:
-    """One effect in the light of the data, in the last model in which it was tested.
-
-    Attributes
-    ----------
-    name, title
-    shapes
-        Shapes by name at which it scores best.
-    amplitude : AmplitudeEstimate
-    test : ScoreTest
-    detectability : Detectability
-    """
+    """One effect in the light of the data, in the last model in which it was tested."""
 
     name: str
     title: str
-    shapes: dict[str, float]
+    shapes: dict[str, float]  # shapes by name at which it scores best
     amplitude: AmplitudeEstimate
     test: ScoreTest
     detectability: Detectability
@@ -427,60 +286,34 @@ def effects_among(candidate_effects: Sequence[CandidateEffect]) -> int:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another explanation with its probability.
-
-    Attributes
-    ----------
-    name
-    kind
-        `effect`, a term at a place, or the kind of an instrument.
-    probability
-        [-]
-    x, y
-        Of a place or an instrument [m], NaN otherwise.
-    amplitude
-        Of what is at a place [unit of the term], NaN otherwise.
-    """
+    """Another explanation with its probability."""
 
     name: str
-    kind: str
-    probability: float
+    kind: str  # `effect`, a term at a place, or the kind of an instrument
+    probability: float  # [-]
+    # x, y: of a place or an instrument [m], NaN otherwise
     x: float = float("nan")
     y: float = float("nan")
-    amplitude: float = float("nan")
+    amplitude: float = float("nan")  # of what is at a place [unit of the term], NaN otherwise
 
 
 @dataclass(frozen=True)
 class Step:
-    """One round of the search.
+    """One round of the search."""
 
-    Attributes
-    ----------
-    accepted
-        Name of the effect that was accepted.
-    rivals, chances
-        The effects that together hold 95 % of the probability, and the probability of each among all of every kind [-].
-    groups
-        Rivals that the data cannot separate.
-    chi2_before, chi2_after
-        [-]
-    p_family
-        Chance that errors alone sound the alarm as loudly [-], counted, see `score_test.alarm_p`.
-    others
-        Probability of the best of each other kind by its name, unless negligible [-].
-    places
-        Those of the others that are something at a place.
-    """
-
-    accepted: str
+    accepted: str  # name of the effect that was accepted
+    # rivals, chances: the effects that together hold 95 % of the probability, and the probability of each among all of
+    # every kind [-]
     rivals: tuple[str, ...]
     chances: tuple[float, ...]
-    groups: tuple[tuple[str, ...], ...]
+    groups: tuple[tuple[str, ...], ...]  # rivals that the data cannot separate
+    # chi2_before, chi2_after: [-]
     chi2_before: float
     chi2_after: float
-    p_family: float
+    p_family: float  # chance that errors alone sound the alarm as loudly [-], counted, see `score_test.alarm_p`
+    # Probability of the best of each other kind by its name, unless negligible [-]
     others: dict[str, float] = field(default_factory=dict)
-    places: dict[str, LocalAnomaly] = field(default_factory=dict)
+    places: dict[str, LocalAnomaly] = field(default_factory=dict)  # those of the others that are something at a place
 
     @property
     def chance(self) -> dict[str, float]:

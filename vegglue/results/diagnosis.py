@@ -30,25 +30,14 @@ from vegglue.wording.sentences import phrase, tagged
 
 @dataclass(frozen=True)
 class Misfit:
-    """chi2 = |W (y - f)|^2 of the first and of the last model.
+    """chi2 = |W (y - f)|^2 of the first and of the last model."""
 
-    Attributes
-    ----------
-    chi2_first, chi2
-        [-]
-    freedom
-        Degrees of freedom of the last.
-    p
-        Chance of a chi2 as large under errors alone [-].
-    zones
-        Mean misfit of the first model by experiment, section and zone [errors of the last].
-    """
-
+    # chi2_first, chi2: [-]
     chi2_first: float
     chi2: float
-    freedom: int
-    p: float
-    zones: pd.DataFrame
+    freedom: int  # degrees of freedom of the last
+    p: float  # chance of a chi2 as large under errors alone [-]
+    zones: pd.DataFrame  # mean misfit of the first model by experiment, section and zone [errors of the last]
 
     @property
     def worst(self) -> tuple[pd.Series, float] | None:
@@ -71,58 +60,32 @@ class Misfit:
 
 @dataclass(frozen=True)
 class FirstScreening:
-    """Score tests of the first model.
+    """Score tests of the first model."""
 
-    Attributes
-    ----------
-    threshold
-        Score that errors alone reach at the false-alarm rate of effects [standard errors].
-    scores
-        By name [standard errors].
-    compared, cosine
-        The strongest effects (c,), and the cosines between their fingerprints (c, c) [-].
-    """
-
-    threshold: float
-    scores: dict[str, float]
+    threshold: float  # score that errors alone reach at the false-alarm rate of effects [standard errors]
+    scores: dict[str, float]  # by name [standard errors]
+    # compared, cosine: the strongest effects (c,), and the cosines between their fingerprints (c, c) [-]
     compared: tuple[str, ...]
     cosine: Array
 
 
 @dataclass(frozen=True)
 class ParameterEstimates:
-    """Calibrated parameters by name.
+    """Calibrated parameters by name."""
 
-    Attributes
-    ----------
-    first
-        Of the first model.
-    last
-        Of the last model: value and 95 % interval.
-    """
-
-    first: dict[str, float]
-    last: dict[str, tuple[float, float, float]]
+    first: dict[str, float]  # of the first model
+    last: dict[str, tuple[float, float, float]]  # of the last model: value and 95 % interval
 
 
 @dataclass(frozen=True)
 class Predictions:
-    """Predictions at the stations.
+    """Predictions at the stations."""
 
-    Attributes
-    ----------
-    station : DataFrame
-        The table of stations.
-    first, last
-        Of the first and of the last model (station,) [unit of the kind].
-    error
-        Standard errors of the readings (station,), NaN if not used.
-    """
-
-    station: pd.DataFrame
+    station: pd.DataFrame  # the table of stations
+    # first, last: of the first and of the last model (station,) [unit of the kind]
     first: Array
     last: Array
-    error: Array
+    error: Array  # standard errors of the readings (station,), NaN if not used
 
     @property
     def table(self) -> pd.DataFrame:

@@ -46,20 +46,11 @@ COMPRESSED_AT_ONCE = 2**20  # [bytes]
 
 @dataclass(frozen=True)
 class FieldWindow:
-    """Columns of the grid around a range along x.
+    """Columns of the grid around a range along x."""
 
-    Attributes
-    ----------
-    range
-        From where to where [m].
-    columns
-        Of the grid.
-    x, y
-        Cell centres (columns,) and (ny,) [m].
-    """
-
-    range: tuple[float, float]
-    columns: slice
+    range: tuple[float, float]  # from where to where [m]
+    columns: slice  # of the grid
+    # x, y: cell centres (columns,) and (ny,) [m]
     x: Array
     y: Array
 

@@ -33,22 +33,13 @@ KeptFlags = Annotated[np.ndarray, PlainValidator(lambda kept: np.array(TypeAdapt
 
 @dataclass(frozen=True)
 class InSample:
-    """Errors at what the calibration used.
+    """Errors at what the calibration used."""
 
-    Attributes
-    ----------
-    rmse
-        Root mean square error by kind [its unit], NaN if not measured.
-    chi2, stations
-        Of independent errors [-], over so many stations.
-    noise_floor
-        Root mean square measurement error of a velocity [m/s].
-    """
-
-    rmse: dict[str, KeptNumber]
+    rmse: dict[str, KeptNumber]  # root mean square error by kind [its unit], NaN if not measured
+    # chi2, stations: of independent errors [-], over so many stations
     chi2: KeptNumber
     stations: int
-    noise_floor: KeptNumber
+    noise_floor: KeptNumber  # root mean square measurement error of a velocity [m/s]
 
     @property
     def velocity(self) -> float:
@@ -59,102 +50,60 @@ class InSample:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Errors of each used station when its section, or its experiment, is left out of the calibration.
+    """Errors of each used station when its section, or its experiment, is left out of the calibration."""
 
-    Attributes
-    ----------
-    sections, experiments
-        (n,) [unit of the kind], NaN if nothing could be left out.
-    velocity
-        Which are velocities along x, or of any direction if there is none along x (n,).
-    clusters
-        Experiment and section of each.
-    """
-
+    # sections, experiments: (n,) [unit of the kind], NaN if nothing could be left out
     sections: KeptErrors
     experiments: KeptErrors
-    velocity: KeptFlags
-    clusters: tuple[tuple[str, str], ...]
+    velocity: KeptFlags  # which are velocities along x, or of any direction if there is none along x (n,)
+    clusters: tuple[tuple[str, str], ...]  # experiment and section of each
 
 
 @dataclass(frozen=True)
 class PredictiveScores:
-    """How well held-out velocities are predicted with their spread; NaN if nothing could be left out.
+    """How well held-out velocities are predicted with their spread; NaN if nothing could be left out."""
 
-    Attributes
-    ----------
-    log_score
-        Mean log predictive density by sections [-].
-    inside50, inside95
-        Share within the 50 % and the 95 % band [-].
-    """
-
-    log_score: KeptNumber
+    log_score: KeptNumber  # mean log predictive density by sections [-]
+    # inside50, inside95: share within the 50 % and the 95 % band [-]
     inside50: KeptNumber
     inside95: KeptNumber
 
 
 @dataclass(frozen=True)
 class ModelScore:
-    """The errors of one model of a comparison.
+    """The errors of one model of a comparison."""
 
-    Attributes
-    ----------
-    name, title, effects
-        Of the case.
-    values
-        Parameters with their 95 % intervals.
-    in_sample : InSample
-    held_out : HeldOut
-    predictive : PredictiveScores
-    homogeneity
-        Chance that a parameter is the same in all experiments, by name [-].
-    validation
-        Root mean square error of velocities that no calibration used [m/s], NaN without them.
-    validation_inside95
-        Share of them within the 95 % band, of a bed whose survey states its error [-]; else NaN.
-    """
-
+    # name, title, effects: of the case
     name: str
     title: str
     effects: tuple[str, ...]
-    values: dict[str, tuple[KeptNumber, KeptNumber, KeptNumber]]
+    values: dict[str, tuple[KeptNumber, KeptNumber, KeptNumber]]  # parameters with their 95 % intervals
     in_sample: InSample
     held_out: HeldOut
     predictive: PredictiveScores
-    homogeneity: dict[str, KeptNumber]
-    validation: KeptNumber
+    homogeneity: dict[str, KeptNumber]  # chance that a parameter is the same in all experiments, by name [-]
+    validation: KeptNumber  # root mean square error of velocities that no calibration used [m/s], NaN without them
+    # Share of them within the 95 % band, of a bed whose survey states its error [-]; else NaN
     validation_inside95: KeptNumber = math.nan
 
 
 @dataclass(frozen=True)
 class ComparedModel:
-    """One model of a stored comparison.
+    """One model of a stored comparison."""
 
-    Attributes
-    ----------
-    name, config, config_hash
-        Of the case.
-    added
-        Effects that the model before has not.
-    parameters
-        Their number.
-    in_sample, held_out_sections, held_out_experiments, unseen
-        Root mean square errors of velocities along x [m/s], NaN if there are none.
-    noise_floor
-        Measurement error [m/s].
-    """
-
+    # name, config, config_hash: of the case
     name: str
     config: str
     config_hash: str
-    added: tuple[str, ...]
-    parameters: int
+    added: tuple[str, ...]  # effects that the model before has not
+    parameters: int  # their number
+    # in_sample, held_out_sections, held_out_experiments, unseen: root mean square errors of velocities along x [m/s],
+    # NaN if there are none
     in_sample: KeptNumber
     held_out_sections: KeptNumber
     held_out_experiments: KeptNumber
     unseen: KeptNumber
-    noise_floor: KeptNumber
+    noise_floor: KeptNumber  # measurement error [m/s]
 
 
 @dataclass(frozen=True)
@@ -250,25 +199,15 @@ KeptSubject = PlainValidator(lambda kept: TypeAdapter(SUBJECTS[kept["kind"]]).va
 
 @dataclass(frozen=True)
 class ProposedMeasurement:
-    """A measurement that could separate rivals.
+    """A measurement that could separate rivals."""
 
-    Attributes
-    ----------
-    name
-        In words.
-    experiment, x, stations
-        In which experiment, at which place [m], and how many.
-    hours
-        Field work [h].
-    now, then
-        Squared standard errors D^2 between the nearest rivals, now and with it [-].
-    """
-
-    name: str
+    name: str  # in words
+    # experiment, x, stations: in which experiment, at which place [m], and how many
     experiment: str
     x: float
     stations: int
-    hours: float
+    hours: float  # field work [h]
+    # now, then: squared standard errors D^2 between the nearest rivals, now and with it [-]
     now: float
     then: float
 
@@ -280,20 +219,11 @@ class ProposedMeasurement:
 
 @dataclass(frozen=True)
 class Question:
-    """What to separate, and the measurements that could.
+    """What to separate, and the measurements that could."""
 
-    Attributes
-    ----------
-    about
-        The rivals.
-    measurements : tuple of ProposedMeasurement
-        By what they add in an hour.
-    seen_from
-        D^2 from which a diagnosis detects it 19 times of 20 [-]; infinite if that depends on no size.
-    """
-
-    about: Annotated[Subject, KeptSubject]
-    measurements: tuple[ProposedMeasurement, ...]
+    about: Annotated[Subject, KeptSubject]  # the rivals
+    measurements: tuple[ProposedMeasurement, ...]  # by what they add in an hour
+    # D^2 from which a diagnosis detects it 19 times of 20 [-]; infinite if that depends on no size
     seen_from: Annotated[float, BeforeValidator(lambda kept: math.inf if kept is None else kept)] = math.inf
 
     @property

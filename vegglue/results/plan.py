@@ -41,24 +41,16 @@ class Work(Enum):
 class PlannedPiece:
     """A piece of field work: verticals of a transect, a vertical, a gauge or a gauging in one experiment, or a line of
     bed levels, which is of all.
-
-    Attributes
-    ----------
-    work, experiment
-        Its kind, and the flow it is done in, '' for all.
-    x, y
-        Its places [m], y empty for a gauging.
-    hours
-        Without those of another flow [h].
-    new, again
-        Whether the experiment is a flow that the case does not have, and whether the same is measured before.
     """
 
+    # work, experiment: its kind, and the flow it is done in, '' for all
     work: Work
     experiment: str
+    # x, y: its places [m], y empty for a gauging
     x: float
     y: tuple[float, ...]
-    hours: float
+    hours: float  # without those of another flow [h]
+    # new, again: whether the experiment is a flow that the case does not have, and whether the same is measured before
     new: bool = False
     again: bool = False
 
@@ -81,39 +73,28 @@ class PlannedEffect:
     """An effect as the planned measurements would show it.
 
     Named means that the first step of a diagnosis has it, alone or as one of a few.
-
-    Attributes
-    ----------
-    name, title, unit
-        Of the effect, and of its amplitude.
-    smallest, best, worst
-        Distance of the amplitude from off that is named with 90 % [unit], infinite if no size is: averaged over all
-        draws of the priors, and in those where it is least and largest.
-    plausible, furthest
-        A plausible distance, and the largest possible one [unit].
-    chance_plausible, chance
-        That the plausible size is named, and one drawn from the prior of the amplitude [-].
-    visibility
-        Share of the trace that calibration cannot mimic [-].
-    confused, place
-        Other effects with a similar trace, the most similar first, and the term at a place that has one.
-    parameter, cosine
-        The parameter whose change is most like it, and the cosine between both [-].
     """
 
+    # name, title, unit: of the effect, and of its amplitude
     name: str
     title: str
     unit: str
+    # smallest, best, worst: distance of the amplitude from off that is named with 90 % [unit], infinite if no size is:
+    # averaged over all draws of the priors, and in those where it is least and largest
     smallest: float
     best: float
     worst: float
+    # plausible, furthest: a plausible distance, and the largest possible one [unit]
     plausible: float
     furthest: float
+    # chance_plausible, chance: that the plausible size is named, and one drawn from the prior of the amplitude [-]
     chance_plausible: float
     chance: float
-    visibility: float
+    visibility: float  # share of the trace that calibration cannot mimic [-]
+    # confused, place: other effects with a similar trace, the most similar first, and the term at a place that has one
     confused: tuple[Confusion, ...]
     place: Confusion | None
+    # parameter, cosine: the parameter whose change is most like it, and the cosine between both [-]
     parameter: str
     cosine: float
 
@@ -135,87 +116,51 @@ class PlannedEffect:
 
 @dataclass(frozen=True)
 class PlannedPlaces:
-    """Something unlisted at a place that changes a term.
+    """Something unlisted at a place that changes a term."""
 
-    Attributes
-    ----------
-    term, unit
-        The term, and the unit of its sizes.
-    plausible
-        A plausible size [unit].
-    places
-        How many are under water.
-    share
-        Of these, where the plausible size is detected with 90 % [-].
-    smallest
-        Size that is detected with 90 % at half of them [unit].
-    """
-
+    # term, unit: the term, and the unit of its sizes
     term: str
     unit: str
-    plausible: float
-    places: int
-    share: float
-    smallest: float
+    plausible: float  # a plausible size [unit]
+    places: int  # how many are under water
+    share: float  # of these, where the plausible size is detected with 90 % [-]
+    smallest: float  # size that is detected with 90 % at half of them [unit]
 
 
 @dataclass(frozen=True)
 class PlaceChances:
-    """Chance that drag of a plausible size is detected at each place.
+    """Chance that drag of a plausible size is detected at each place."""
 
-    Attributes
-    ----------
-    x, y, chance
-        Places [m] and the chance at each [-], (place,).
-    length, width
-        Half length and half width of one spot [m].
-    """
-
+    # x, y, chance: places [m] and the chance at each [-], (place,)
     x: tuple[float, ...]
     y: tuple[float, ...]
     chance: tuple[float, ...]
+    # length, width: half length and half width of one spot [m]
     length: float
     width: float
 
 
 @dataclass(frozen=True)
 class PlannedInstruments:
-    """Instruments of one kind.
+    """Instruments of one kind."""
 
-    Attributes
-    ----------
-    instrument, count
-        The kind, and how many there are.
-    smallest
-        Offset that is detected with 90 % in half of them, over the standard error of a reading [-].
-    plausible
-        A plausible offset over that error [-].
-    """
-
+    # instrument, count: the kind, and how many there are
     instrument: str
     count: int
-    smallest: float
-    plausible: float
+    smallest: float  # offset that is detected with 90 % in half of them, over the standard error of a reading [-]
+    plausible: float  # a plausible offset over that error [-]
 
 
 @dataclass(frozen=True)
 class PlannedParameter:
-    """How well a parameter would be known.
+    """How well a parameter would be known."""
 
-    Attributes
-    ----------
-    name, unit, meaning
-        Of the parameter.
-    share
-        Standard error over that of its prior [-].
-    before, after
-        95 % intervals around the middle of the prior [unit].
-    """
-
+    # name, unit, meaning: of the parameter
     name: str
     unit: str
     meaning: str
-    share: float
+    share: float  # standard error over that of its prior [-]
+    # before, after: 95 % intervals around the middle of the prior [unit]
     before: tuple[float, float]
     after: tuple[float, float]
 
@@ -249,19 +194,12 @@ PlanQuestion = EffectsInGeneral | OneEffect | TwoEffects
 
 @dataclass(frozen=True)
 class ProposedPieces:
-    """Pieces that could be added together, as one more discharge takes more than one.
-
-    Attributes
-    ----------
-    pieces : tuple of PlannedPiece
-    hours
-        Field work, with that of another flow [h].
-    before, after, least
-        The answer to the question before and after, the mean over all draws, and the least of them after [-].
-    """
+    """Pieces that could be added together, as one more discharge takes more than one."""
 
     pieces: tuple[PlannedPiece, ...]
-    hours: float
+    hours: float  # field work, with that of another flow [h]
+    # before, after, least: the answer to the question before and after, the mean over all draws, and the least of them
+    # after [-]
     before: float
     after: float
     least: float

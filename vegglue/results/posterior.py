@@ -37,117 +37,63 @@ OWN_UNIT = "that of the parameter, see `unit`"
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """The errors of the data that the misfit is weighed by.
+    """The errors of the data that the misfit is weighed by."""
 
-    Attributes
-    ----------
-    errors
-        "stated" or "estimated".
-    correlation
-        Of the errors of neighbours along a section [-].
-    scale
-        Of the stated errors [-].
-    grid_error
-        Root mean square, from a grid of twice the cell size [m/s, m]; NaN where that cannot be made.
-    """
-
-    errors: str
-    correlation: float
-    scale: float
-    grid_error: float
+    errors: str  # "stated" or "estimated"
+    correlation: float  # of the errors of neighbours along a section [-]
+    scale: float  # of the stated errors [-]
+    grid_error: float  # root mean square, from a grid of twice the cell size [m/s, m]; NaN where that cannot be made
 
 
 @dataclass(frozen=True)
 class PosteriorModes:
-    """Where the search for the best fit ended, the best mode first.
+    """Where the search for the best fit ended, the best mode first."""
 
-    Attributes
-    ----------
-    starts
-        Members that were followed downhill.
-    mode_theta
-        (mode, parameter) parameters of each.
-    mode_chi2
-        (mode,) misfit of each [-].
-    mode_weight
-        (mode,) weight of the draws nearest to each [-].
-    """
-
-    starts: int
-    mode_theta: Annotated[np.ndarray, Stored(("mode", "parameter"), OWN_UNIT)]
-    mode_chi2: Annotated[np.ndarray, Stored(("mode",))]
-    mode_weight: Annotated[np.ndarray, Stored(("mode",))]
+    starts: int  # members that were followed downhill
+    mode_theta: Annotated[np.ndarray, Stored(("mode", "parameter"), OWN_UNIT)]  # parameters of each
+    mode_chi2: Annotated[np.ndarray, Stored(("mode",))]  # misfit of each
+    mode_weight: Annotated[np.ndarray, Stored(("mode",))]  # weight of the draws nearest to each
 
 
 @dataclass(frozen=True)
 class ImportanceDraws:
-    """How the members were drawn, and as many draws from the prior to compare them with.
+    """How the members were drawn, and as many draws from the prior to compare them with."""
 
-    Attributes
-    ----------
-    drawn, worth
-        (round,) members, and what they are worth as equal ones, after each round.
-    log_density
-        (member,) ln of the density of the posterior up to a constant; -inf if it failed.
-    prior_theta
-        (parameter, member) draws from the prior.
-    """
-
+    # drawn, worth: members, and what they are worth as equal ones, after each round
     drawn: Annotated[np.ndarray, Stored(("round",), type=WHOLE_NUMBERS)]
     worth: Annotated[np.ndarray, Stored(("round",))]
+    # ln of the density of the posterior up to a constant; -inf if it failed
     log_density: Annotated[np.ndarray, Stored(("member",))]
-    prior_theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
+    prior_theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]  # draws from the prior
 
 
 @dataclass(frozen=True)
 class LeaveOneOut:
-    """Each station predicted from all others.
+    """Each station predicted from all others."""
 
-    Attributes
-    ----------
-    elpd, elpd_error
-        Sum of the log predictive densities of stations left out in turn, and its standard error [-].
-    inside50, inside95
-        Shares of measurements within the 50 % and the 95 % band of the prediction from all others [-].
-    p_calibration
-        Chance that shares below are as uneven as these (Kolmogorov-Smirnov) [-].
-    score, score_k
-        (station,) log predictive density given all other stations, and its Pareto k [-].
-    below
-        (station,) share of the prediction below the measurement.
-    """
-
+    # elpd, elpd_error: sum of the log predictive densities of stations left out in turn, and its standard error [-]
     elpd: float
     elpd_error: float
+    # inside50, inside95: shares of measurements within the 50 % and the 95 % band of the prediction from all others [-]
     inside50: float
     inside95: float
-    p_calibration: float
+    p_calibration: float  # chance that shares below are as uneven as these (Kolmogorov-Smirnov) [-]
+    # score, score_k: log predictive density given all other stations, and its Pareto k
     score: Annotated[np.ndarray, Stored(("station",))]
     score_k: Annotated[np.ndarray, Stored(("station",))]
-    below: Annotated[np.ndarray, Stored(("station",))]
+    below: Annotated[np.ndarray, Stored(("station",))]  # share of the prediction below the measurement
 
 
 @dataclass(frozen=True)
 class MisfitTest:
-    """Whether the errors explain what the best member leaves, at all stations together and at each.
+    """Whether the errors explain what the best member leaves, at all stations together and at each."""
 
-    Attributes
-    ----------
-    chi2, freedom
-        Of the best member, whitened by the covariance of the errors [-], and its degrees of freedom.
-    p_misfit
-        Chance of a chi2 as large under errors alone [-].
-    surprise
-        (station,) residual that calibration cannot explain, in its errors.
-    outlier
-        (station,) one such among all is no chance.
-    """
-
+    # chi2, freedom: of the best member, whitened by the covariance of the errors [-], and its degrees of freedom
     chi2: float
     freedom: int
-    p_misfit: float
-    surprise: Annotated[np.ndarray, Stored(("station",))]
-    outlier: Annotated[np.ndarray, Stored(("station",), type=YES_OR_NO)]
+    p_misfit: float  # chance of a chi2 as large under errors alone [-]
+    surprise: Annotated[np.ndarray, Stored(("station",))]  # residual that calibration cannot explain, in its errors
+    outlier: Annotated[np.ndarray, Stored(("station",), type=YES_OR_NO)]  # one such among all is no chance
 
     @property
     def worst_outlier(self) -> int:
@@ -157,31 +103,19 @@ class MisfitTest:
 
 @dataclass(frozen=True)
 class GroupsLeftOut:
-    """Each section, and each experiment, predicted from all other stations.
+    """Each section, and each experiment, predicted from all other stations."""
 
-    Attributes
-    ----------
-    left_out, left_out_stations
-        (group,) sections and experiments left out in turn, and how many stations each has.
-    left_out_score, left_out_k
-        (group,) log predictive density of the stations of each together, and its Pareto k [-].
-    """
-
+    # left_out, left_out_stations: sections and experiments left out in turn, and how many stations each has
     left_out: Annotated[np.ndarray, Stored(("group",), type=IN_WORDS)]
     left_out_stations: Annotated[np.ndarray, Stored(("group",), type=WHOLE_NUMBERS)]
+    # left_out_score, left_out_k: log predictive density of the stations of each together, and its Pareto k
     left_out_score: Annotated[np.ndarray, Stored(("group",))]
     left_out_k: Annotated[np.ndarray, Stored(("group",))]
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """What a refined posterior knows more than a weighted ensemble.
-
-    Attributes
-    ----------
-    error_model, modes, draws, leave_one_out, misfit, groups
-        ErrorModel, PosteriorModes, ImportanceDraws, LeaveOneOut, MisfitTest and GroupsLeftOut.
-    """
+    """What a refined posterior knows more than a weighted ensemble."""
 
     error_model: ErrorModel
     modes: PosteriorModes
@@ -204,84 +138,45 @@ ByKind = Annotated[dict[str, float], Stored(("kind",), VALUE_UNIT)]
 
 @dataclass(frozen=True)
 class InferenceSettings:
-    """How the members were weighed, and which ensemble they come from.
+    """How the members were weighed, and which ensemble they come from."""
 
-    Attributes
-    ----------
-    method
-        "glue": members of the ensemble weighed; "refine": draws around the modes; "surrogate": of a surrogate.
-    likelihood
-        "gaussian", "nse" or "inverse-variance".
-    sigma_rule
-        "best-member" or "known".
-    threshold
-        Smallest efficiency of a member with weight [-]; -inf: none.
-    ensemble_hash
-        Config hash of the ensemble, '' where none was needed.
-    seed, version
-        Of the draws; and that of vegglue.
-    """
-
+    # "glue": members of the ensemble weighed; "refine": draws around the modes; "surrogate": of a surrogate
     method: str
-    likelihood: str
-    sigma_rule: str
-    threshold: float
-    ensemble_hash: str
+    likelihood: str  # "gaussian", "nse" or "inverse-variance"
+    sigma_rule: str  # "best-member" or "known"
+    threshold: float  # smallest efficiency of a member with weight [-]; -inf: none
+    ensemble_hash: str  # config hash of the ensemble, '' where none was needed
+    # seed, version: of the draws; and that of vegglue
     seed: int
     version: str
 
 
 @dataclass(frozen=True)
 class WeightedSample:
-    """The members: their parameters, what each predicts, how well, and its weight.
+    """The members: their parameters, what each predicts, how well, and its weight."""
 
-    Attributes
-    ----------
-    members, failed, best
-        How many, those without a flow among them, and the one that fits best.
-    unit, theta
-        By parameter: its unit, and its values (member,).
-    weights
-        (member,) w, of sum 1 [-].
-    efficiency
-        (member,) 1 - sum (y - f)^2 / sum (y - mean y)^2 (Nash-Sutcliffe) [-].
-    log_likelihood
-        (member, station) Gaussian; of a refined posterior that of each station given all others [-].
-    prediction
-        (member, station) f [unit of the kind].
-    """
-
+    # members, failed, best: how many, those without a flow among them, and the one that fits best
     members: int
     failed: int
     best: int
+    # unit, theta: by parameter: its unit, and its values (member,)
     unit: Annotated[dict[str, str], Stored(("parameter",), type=IN_WORDS)]
     theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
-    weights: Annotated[np.ndarray, Stored(("member",))]
-    efficiency: Annotated[np.ndarray, Stored(("member",))]
+    weights: Annotated[np.ndarray, Stored(("member",))]  # w, of sum 1
+    efficiency: Annotated[np.ndarray, Stored(("member",))]  # 1 - sum (y - f)^2 / sum (y - mean y)^2 (Nash-Sutcliffe)
+    # Gaussian; of a refined posterior that of each station given all others
     log_likelihood: Annotated[np.ndarray, Stored(("member", "station"))]
-    prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]
+    prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]  # f [unit of the kind]
 
 
 @dataclass(frozen=True)
 class WeightStatistics:
-    """What the weights are worth.
+    """What the weights are worth."""
 
-    Attributes
-    ----------
-    weighed
-        Members solved and above the threshold.
-    effective_size
-        N = 1 / sum w^2 (Kish): equal members that the weights w are worth [-].
-    largest_weight
-        Largest w [-].
-    pareto_k
-        Shape of the tail of the weights [-]; above 0.7 they are not to be trusted.
-    """
-
-    weighed: int
-    effective_size: float
-    largest_weight: float
-    pareto_k: float
+    weighed: int  # members solved and above the threshold
+    effective_size: float  # N = 1 / sum w^2 (Kish): equal members that the weights w are worth [-]
+    largest_weight: float  # largest w [-]
+    pareto_k: float  # shape of the tail of the weights [-]; above 0.7 they are not to be trusted
 
 
 @dataclass(frozen=True)
@@ -289,118 +184,71 @@ class Marginals:
     """Each parameter by its name, beside its prior, and the correlation of all pairs.
 
     Of a log-uniform or lognormal parameter, correlation, width_ratio and bound_mass are those of its log10.
-
-    Attributes
-    ----------
-    median, sd
-        Median and standard deviation [unit of the parameter].
-    quantiles, prior_quantiles
-        (parameter, level) of the posterior and of the prior at LEVELS.
-    log10_median, log10_sd
-        The same of log10, if the prior is log-uniform or lognormal [-].
-    correlation
-        (parameter, other_parameter) of all pairs [-].
-    width_ratio
-        (parameter,) 95 % range of the posterior over that of the prior [-].
-    identified
-        (parameter,) whether that is below IDENTIFIED_BELOW.
-    bounds
-        (parameter, side) of the prior, maybe infinite.
-    bound_mass, bound_hit
-        (parameter, side) share of the weight within 2 % of the range of a bound [-]; and whether it presses against
-        it.
     """
 
+    # median, sd: median and standard deviation [unit of the parameter]
     median: ByParameter
     sd: ByParameter
+    # quantiles, prior_quantiles: of the posterior and of the prior at LEVELS
     quantiles: Annotated[dict[str, np.ndarray], Stored(("parameter", "level"), OWN_UNIT)]
     prior_quantiles: Annotated[dict[str, np.ndarray], Stored(("parameter", "level"), OWN_UNIT)]
+    # log10_median, log10_sd: the same of log10, if the prior is log-uniform or lognormal [-]
     log10_median: ByLogParameter
     log10_sd: ByLogParameter
-    correlation: Annotated[np.ndarray, Stored(("parameter", "other_parameter"))]
+    correlation: Annotated[np.ndarray, Stored(("parameter", "other_parameter"))]  # of all pairs
+    # 95 % range of the posterior over that of the prior
     width_ratio: Annotated[dict[str, float], Stored(("parameter",))]
+    # Whether that is below IDENTIFIED_BELOW
     identified: Annotated[dict[str, bool], Stored(("parameter",), type=YES_OR_NO)]
-    bounds: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), OWN_UNIT)]
+    bounds: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), OWN_UNIT)]  # of the prior, maybe infinite
+    # bound_mass, bound_hit: share of the weight within 2 % of the range of a bound; and whether it presses against it
     bound_mass: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"))]
     bound_hit: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), type=YES_OR_NO)]
 
 
 @dataclass(frozen=True)
 class GoodnessOfFit:
-    """What is left between measured and predicted, and the errors it is compared with, by kind of observation.
+    """What is left between measured and predicted, and the errors it is compared with, by kind of observation."""
 
-    Attributes
-    ----------
-    used
-        Stations that count.
-    chi2
-        sum ((y - f) / s)^2 of the best member, s known standard errors [-]; NaN where one is unknown.
-    sigma
-        Root mean square residual of the best member, or of the known standard errors, by kind [its unit].
-    rmse, best_rmse
-        Root mean square residual of the median prediction, and of the best member, by kind [its unit].
-    noise
-        (station,) standard deviation of a residual, NaN if unknown.
-    residual, best_residual
-        (station,) y - f of the median prediction, and of the best member.
-    """
-
-    used: int
-    chi2: float
-    sigma: ByKind
+    used: int  # stations that count
+    chi2: float  # sum ((y - f) / s)^2 of the best member, s known standard errors [-]; NaN where one is unknown
+    sigma: ByKind  # root mean square residual of the best member, or of the known standard errors, by kind [its unit]
+    # rmse, best_rmse: root mean square residual of the median prediction, and of the best member, by kind [its unit]
     rmse: ByKind
     best_rmse: ByKind
-    noise: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
+    noise: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # standard deviation of a residual, NaN if unknown
+    # residual, best_residual: y - f of the median prediction, and of the best member
     residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
     best_residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
 
 
 @dataclass(frozen=True)
 class PredictiveDistribution:
-    """What the posterior predicts at the stations: quantiles, and draws of equal weight.
+    """What the posterior predicts at the stations: quantiles, and draws of equal weight."""
 
-    Attributes
-    ----------
-    model_band, total_band
-        (level, station) quantiles at LEVELS of the members alone, and with the residual error.
-    draws
-        (chain, draw) members of draws of equal weight.
-    predictive
-        (chain, draw, station) what these predict, with residual error.
-    """
-
+    # model_band, total_band: quantiles at LEVELS of the members alone, and with the residual error
     model_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]
     total_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]
-    draws: Annotated[np.ndarray, Stored(("chain", "draw"), type=WHOLE_NUMBERS)]
+    draws: Annotated[np.ndarray, Stored(("chain", "draw"), type=WHOLE_NUMBERS)]  # members of draws of equal weight
+    # What these predict, with residual error
     predictive: Annotated[np.ndarray, Stored(("chain", "draw", "station"), VALUE_UNIT)]
 
 
 @dataclass(frozen=True)
 class CorrectedCanopy:
-    """phi of a stand for another canopy height: equal Chézy coefficient at the same depth.
+    """phi of a stand for another canopy height: equal Chézy coefficient at the same depth."""
 
-    Attributes
-    ----------
-    parameter
-        Name of phi.
-    from_height, to_height, depth
-        Of the canopy [m], and depth of the water [m].
-    phi
-        (member,) phi of each [-].
-    median, sd, quantiles
-        Median, standard deviation, and quantiles at LEVELS [-].
-    log10_median, log10_sd
-        Median and standard deviation of log10 phi [-].
-    """
-
-    parameter: str
+    parameter: str  # name of phi
+    # from_height, to_height, depth: of the canopy [m], and depth of the water [m]
     from_height: float
     to_height: float
     depth: float
-    phi: Annotated[np.ndarray, Stored(("member",))]
+    phi: Annotated[np.ndarray, Stored(("member",))]  # phi of each
+    # median, sd, quantiles: median, standard deviation, and quantiles at LEVELS [-]
     median: float
     sd: float
     quantiles: Annotated[np.ndarray, Stored(("level",))]
+    # log10_median, log10_sd: median and standard deviation of log10 phi [-]
     log10_median: float
     log10_sd: float
 
@@ -411,42 +259,24 @@ class Transfer:
 
     Values and errors on the scale on which the prior is flat (log10 of a log-uniform one); NaN where the data constrain
     little. chi2 of homogeneity with its freedom and chance; misfits chi2 in the joint fit and alone.
-
-    Attributes
-    ----------
-    scale
-        Of the errors, from what the experiments alone leave [-].
-    gain
-        By which chi2 falls when every experiment has its own parameters [-].
-    more
-        How many parameters more these are.
-    p_all
-        Chance of such a gain by errors alone [-].
-    experiments
-        (experiment,) names.
-    value, error
-        (experiment, parameter) estimate of each experiment alone, and its standard error.
-    chi2, freedom, p
-        (parameter,) of homogeneity, its degrees of freedom, and its chance by errors alone [-].
-    misfit_together, misfit_alone
-        (experiment,) chi2 in the joint fit, and of the experiment alone [-].
-    stations
-        (experiment,) how many.
     """
 
-    scale: float
-    gain: float
-    more: int
-    p_all: float
-    experiments: Annotated[np.ndarray, Stored(("experiment",), type=IN_WORDS)]
+    scale: float  # of the errors, from what the experiments alone leave [-]
+    gain: float  # by which chi2 falls when every experiment has its own parameters [-]
+    more: int  # how many parameters more these are
+    p_all: float  # chance of such a gain by errors alone [-]
+    experiments: Annotated[np.ndarray, Stored(("experiment",), type=IN_WORDS)]  # names
+    # value, error: estimate of each experiment alone, and its standard error
     value: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
     error: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
+    # chi2, freedom, p: of homogeneity, its degrees of freedom, and its chance by errors alone
     chi2: Annotated[np.ndarray, Stored(("parameter",))]
     freedom: Annotated[np.ndarray, Stored(("parameter",))]
     p: Annotated[np.ndarray, Stored(("parameter",))]
+    # misfit_together, misfit_alone: chi2 in the joint fit, and of the experiment alone
     misfit_together: Annotated[np.ndarray, Stored(("experiment",))]
     misfit_alone: Annotated[np.ndarray, Stored(("experiment",))]
-    stations: Annotated[np.ndarray, Stored(("experiment",), type=WHOLE_NUMBERS)]
+    stations: Annotated[np.ndarray, Stored(("experiment",), type=WHOLE_NUMBERS)]  # how many
 
 
 @dataclass(frozen=True)
@@ -454,34 +284,19 @@ class Surrogate:
     """Of a command: what a posterior by a surrogate rests on, and how far it is known.
 
     Errors are standard errors over realisations of what the surrogate does not know, the largest of any parameter.
-
-    Attributes
-    ----------
-    runs, failed
-        Of the command, and those of them that failed.
-    settled
-        1 if the errors were small enough, and stayed so when runs were added.
-    median_error
-        Of a median [standard deviations of the posterior].
-    sd_error
-        Of a standard deviation, over itself [-].
-    last_error
-        Of the surrogate at the last runs, root mean square [standard errors of the data].
-    validation_low, validation_high
-        Discharges at which measurements would test it [m3/s]; NaN if the case has any.
-    station_error
-        (station,) of the surrogate, counted in the errors.
     """
 
+    # runs, failed: of the command, and those of them that failed
     runs: int
     failed: int
-    settled: int
-    median_error: float
-    sd_error: float
-    last_error: float
+    settled: int  # 1 if the errors were small enough, and stayed so when runs were added
+    median_error: float  # of a median [standard deviations of the posterior]
+    sd_error: float  # of a standard deviation, over itself [-]
+    last_error: float  # of the surrogate at the last runs, root mean square [standard errors of the data]
+    # validation_low, validation_high: discharges at which measurements would test it [m3/s]; NaN if the case has any
     validation_low: float
     validation_high: float
-    station_error: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
+    station_error: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # of the surrogate, counted in the errors
 
 
 @dataclass(frozen=True)

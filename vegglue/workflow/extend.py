@@ -259,31 +259,18 @@ def kept_extension(run: CaseRun, found: Diagnosis) -> StepwiseExtension | None:
 
 @dataclass(frozen=True)
 class ExtensionReason:
-    """What was added, or why nothing was, and why each of the others was not.
+    """What was added, or why nothing was, and why each of the others was not."""
 
-    Parameters
-    ----------
-    added
-        Names of what was added, in order.
-    nothing
-        Why nothing was tried: `law` if `discover` would add one, else the kind of the verdict; empty if something was
-        tried.
-    spread
-        Name, half length and half width [m] of each added place, over which it is spread.
-    unclear
-        Falls of held-out errors that may be chance, by the name of what was added.
-    refused
-        Why each of the others was not kept, by name.
-    lines
-        x of surveyed lines whose level is not used [m].
-    """
-
-    added: tuple[str, ...]
+    added: tuple[str, ...]  # names of what was added, in order
+    # Why nothing was tried: `law` if `discover` would add one, else the kind of the verdict; empty if something was
+    # tried
     nothing: str = ""
+    # Name, half length and half width [m] of each added place, over which it is spread
     spread: tuple[tuple[str, float, float], ...] = ()
+    # Falls of held-out errors that may be chance, by the name of what was added
     unclear: Mapping[str, Any] = field(default_factory=dict)
-    refused: Mapping[str, Any] = field(default_factory=dict)
-    lines: tuple[float, ...] = ()
+    refused: Mapping[str, Any] = field(default_factory=dict)  # why each of the others was not kept, by name
+    lines: tuple[float, ...] = ()  # x of surveyed lines whose level is not used [m]
 
 
 def extension_reason(case: Case, found: Diagnosis, choice: Choice) -> ExtensionReason:

@@ -188,40 +188,24 @@ def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False
 
 @dataclass(frozen=True)
 class Mark:
-    """One hidden cause compared with a diagnosis.
+    """One hidden cause compared with a diagnosis."""
 
-    Attributes
-    ----------
-    hidden, kind
-        The cause, and what kind of cause it is.
-    verdict
-        Kind of the verdict, '' without a diagnosis.
-    found, named
-        Whether it counts as found for its kind of cause, and whether the verdict is this effect alone.
-    inside, open
-        Whether it is in the set, and whether it is listed among what is not excluded.
-    holds
-        Whether the 95 % interval holds the true amplitude, None if it is not in the set.
-    away
-        Distance of the nearest place found from the true one [m], NaN without either.
-    groups, said
-        Groups of effects that the data cannot separate, for each step, and the set.
-    shapes
-        (name, found, true) of shapes that differ by 5 % or more.
-    """
-
+    # hidden, kind: the cause, and what kind of cause it is
     hidden: Hidden
     kind: Literal["probe", "unlisted", "law", "effect"]
-    verdict: str = ""
+    verdict: str = ""  # kind of the verdict, '' without a diagnosis
+    # found, named: whether it counts as found for its kind of cause, and whether the verdict is this effect alone
     found: bool = False
     named: bool = False
+    # inside, open: whether it is in the set, and whether it is listed among what is not excluded
     inside: bool = False
     open: bool = False
-    holds: bool | None = None
-    away: float = float("nan")
+    holds: bool | None = None  # whether the 95 % interval holds the true amplitude, None if it is not in the set
+    away: float = float("nan")  # distance of the nearest place found from the true one [m], NaN without either
+    # groups, said: groups of effects that the data cannot separate, for each step, and the set
     groups: tuple[int, ...] = ()
     said: tuple[str, ...] = ()
-    shapes: tuple[tuple[str, float, float], ...] = ()
+    shapes: tuple[tuple[str, float, float], ...] = ()  # (name, found, true) of shapes that differ by 5 % or more
 
 
 @dataclass(frozen=True)
