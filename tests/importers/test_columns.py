@@ -372,3 +372,9 @@ def test_own_columns_and_units_are_kept_in_the_case(tmp_path: Path) -> None:
     (record,) = found.case.imported or ()
     assert (record.columns, record.units["u"]) == ({"x": "P", "y": "y", "u": "V1"}, "ft/s")
     assert found.table[["x", "value", "section"]].to_numpy().tolist() == [[6.0, 0.6096, "A"]]
+
+
+@pytest.mark.parametrize("heading", ["%Q", "% Q", "Depth %", "Velocity percent", "pct flow"])
+def test_a_share_is_no_quantity(tmp_path: Path, heading: str) -> None:
+    """`%Q` of a gauging was its discharge in m3/s."""
+    assert rows_of(tmp_path, f"x;{heading};u\n1;40;0.4\n2;60;0.5\n").numbers.keys() == {"x", "u"}

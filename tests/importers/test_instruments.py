@@ -271,6 +271,62 @@ def test_records_of_one_vertical_keep_errors_of_their_own(tmp_path: Path) -> Non
     assert pd.read_csv(case.observations[0].file)["u_se"].tolist() == [0.01, 0.0, 0.04]
 
 
+QREVIEW = """ \r
+Discharge Measurement Summary\r
+Units\tImperial\tPoint Offset\t0.00\r
+Start edge\tRIGHT\tFirst edge position(ft)\t56.00\tLast edge position(ft)\t99.50\r
+ \r
+Time Series\r
+Time    \tNr \tPnts\tPos. \tDepth \tMeanV \tArea  \tQ     \t%Q    \tAngle\tStD of\tTempe\r
+        \t  \t    \t(ft)   \t(ft)        \t(ft/s)    \t(ft³)    \t(ft³/s)    \t      \t(?   \t(ft³/s)  \t(°C) \r
+17:00:13\t1\t1\t60.00\t2.052\t0.021\t6.156\t0.129\t0.6\t-62.3*\t0.41\t18.8\r
+18:16:28\t3\t2\t64.50\t3.138\t0.271\t1.569\t0.426\t1.8\t-0.3\t0.13\t20.1\r
+17:05:06\t2\t2\t64.00\t2.967\t0.292\t3.709\t1.081\t4.6\t0.3\t0.10\t19.2\r
+"""
+
+
+def test_verticals_of_an_ott_adc_stand_along_their_tape(tmp_path: Path) -> None:
+    """Units below the headings, in the code page of Windows; added verticals stand out of order."""
+    path = tmp_path / "mill_Summary.TSV"
+    path.write_bytes(QREVIEW.encode("cp1252"))
+    taken = reader_of(path)(path, FileOptions(line=((10.0, 0.0), (10.0, 40.0))))
+    assert taken.numbers["y"] == pytest.approx(0.3048 * np.array([60.0, 64.5, 64.0]))
+    assert taken.numbers["u"] == pytest.approx(0.3048 * np.array([0.021, 0.271, 0.292]))
+    assert taken.numbers["depth"] == pytest.approx(0.3048 * np.array([2.052, 3.138, 2.967]))
+
+
+MF_PRO = """Profile Name: MILL 1
+14:23 Mo 24. Aug 2015
+Start Edge: Left Edge Water
+# Stations: 3
+Stage Reference: 0.300 m
+
+Time\tStation\tLocation (m)\tMethod\tDepth (m)\tEdge Factor\t0.2 (m/s)\t0.6 (m/s)\tAverage Velocity (m/s)\tFlow (m³/s)
+14:25\t1\t0.20\t0 point\t0.00\t0.60\t0.000\t0.000\t0.000\t0.000
+14:26\t2\t1.20\t1 point\t0.42\t0.00\t0.000\t0.351\t0.351\t0.147
+14:29\t3\t2.20\t2 point\t0.61\t0.00\t0.512\t0.000\t0.457\t0.279
+"""
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_verticals_of_an_ott_mf_pro_stand_along_their_tape(tmp_path: Path, decimal: str) -> None:
+    site = f"{CHANNEL}{JUNE}files: {{mill.tsv: {{line: [[10, 3.2], [10, -3]]}}}}\n"
+    found = imported(folder_of(tmp_path / "mill", site, mill__tsv=MF_PRO.replace(".", decimal)))
+    assert found.table["y"].tolist() == pytest.approx([2.0, 1.0])
+    assert found.values() == [0.351, 0.457]
+    error = refusal(folder_of(tmp_path / "brook", CHANNEL + JUNE, mill__tsv=MF_PRO))
+    assert "expected where the tape of 'Location (m)' lay" in error
+
+
+def test_points_of_an_aquacalc_5000_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = " 1,    43.00,   0.00,  0.00,    0,  0.0,  1.00,   6,  1.00,   9:50,   0.341,    0.000,     0.000,         ,"
+    head = "\nAquaCalc 5000 (tm)  by JBS Instruments \n\n  GAGE ID#  ,6690500\n\n"
+    path.write_text(f"{head}OB ,DIST    ,DEPTH,ICE,REVS,TIME,COS:VF,LOC,COEF ,CLOCK  ,VEL   ,AREA \n{rows}\n")
+    with pytest.raises(InputError, match="points of an AquaCalc 5000; write a table"):
+        reader_of(path)(path, FileOptions(line=((10.0, 0.0), (10.0, 40.0))))
+
+
 def samples(mean: float, headings: str = "Time,Vx,Vy,Corr1,Corr2") -> str:
     """A table of a probe at 25 Hz: of each fifty samples one has a low correlation, and one of 300 is a spike."""
     rng = np.random.default_rng(round(100 * mean))

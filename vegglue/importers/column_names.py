@@ -235,6 +235,7 @@ ROLES = {
         Role("device", "", ("device", "instrument", "probe", "sensor")),
     )
 }  # fmt: skip
+OF_SHARES = re.compile(r"%|\b(percent|pct)\b", re.IGNORECASE)
 DEGREES = {"lat", "latitude", "lon", "long", "lng", "longitude", "breite", "breitengrad", "laenge", "langengrad"}
 _ROLE_OF = {name: role.name for role in ROLES.values() for name in role.names}
 
@@ -246,8 +247,12 @@ def role_of(heading: str) -> tuple[str, str | None] | None:
 
 
 def known_name(heading: str) -> tuple[str, str | None] | None:
-    """Under which name of its role a column is known, and the unit its heading states: `('u mean', 'm/s')`."""
+    """Under which name of its role a column is known, and the unit its heading states: `('u mean', 'm/s')`; a share,
+    such as `%Q`, under none.
+    """
     bare, unit = _name_and_brackets(heading)
+    if OF_SHARES.search(bare):
+        return None
     if (found := _ROLE_OF.get(words_of(bare))) is not None:
         quantity = ROLES[found].quantity
         return words_of(bare), unit_named(unit, quantity) if unit and quantity else None

@@ -1,10 +1,12 @@
-"""Gaugings along a tape: FlowTracker2 (.ft), FlowTracker and RiverSurveyor Stationary Live (.dis), AquaCalc (.csv).
+"""Gaugings along a tape: FlowTracker2 (.ft), FlowTracker and RiverSurveyor Stationary Live (.dis), AquaCalc (.csv),
+OTT ADC (.tsv).
 
 Formats: FlowTracker2 User's Manual (SonTek, January 2019), section 12.1: a ZIP whose DataFile.json holds `Stations`
 with Location, Depth and Calculations, in metres and seconds, or with units in the keys (`Depth (ft)`). FlowTracker
 (file format 2.x) and RiverSurveyor Stationary Live (2.x) as their programs export them: text with settings, then a
 table of verticals. AquaCalc Pro (JBS Instruments, file version 1.5): settings, then a table that begins with VERT, in
-feet, or in metres if its standard is metric. Edges, and verticals without a method, samples or time, are no
+feet, or in metres if its standard is metric. OTT ADC, as QReview exports it (2.17): settings, then a table that begins
+with Time and Nr, its units below its headings. Edges, and verticals without a method, samples or time, are no
 measurements: all programs write 0 for them.
 """
 
@@ -36,9 +38,11 @@ DATA_FILE = "datafile.json"
 FLOWTRACKER = re.compile(r"^Sensor_Type\s+FlowTracker|FlowTracker_Handheld_ADV", re.MULTILINE)
 RIVERSURVEYOR = re.compile(r"^System Type;\s*RS-|RiverSurveyor Stationary", re.MULTILINE)
 AQUACALC = re.compile(r"\A.{0,100}^\W*AquaCalc", re.MULTILINE | re.DOTALL)
+OF_POINTS = re.compile(r"^\s*OB\s*,\s*DIST\s*,", re.MULTILINE)  # the table of an AquaCalc 5000
+QREVIEW = re.compile(r"^Time\s*\tNr\s*\tPnts\s*\tPos\.", re.MULTILINE)
 # Columns of place, depth and mean velocity of the vertical, and its error.
 COLUMNS_OF_GAUGINGS = {
-    "tape": ("Loc", "Location", "DIST"),
+    "tape": ("Loc", "Location", "DIST", "Pos."),
     "depth": ("Depth", "TDPTH"),
     "u": ("MeanV", "Mean Velocity", "VVEL"),
     "u_se": ("Verr",),
@@ -133,12 +137,12 @@ def _measured_vertical(path: Path, station: Mapping[str, Any]) -> list[float]:
 
 
 def is_gauging(text: str) -> bool:
-    """Whether a text is an export of one of the three programs."""
-    return any(program.search(text) for program in (FLOWTRACKER, RIVERSURVEYOR, AQUACALC))
+    """Whether a text is an export of one of the four programs."""
+    return any(program.search(text) for program in (FLOWTRACKER, RIVERSURVEYOR, AQUACALC, QREVIEW))
 
 
 def read_gauging(path: Path, options: FileOptions) -> MeasuredRows:
-    """Verticals of a FlowTracker, a RiverSurveyor Stationary or an AquaCalc, at their place on the tape.
+    """Verticals of a FlowTracker, a RiverSurveyor Stationary, an AquaCalc or an OTT ADC, at their place on the tape.
 
     Parameters
     ----------
@@ -174,8 +178,9 @@ def read_gauging(path: Path, options: FileOptions) -> MeasuredRows:
 
 
 def _table_of_gauging(path: Path, text: str) -> ParsedTable:
-    """The table of verticals, whose units a FlowTracker states below its headings, a RiverSurveyor in the part `Units`,
-    and an AquaCalc by its standard. Its rows begin with a number, or hold half as many as the heading has fields.
+    """The table of verticals, whose units a FlowTracker and QReview state below its headings, a RiverSurveyor in the
+    part `Units`, and an AquaCalc by its standard. Its rows begin with a number, or hold half as many as the heading has
+    fields.
     """
     unit_of: dict[str, str] = {}
     if AQUACALC.search(text):
@@ -185,6 +190,8 @@ def _table_of_gauging(path: Path, text: str) -> ParsedTable:
         unit_of = {"DIST": length, "TDPTH": length, "VVEL": velocity}
     elif FLOWTRACKER.search(text):
         program, mark, below = "FlowTracker", re.compile(r"\s*St\s+Clock"), 0
+    elif QREVIEW.search(text):
+        program, mark, below = "OTT QReview", re.compile(r"Time\s*\tNr"), 0
     else:
         program, mark, below = "RiverSurveyor Stationary", re.compile("Measurement Results"), 1
         part = re.search(r"^Units\s*$(.*?)^\s*$", text, re.MULTILINE | re.DOTALL)
@@ -201,14 +208,19 @@ def _table_of_gauging(path: Path, text: str) -> ParsedTable:
 
     lines = text.splitlines()
     head = below + next((i for i, line in enumerate(lines) if mark.match(line)), len(lines))
+    if head >= len(lines) and OF_POINTS.search(text):
+        raise InputError(
+            f"{shown_path(path)}: expected verticals of an AquaCalc Pro, got points of an AquaCalc 5000; write a table "
+            "with DIST, DEPTH, VEL times COS:VF as `velocity`, and DEPTH times LOC / 10 as `below surface`, with units."
+        )
     if head >= len(lines):
         raise InputError(
             f"{shown_path(path)}: expected the table of verticals of a {program}, got none; export it anew."
         )
     headings, rest = tuple(cut(lines[head].rstrip("\t "))), [cut(line) for line in lines[head + 1 :]]
-    if program == "FlowTracker" and rest:
+    if program in ("FlowTracker", "OTT QReview") and rest:
         unit_of = {name: unit for name, unit in zip(headings, rest[0], strict=False) if unit not in ("()", "(*D)")}
-    if program == "RiverSurveyor Stationary":  # its rows end in tabs
+    if program in ("RiverSurveyor Stationary", "OTT QReview"):  # its rows end in tabs
         rest = [fields[: len(headings)] for fields in rest]
     there = [
         (number, fields)

@@ -31,6 +31,7 @@ from vegglue.wording.sentences import sentences
 EXPERIMENTS = "experiments"
 # Headings that a message lists of each kind of measurement: the commonest stand first.
 HEADINGS_SHOWN = 4
+HEADINGS_OF_NONE = 8  # that a message lists where none is the one wanted
 VELOCITIES = ("u", "v", "speed")
 # Share of places with several heights from which a table is of verticals [-]. Chosen, not measured: less may be places
 # that were read again, with another level of the bed or of the probe beside it.
@@ -189,7 +190,8 @@ def _with_experiment_and_section(
     wide = [heading for heading in taken.others if any(f" {name} " in f" {words_of(heading)} " for name in words)]
     written_long = InputError("wide_table", where=where, experiments=experiments, got=wide)
     if "x" not in place:
-        headings = ", ".join(taken.headings)
+        more = [f"{len(taken.headings) - HEADINGS_OF_NONE} more"] if len(taken.headings) > HEADINGS_OF_NONE else []
+        headings = listed([*taken.headings[:HEADINGS_OF_NONE], *more])
         if any(map(is_in_degrees, taken.others)):
             raise InputError("places_in_degrees", where=where.removesuffix(":"), role="x")
         if [kind.column for kind in KINDS.values() if kind.column in taken.numbers] == ["discharge"]:
@@ -199,6 +201,11 @@ def _with_experiment_and_section(
             )
         if "level" not in taken.numbers and wide:
             raise written_long
+        if "tape" in taken.numbers:
+            raise InputError(
+                f"{where} expected where the tape of {taken.columns['tape']!r} lay, got none; add `line: [[x, y], [x, "
+                "y]]` to this file in `files`, first the end where it reads 0, or name it x by `columns`."
+            )
         raise InputError(
             f"{where} expected a column of x, got none in {headings}; name it by `columns: {{x: ...}}` of this file in "
             "`files`, or give there `x: 12 m`, `line` or `position`."
