@@ -698,3 +698,78 @@ def test_flat_banks_of_a_channel_are_banks(tmp_path: Path, slope: float, beyond:
 def test_a_bed_of_another_unit_in_a_table_is_converted(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "b", "bed: {file: s.csv, sections: true}\n" + JUNE, s__csv="section,x,y,z\nA,0,0,1\n")
     assert "s.csv" in refusal(folder)
+
+
+FRAMED = "frame: {origin: [683120, 247480], angle: 32}\n"
+SECTION_FRAMED = [(683132.8, 247482.1), (683131.8, 247483.8), (683130.8, 247485.5)]
+
+
+def on_map(place, **columns):
+    """Velocities of a section whose places are turned into another form."""
+    rows = [",".join(map(repr, (*place(east, north), 0.34, 0.21))) for east, north in SECTION_FRAMED]
+    return "\n".join([columns.get("head", "Easting,Northing,Ve,Vn"), *rows])
+
+
+@pytest.mark.parametrize(
+    ("place", "cause"),
+    [
+        (lambda east, north: (north, east), "look exchanged"),
+        (lambda east, north: (east + 2e6, north + 1e6), "digits"),
+        (lambda east, north: (east / 0.3048, north / 0.3048), "units: {x: ft"),
+        (lambda east, north: (east / 1e3, north / 1e3), "units: {x: km"),
+        (lambda east, north: (east - 683120.0, north - 247480.0), "coordinates: channel"),
+        (lambda east, north: (east - 216000.0, north + 4990000.0), "correct `frame`"),
+        (lambda east, north: (8.0 + east * 1e-6, 47.0 + north * 1e-6), "degrees"),
+    ],
+)  # fmt: skip
+def test_places_far_from_the_site_are_refused_with_the_likely_cause(tmp_path: Path, place, cause: str) -> None:
+    """A million metres off, all stations were outside the grid, which `check` alone said."""
+    error = refusal_of(tmp_path, CHANNEL + JUNE + FRAMED, v__csv=on_map(place))
+    assert "v.csv: expected" in error
+    assert cause in error
+
+
+def test_degrees_are_no_metres_without_a_frame_either(tmp_path: Path) -> None:
+    """They became one place, with all velocities as its repeats."""
+    degrees = on_map(lambda east, north: (8.0 + east * 1e-6, 47.0 + north * 1e-6), head="x,y,u,v")
+    assert "degrees" in refusal_of(tmp_path, v__csv=degrees)
+
+
+def test_a_plane_of_millimetres_is_one(tmp_path: Path) -> None:
+    found = import_of(tmp_path, v__csv="x [mm],y [mm],u\n8000,2,0.3\n8000,4,0.31\n8002.5,7,0.32\n")
+    assert found.table["y"].tolist() == pytest.approx([0.002, 0.004, 0.007])
+
+
+@pytest.mark.parametrize("at", ["patches: [{file: p.geojson}]", "classes: {file: p.geojson}", "bed: {file: b.csv}"])
+def test_maps_far_from_the_site_are_refused(tmp_path: Path, at: str) -> None:
+    ring = [[2683130.0, 1247480.0], [2683134.0, 1247480.0], [2683134.0, 1247482.0]]
+    polygon = {"type": "Feature", "properties": {"class": "a"}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    points = "\n".join(
+        ["x,y,z", *(f"{2683100 + 2 * i},{1247470 + 2 * j},{0.1 * j}" for i in range(9) for j in range(9))]
+    )
+    files = {"p__geojson": json.dumps({"type": "FeatureCollection", "features": [polygon]}), "b__csv": points}
+    site = CHANNEL + JUNE + FRAMED + at + "\n"
+    used = {name: text for name, text in files.items() if name.replace("__", ".") in at}
+    assert "digits" in refusal_of(tmp_path, site, v__csv=on_map(lambda east, north: (east, north)), **used)
+
+
+@pytest.mark.parametrize(
+    ("name", "begin", "words"),
+    [
+        ("p.las", b"LASF\x00\x00", "point cloud"), ("p.ply", b"ply\nformat ascii 1.0\n0 0 1\n1 0 2\n", "point cloud"),
+        ("p.gpkg", b"SQLite format 3\x00", "GeoPackage"), ("p.dxf", b"  0\r\nSECTION\r\n  2\r\n", "drawing"),
+        ("p.kml", b'\xef\xbb\xbf<?xml version="1.0"?>\n<kml>8.5,47.3,0 8.6,47.3,0</kml>', "KML"),
+        ("p.gpx", b'<?xml version="1.0"?><gpx version="1.1">', "GPX"), ("p.xls", b"\xd0\xcf\x11\xe0\xa1", "Excel 97"),
+        ("p.pdf", b"%PDF-1.4", "PDF"), ("p.ods", b"PK\x03\x04", "packed"), ("p.xml", b"<Data><v>1</v></Data>", "XML"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("at", ["bed: {file: F}", "patches: [{file: F}]", "grid: {centreline: {file: F}}"])
+def test_files_of_other_programs_are_named_with_what_to_save(
+    tmp_path: Path, at: str, name: str, begin: bytes, words: str
+) -> None:
+    folder = folder_of(tmp_path / "brook", CHANNEL + JUNE + at.replace("F", name) + "\n", v__csv="x,y,u\n8,0,0.4\n")
+    (folder / name).write_bytes(begin)
+    error = refusal(folder)
+    assert f"{name}: expected text, got a" in error
+    assert words in error
+    assert "; save " in error

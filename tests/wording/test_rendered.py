@@ -438,6 +438,10 @@ CSV = Path("adv.csv")
 FILES = "site.yaml: `files.adv.csv`"
 AT_ROW = {"file": CSV, "row": 3}
 OF_SITE = {"known": ("low", "high"), "site": "site.yaml", "key": "experiments"}
+FOREIGN_FILES = (
+    ("a.las", "a point cloud (LAS, LAZ)", "points"), ("a.dxf", "a drawing (DXF)", "drawn"),
+    ("a.xls", "a workbook of Excel 97 (.xls)", "workbook"),
+)  # fmt: skip
 REFUSED = [
     InputError("unreadable", file=CSV, why="No such file or directory"),
     *(
@@ -472,6 +476,11 @@ REFUSED = [
         InputError("missing_columns", file=CSV, wanted=("x", "y", "u"), got=got, missing=missing)
         for got, missing in ((["x", "y", "v"], ["u"]), (["x"], ["y", "u"]), ([], ["x", "y", "u"]))
     ),
+    *(
+        InputError("far_places", where="a.csv", origin=[683120.0, 247480.0], got=[2.5, 8.25], apart=2.24e6, cause=cause)
+        for cause in ("exchanged", "degrees", "channel", "digits", "ft", "")
+    ),
+    *(InputError("foreign_format", file=Path(name), name=of, instead=kind) for name, of, kind in FOREIGN_FILES),
     InputError("ragged_record", file=Path("a.dat"), row=2, fields=18, got=17),
     *(
         InputError("option_of_records", file=Path(name), option="position", records="records of a probe", dat=dat)

@@ -19,7 +19,6 @@ from vegglue.case.config import load_case, read_tree
 from vegglue.case.grid import centreline_in
 from vegglue.case.gridded_site import build_site, cells_at
 from vegglue.case.resolved_config import Tree
-from vegglue.case.site_schema import Frame
 from vegglue.case.text_files import case_name, told_apart
 from vegglue.case.zones import BANK_SLOPE
 from vegglue.effects.physical_constants import GRAVITY
@@ -51,7 +50,13 @@ from vegglue.importers.terrain import (
     surveyed_ground,
     with_banks,
 )
-from vegglue.importers.vector_files import drawn_placement, planted_polygons, refuse_crossing, summary_of_plants
+from vegglue.importers.vector_files import (
+    drawn_placement,
+    planted_polygons,
+    refuse_crossing,
+    refuse_far_polygons,
+    summary_of_plants,
+)
 from vegglue.measurements.plausibility import DEEPEST_CHANNEL, STANDING_WATER
 from vegglue.wording.sentences import phrase
 
@@ -108,7 +113,7 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     _refuse_standing_water(path, site)
     drawn, place = drawn_placement(folder, site)
     frame, given = place.frame, site.grid.centreline if site.grid is not None else None
-    patches, drawn_patches = _patches(folder, site.patches, frame)
+    patches, drawn_patches = _patches(folder, site.patches, place)
     # Files that the site file names and that hold no measurements.
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
     used += [given.file] if isinstance(given, FileOfSite) else []
@@ -273,7 +278,7 @@ def case_from_sheet(folder: Path, target: Path, config: Path) -> FolderCase:
     return FolderCase(tree, texts_of_tables(target, measured.tables))
 
 
-def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -> tuple[list[PlantedPatch], list[Tree]]:
+def _patches(folder: Path, given: Sequence[PlantedPatch], place: Placement) -> tuple[list[PlantedPatch], list[Tree]]:
     """The patches of a site file, and those of the files of polygons that it names, with what was taken from these."""
     found: list[PlantedPatch] = []
     imported: list[Tree] = []
@@ -284,7 +289,8 @@ def _patches(folder: Path, given: Sequence[PlantedPatch], frame: Frame | None) -
             continue
         if not (folder / one.file).is_file():
             raise InputError("not_there", folder=folder, key="patches", name=one.file)
-        polygons = planted_polygons(folder / one.file, frame, one.columns)
+        polygons = planted_polygons(folder / one.file, place.frame, one.columns)
+        refuse_far_polygons(folder / one.file, polygons, place)
         imported.append(record(folder / one.file, None, summary_of_plants(polygons)))
         for polygon in polygons:
             density = polygon.density if polygon.density is not None else one.stems_per_m2

@@ -4,9 +4,11 @@ Whatever a library makes of a damaged file, and however many numbers a small fil
 sentence.
 """
 
+import codecs
 import io
 import json
 import logging
+import re
 import struct
 import traceback
 import warnings
@@ -31,6 +33,30 @@ COMPRESSED, AT_ONCE_UNPACKED = 15, 1 << 20  # type of an element of a MATLAB fil
 LONGEST_COMPLAINT = 200  # letters of a library's complaint; some quote the file
 MATLAB_READER = f"{__name__}:unpack_matlab"  # as the process of its own knows it
 MATLAB_5 = "MATLAB 5"
+# How files begin that are no table, up to so much of them [bytes]; what they are, and as what a program saves them.
+POINTS, DRAWN, WORKBOOK = "points", "drawn", "workbook"
+LONGEST_BEGINNING = 1000
+FOREIGN = (
+    (rb"LASF", "a point cloud (LAS, LAZ)", POINTS), (rb"ASTM-E57", "a point cloud (E57)", POINTS),
+    (rb"ply\r?\n", "a point cloud (PLY)", POINTS), (rb"AC10\d\d", "a drawing (DWG)", DRAWN),
+    (rb"(999\r?\n.*\r?\n\s*)?0\r?\n\s*SECTION", "a drawing (DXF)", DRAWN),
+    (rb"SQLite format 3", "a GeoPackage", DRAWN), (rb"(<\?xml[^>]*>\s*)?<kml", "a KML", DRAWN),
+    (rb"(<\?xml[^>]*>\s*)?<gpx", "a GPX track", DRAWN), (rb"(<\?xml[^>]*>\s*)?<LandXML", "a LandXML", DRAWN),
+    (rb"\xd0\xcf\x11\xe0", "a workbook of Excel 97 (.xls)", WORKBOOK), (rb"PK\x03\x04", "a packed file", WORKBOOK),
+    (rb"%PDF", "a PDF", WORKBOOK), (rb"PAR1", "a Parquet file", WORKBOOK), (rb"<[?!a-zA-Z]", "an XML", WORKBOOK),
+)  # fmt: skip
+
+
+def refuse_foreign(path: Path) -> None:
+    """InputError for a file that begins as one of FOREIGN: what it is, and as what to save it."""
+    try:
+        with path.open("rb") as file:
+            begin = file.read(LONGEST_BEGINNING).removeprefix(codecs.BOM_UTF8).lstrip()
+    except OSError as error:
+        raise InputError("unreadable", file=path, why=error.strerror) from None
+    for mark, name, instead in FOREIGN:
+        if re.match(mark, begin):
+            raise InputError("foreign_format", file=path, name=name, instead=instead)
 
 
 def readable_text(path: Path) -> str:

@@ -24,7 +24,14 @@ from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.instruments import BINARY_ENDINGS, reader_of
 from vegglue.importers.library_files import readable_text
-from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, joined_rows, with_experiments
+from vegglue.importers.measured_rows import (
+    MeasuredRows,
+    Placement,
+    in_the_channel,
+    joined_rows,
+    refuse_far_places,
+    with_experiments,
+)
 from vegglue.importers.site_file import HELD_OUT, FieldSite, held_out_files, site_file
 from vegglue.importers.stations import EXPERIMENTS, KnownExperiments, StationTable, errors_of_rows, station_tables
 from vegglue.importers.table_parser import WORKBOOKS
@@ -278,6 +285,10 @@ def _converted(
                 "upstream, draw the line from its other end: `reverse: true`, or its points upstream first."
             )
     read = [with_experiments(reader_of(path)(path, options), known.names) for path, options in group]
+    for one, (path, options) in zip(read, group, strict=True):
+        if {"x", "y"} <= one.numbers.keys():
+            on_map = Placement() if options.coordinates == "channel" else place
+            refuse_far_places(shown_path(path), one.numbers["x"], one.numbers["y"], on_map)
     placed = [in_the_channel(one, place, options) for one, (_, options) in zip(read, group, strict=True)]
     for number, one in enumerate(placed):  # depths h alone are levels z_b + h, z_b of their table, else of the case
         numbers = one.numbers

@@ -11,7 +11,7 @@ from vegglue.arrays import Array, Mask
 from vegglue.case.grid import Centreline, along_and_across, heading_at, on_map
 from vegglue.case.site_schema import Frame
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, known_name, unit_in_words
+from vegglue.importers.column_names import ROLES, UNITS, known_name, unit_in_words
 from vegglue.importers.column_roles import (
     NAMES_OF_BED,
     columns_of_table,
@@ -35,6 +35,11 @@ OF_RECORDS = {
     "draft": "raw records of a boat",
     "declination": "raw records of a boat",
 }
+# Places on a map further from a site are none of it, as no reach is so long [m]; digits that maps put in front, such as
+# 2 and 1 million of the Swiss ones, come in such steps [m]. How many places are looked at.
+FAR, DIGITS_IN_FRONT, MOST_PLACES = 2e4, 1e6, 50
+# Places of a reach within such a span, below a full turn and finer than a tenth of a millimetre, are degrees.
+SPAN_OF_DEGREES, FULL_TURN, FINER, FEWEST_PLACES = 0.02, 360.0, 1e-7, 3
 # Pairs of components, those that are named after the map first.
 COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 
@@ -265,6 +270,43 @@ def on_the_tape(path: Path, taken: MeasuredRows, options: FileOptions) -> Measur
     t = taken.numbers["tape"]
     places = {"x": x0 + t * east, "y": y0 + t * north}
     return taken.having(places, ImportNote(Noted.ON_TAPE, length)).without("tape")
+
+
+def refuse_far_places(where: str, east: Array, north: Array, place: Placement) -> None:
+    """InputError for places (n,) [m] that are rather degrees, and if most lie further than FAR from a site on a map.
+
+    where: how the message begins. The cause is what would bring them near: degrees, axes exchanged, another unit,
+    digits in front, or that they are those of the channel.
+    """
+    there = np.isfinite(east) & np.isfinite(north)
+    at = np.unique(np.column_stack([east, north])[there], axis=0)
+    if not len(at):
+        return
+    span, size = np.ptp(at, axis=0), np.abs(at).max(axis=0)
+    finer = bool((np.abs(at - np.round(at, 4)) > FINER).any())
+    degrees = len(at) >= FEWEST_PLACES and bool((span < SPAN_OF_DEGREES).all() and max(size) <= FULL_TURN)
+    if degrees and finer and min(size) > 0.0 and max(size) > 1.0:
+        raise InputError("places_in_degrees", where=where, role="x")
+    if not place.turned:
+        return
+    reach = np.zeros((1, 2)) if place.line is None else np.column_stack([place.line.x, place.line.y])
+
+    def apart(places: Array) -> float:
+        """Median distance from the site [m]."""
+        x, y = place.frame.to_model(*places.T) if place.frame is not None else places.T
+        return float(np.median([np.hypot(*(reach - one).T).min() for one in np.column_stack([x, y])[:MOST_PLACES]]))
+
+    if apart(at) <= FAR:
+        return
+    origin = np.array(place.to_map(*np.zeros((2, 1)))).T[0]
+    digits = np.round((origin - np.median(at, axis=0)) / DIGITS_IN_FRONT) * DIGITS_IN_FRONT
+    in_units = {unit: UNITS["length"][unit] * at for unit in ("ft", "km")}
+    tried = {"exchanged": at[:, ::-1], **in_units, "digits": at + digits}
+    near = [name for name, places in tried.items() if apart(places) <= FAR]
+    cause = near[0] if near else "degrees" if degrees else "channel" if max(size) <= FAR else ""
+    raise InputError(
+        "far_places", where=where, origin=origin.tolist(), got=at[0].tolist(), apart=apart(at), cause=cause
+    )
 
 
 def vertical_role(taken: MeasuredRows) -> str | None:

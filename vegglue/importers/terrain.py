@@ -34,11 +34,11 @@ from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.import_notes import BanksOfBed, FileNote, ImportNote, Noted
 from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_larger
 from vegglue.importers.measured_files import data_folder, record
-from vegglue.importers.measured_rows import Placement, in_the_channel, read_rows
+from vegglue.importers.measured_rows import Placement, in_the_channel, read_rows, refuse_far_places
 from vegglue.importers.site_file import FieldSite, FileOfSite, SiteGrid
 from vegglue.importers.stations import ONE_PLACE
 from vegglue.importers.table_parser import parse_table
-from vegglue.importers.vector_files import read_polygons, units_assumed
+from vegglue.importers.vector_files import read_polygons, refuse_far_polygons, units_assumed
 from vegglue.wording.numbers import listed, so_many
 from vegglue.wording.sentences import sentences
 
@@ -173,6 +173,7 @@ def mapped_classes(folder: Path, site: FieldSite, place: Placement) -> tuple[Tre
         return friction, []
     path = _file_of(folder, site.classes, "classes")
     polygons = read_polygons(path, place.frame)
+    refuse_far_polygons(path, polygons, place)
     zones = []
     for polygon in polygons:
         name = case_name(polygon.friction_class or polygon.name)
@@ -330,6 +331,7 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
         if not len(known):
             raise InputError("no_levels", file=path)
         shown = known if place.line is None else known[:: max(len(known) // MOST_FOR_EXTENT, 1)]
+        refuse_far_places(shown_path(path), raster.x[shown[:, 0]], raster.y[shown[:, 1]], place)
         along, across = place.to_channel(raster.x[shown[:, 0]], raster.y[shown[:, 1]])
         return Terrain(
             lambda x, y: np.asarray(reader(np.column_stack(place.to_map(x, y)))),
@@ -553,6 +555,8 @@ def _surveyed_points(path: Path, place: Placement, options: FileOptions) -> tupl
         roles = {known[0] for heading in headings if (known := role_of(heading)) is not None}
         deep = {"depth", "below"} & roles or any("depth" in words_of(heading).split() for heading in headings)
         raise InputError("no_bed_columns", file=path, got=headings, deep=deep and "z" not in roles)
+    on_map = Placement() if options.coordinates == "channel" else place
+    refuse_far_places(shown_path(path), taken.numbers["x"], taken.numbers["y"], on_map)
     taken = in_the_channel(taken, place, options)
     points = np.column_stack([taken.numbers[role] for role in "xyz"])
     there: Mask = np.asarray(np.isfinite(points).all(axis=1))

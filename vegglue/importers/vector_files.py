@@ -24,8 +24,15 @@ from vegglue.importers.column_roles import columns_of_table, taken_as_si
 from vegglue.importers.coordinate_systems import StatedSystem, epsg_number, refuse_other_system, system_of_wkt
 from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.import_notes import CentrelineTaken, ImportNote, Noted, PatchesRead, UnitsAssumed
-from vegglue.importers.library_files import importing, read_by_library, readable_text
-from vegglue.importers.measured_rows import MeasuredRows, Placement, in_the_channel, read_rows, rows_of_table
+from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_foreign
+from vegglue.importers.measured_rows import (
+    MeasuredRows,
+    Placement,
+    in_the_channel,
+    read_rows,
+    refuse_far_places,
+    rows_of_table,
+)
 from vegglue.importers.site_file import FieldSite, FileOfSite
 from vegglue.importers.table_parser import WORKBOOKS, is_number, parse_table
 from vegglue.measurements.plausibility import is_mark_anywhere
@@ -190,6 +197,13 @@ def planted_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str]
     return found
 
 
+def refuse_far_polygons(path: Path, found: Sequence[NamedPolygon], place: Placement) -> None:
+    """InputError for polygons that are rather degrees, or far from the site."""
+    x, y = np.array([corner for one in found for corner in one.corners]).T
+    east, north = place.frame.to_map(x, y) if place.frame is not None else (x, y)
+    refuse_far_places(shown_path(path), east, north, place)
+
+
 def summary_of_plants(found: Sequence[NamedPolygon]) -> str:
     """`2 patches: stems from Density; not read: d_mm`."""
     known = dict.fromkeys(one.density_from for one in found if one.density_from is not None)
@@ -303,6 +317,7 @@ def geojson_features(path: Path, what: str, frame: Frame | None = None) -> Itera
 
     InputError if it is none, names another system than the frame does, or lacks what is read of it within.
     """
+    refuse_foreign(path)
     try:
         tree = json.loads(readable_text(path))
         number = epsg_number(json.dumps(tree.get("crs")))
