@@ -263,8 +263,8 @@ Beside [the rules of tables](own_files.md#how-tables-are-read), `import`
 - **leaves out** codes of gauging offices (Ice, Eqp, -999999), and raw ensembles of a boat with a wrong checksum or
   size, cut short, or without bottom track or ranges;
 - **refuses** velocities relative to the boat (reference NONE), a jump of the boat, another coordinate system, datum or
-  unit of a map, missing-value codes in the site file, stems and corners, damaged MATLAB files, and files that unpack to
-  more than 100 MB.
+  unit of a map, places 20 km from the site, files of another kind by how they begin, missing-value codes in the site
+  file, stems and corners, damaged MATLAB files, and files that unpack to more than 100 MB.
 
 ## Following a run
 
