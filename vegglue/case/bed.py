@@ -30,8 +30,8 @@ WORDS_FOR_NO_LEVEL = re.compile(r"\b(null|nodata|na|nan)\b", re.IGNORECASE)
 # a Gaussian of 1 m (0.5 m) half width has a standard deviation 0.3 % (1.5 %) below that of the whole covariance, and
 # 1.1 % (2.4 %) with a place in each cell: there MOST_OF_SQUARE_ROOT columns are spent on what no station sees.
 SPACING = 0.5
-# Changes of a bed that are kept in memory, one for each grid of a calibration.
-MOST_CHANGES_KEPT = 8
+# Kriged means that are kept in memory, of a bed and without the level of a line on each grid of a calibration.
+MOST_MEANS_KEPT = 16
 
 
 @dataclass(frozen=True)
@@ -240,20 +240,14 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
     else:
         return np.full((grid.x.size, grid.y.size), np.nan)
     if (survey := layer.survey) is not None and survey.relevelled:
-        change = _change_without_levels(surveyed(survey), survey.loose, survey.covariances, cell_places(grid))
-        level = level + change.reshape(level.shape)
+        now, places = surveyed(survey), cell_places(grid)
+        as_before = replace(now, loose=survey.loose)
+        without, before = (kept_mean_level(one, survey.covariances, places) for one in (now, as_before))
+        level = level + (without - before).reshape(level.shape)
     return level
 
 
-@memoised(MOST_CHANGES_KEPT)
-def _change_without_levels(
-    survey: BedSurvey, loose: tuple[int, ...], covariances: tuple[CovarianceOfBed, ...], places: Array
-) -> Array:
-    """By how much the kriged mean at places (m, 2) changes (m,) [m] from a survey with `loose` lines to one with its
-    own.
-    """
-    without, before = (mean_level(one, covariances, places) for one in (survey, replace(survey, loose=loose)))
-    return without - before
+kept_mean_level = memoised(MOST_MEANS_KEPT)(mean_level)  # it is part of the bed, and of its error
 
 
 def surveyed(survey: SurveyOfBed) -> BedSurvey:

@@ -7,11 +7,11 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from vegglue.arrays import Array, Mask
-from vegglue.case.bed import all_places, cell_places, layer_levels, spline_places, surveyed, to_cells
+from vegglue.case.bed import all_places, cell_places, kept_mean_level, layer_levels, spline_places, surveyed, to_cells
 from vegglue.case.grid import Grid
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import BedLayer, CovarianceOfBed
-from vegglue.case.survey_error import BedSurvey, evidence_of_lines, line_weights, mean_level, root_of_covariance
+from vegglue.case.survey_error import BedSurvey, evidence_of_lines, line_weights, root_of_covariance
 from vegglue.memoised import memoised
 
 # Beds whose errors and lines are kept in memory, most of them of one column of cells.
@@ -70,7 +70,7 @@ def bed_error_columns(case: Case, grid: Grid, experiment: str = "") -> Array:
 def _error_columns_of(one: SurveyedLayer, grid: Grid) -> Array:
     x, y = spline_places(grid, one.covariances)
     error = to_cells(_root_of_covariance(one.read, one.covariances, all_places(x, y)), x, y, grid)
-    off = one.level.ravel() - mean_level(one.read, one.covariances, cell_places(grid))
+    off = one.level.ravel() - kept_mean_level(one.read, one.covariances, cell_places(grid))
     return one.in_cells(np.column_stack([off.astype("float32"), error])[one.there])
 
 
