@@ -25,7 +25,7 @@ from vegglue.case.resolved_config import dumped, plain_tree
 from vegglue.case.size_limits import WIDE_FROM
 from vegglue.engine.command import CommandRuns
 from vegglue.engine.corrected import Correction, InsensitiveCommandError, corrected, correction_at
-from vegglue.engine.interface import Model, Point, linearise, linearise_from, relinearised
+from vegglue.engine.interface import Model, Point, linearise, linearise_as_coarse, linearise_from, relinearised
 from vegglue.engine.model import coarser
 from vegglue.engine.newton import NEWTON, on_half_as_many_cells
 from vegglue.errors import InputError
@@ -76,7 +76,7 @@ class SearchModel:
     point: Point
 
 
-def baseline(model: Model, known: Array | None = None, noise: Noise | None = None) -> Baseline:
+def baseline(model: Model, known: Array | None = None, beside: Baseline | None = None) -> Baseline:
     """The calibrated model; on cells of twice the size, where a fit costs a quarter, as far as possible.
 
     Parameters
@@ -85,8 +85,8 @@ def baseline(model: Model, known: Array | None = None, noise: Noise | None = Non
         Of a case with at least one parameter.
     known : array (p,), optional
         z to start from, else the best points of the prior on coarse grids.
-    noise : Noise, optional
-        Of the same stations as far as it is known, else as their errors are stated.
+    beside : Baseline, optional
+        Of another bed on the same grid, with whose noise the search begins at its place from its flows.
 
     Returns
     -------
@@ -99,13 +99,14 @@ def baseline(model: Model, known: Array | None = None, noise: Noise | None = Non
         If no steady flow is found, or there is nothing to calibrate.
     """
     refuse_without_parameters(model.case)
-    noise, coarse = noise or noise_of(model.station), coarser(model)
+    coarse, noise = coarser(model), noise_of(model.station) if beside is None else beside.noise
+    before, near = (None, None) if beside is None else (beside.fitted.point, beside.on_coarse)
+    known = known if before is None else before.z
     if coarse is None:
-        start = _best_from_prior(model, noise) if known is None else linearise(model, known)
+        start = _best_from_prior(model, noise) if known is None else linearise_from(model, known, before)
         return with_own_error(Baseline(model, noise, fit(model, noise, _with_steady_flow(model, start)), None, None))
-    near: Point | None
     if known is not None:
-        near = linearise(coarse, known)
+        near = linearise_from(coarse, known, near)
     elif (coarsest := coarser(coarse) or on_half_as_many_cells(coarse)) is None:
         near = _best_from_prior(coarse, noise)
     else:
@@ -118,7 +119,10 @@ def baseline(model: Model, known: Array | None = None, noise: Noise | None = Non
         noise = with_own_error_at(noise, coarse, near)
         near = near if known is not None else fit(coarse, noise, near).point
     z = known if near is None else near.z
-    start = None if z is None else linearise_from(model, z, near)
+    if near is not None and beside is not None and beside.on_coarse is not None:
+        start = linearise_as_coarse(model, beside.fitted.point, beside.on_coarse, near)
+    else:
+        start = None if z is None else linearise_from(model, z, near)
     if start is None and known is None:  # the best point of the coarser cells has no flow on these
         start = _best_from_prior(model, noise)
     base = under_error_of_grid(Baseline(model, noise, at_point(noise, _with_steady_flow(model, start)), coarse, near))

@@ -172,7 +172,7 @@ def relevelled(base: Baseline, line: SurveyedLine) -> Relevelled | None:
     """
     case = without_level(base.model.case, line)
     try:
-        loose = baseline(replace(base.model, case=case, site=build_site(case)), base.fitted.point.z, base.noise)
+        loose = baseline(replace(base.model, case=case, site=build_site(case)), beside=base)
     except InputError:
         return None
     known = surveyed_lines(base.model.case, base.model.site.grid)
