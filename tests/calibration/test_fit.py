@@ -11,7 +11,7 @@ import scipy.optimize
 import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import MOST_STEPS, NEGLIGIBLE_DECREASE, STALLED_STEPS, fit, objective
+from vegglue.calibration.fit import HOPELESS, MOST_STEPS, NEGLIGIBLE_DECREASE, STALLED_STEPS, fit, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.parameter_space import FURTHEST
 from vegglue.engine.interface import Point, Wanted
@@ -78,6 +78,20 @@ def test_a_search_that_promises_too_little_is_not_followed(worth: float, followe
     least = float(np.sum((target - wide @ np.linalg.lstsq(wide, target)[0]) ** 2))
     found = fit(model_of(), NOISE, linear, enough=least + worth)
     assert (found.point is not linear) == followed
+
+
+@pytest.mark.parametrize(("steps_away", "followed"), [(0.9, True), (1.1, False)])
+def test_a_search_far_from_the_evidence_that_is_needed_is_given_up(steps_away: float, followed: bool) -> None:
+    """In times HOPELESS of what the first step promises, which goes all the way in this linear model."""
+
+    def linear(z: Array) -> Point:
+        slope = np.array([[0.01, 0.0], [0.0, 0.01], [0.0, 0.0]])
+        return Point(z, slope @ z + (1.1, 1.05, 0.3), slope, {})
+
+    start, white = linear(np.array([1.0, 0.0])), NOISE.whiten(linear(np.zeros(2)).slope)
+    before, determinant = objective(NOISE, start), np.linalg.slogdet(white.T @ white + np.eye(2))[1]
+    needed = -0.5 * (before - steps_away * HOPELESS * before + determinant)
+    assert (fit(model_of(linear), NOISE, start, needed=needed).point is not start) == followed
 
 
 def rosenbrock(z: Array) -> Point:

@@ -98,5 +98,6 @@ def test_an_extent_has_a_prior_where_only_spots_of_one_length_fit(
         fitted=SimpleNamespace(point=SimpleNamespace(z=np.zeros(3))), shapes=place,
     )  # fmt: skip
     nothing: Any = None
-    assert found_extent(nothing, places, nothing, spot, place) is None
+    kind: Any = SimpleNamespace(log_prior=np.zeros(2))
+    assert found_extent(nothing, places, kind, spot, place, -np.inf) is None
     assert [dict(one.candidate.fitted)["length"].log_sd for one in tried] == pytest.approx([log_sd, log_sd])

@@ -162,6 +162,11 @@ def test_of_all_starts_the_best_end_counts(order: tuple[int, ...]) -> None:
     assert refit.fitted.point.z[-1] > 1.0
     (none,) = refits_of(search, [RefitTrial(one, {}, starts[:0])])
     assert none is None
+    just, more = (RefitTrial(one, {}, starts, refit.log_factor + short) for short in (-0.1, 0.1))
+    again, useless = refits_of(search, [just, more])
+    assert again is not None
+    assert again.log_factor == refit.log_factor
+    assert useless is None
 
 
 @pytest.mark.slow

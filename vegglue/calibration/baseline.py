@@ -10,6 +10,7 @@ import json
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -74,6 +75,11 @@ class SearchModel:
     model: Model
     noise: Noise
     point: Point
+
+    @cached_property
+    def log_evidence(self) -> float:
+        """ln p(y) of the model with nothing more, calibrated on its own cells (`log_evidence_under`) [-]."""
+        return log_evidence_under(fit(self.model, self.noise, self.point))
 
 
 def baseline(model: Model, known: Array | None = None, beside: Baseline | None = None) -> Baseline:

@@ -250,9 +250,10 @@ def fitted_extent(search: SearchModel, refit: Refit) -> tuple[dict[str, float], 
 
 
 def found_extent(
-    search: SearchModel, places: Places, kind: HypothesisKind, spot: Refit, outline: Mapping[str, float]
+    search: SearchModel, places: Places, kind: HypothesisKind, spot: Refit, outline: Mapping[str, float], needed: float
 ) -> FoundPlace | None:
-    """A spot whose middle, length and width are fitted with all else, from its own and from those of an outline.
+    """A spot whose middle, length and width are fitted with all else, from its own and from those of an outline;
+    needed: ln E below which it is of no use [-].
 
         ln E = ln B + ln prior,   x, y uniform over the places, ln l and ln w normal around those of the spots
 
@@ -261,7 +262,8 @@ def found_extent(
     Returns
     -------
     FoundPlace or None
-        None if no flow is found, it falls between the centres of cells, or it would take the place of what acts there.
+        None if no flow is found, it is of no use, falls between the centres of cells, or would take the place of what
+        acts there.
     """
     effect, above_off = spot.candidate.effect, spot.candidate.above_off
     ends = float(places.length.min()), float(places.length.max())
@@ -275,7 +277,8 @@ def found_extent(
         candidate = place_candidate(effect, shapes, places.plausible, above_off)
         candidate = replace(candidate, fitted=(("x", of_x), ("y", of_y), ("length", length), ("width", width)))
         gain = float(candidate.amplitude.gain(spot.amplitude))
-        trials.append(RefitTrial(candidate, shapes, (start_with(candidate, spot.fitted.point.z[:-1], gain),)))
+        at = start_with(candidate, spot.fitted.point.z[:-1], gain)
+        trials.append(RefitTrial(candidate, shapes, (at,), needed - float(logsumexp(kind.log_prior))))
 
     def is_narrow(shapes: Mapping[str, float]) -> bool:
         grid = search.model.site.grid
@@ -311,7 +314,7 @@ def _best_fitted(
 
 
 def found_patch(
-    search: SearchModel, places: Places, kind: HypothesisKind, starts: Sequence[tuple[float, float]]
+    search: SearchModel, places: Places, kind: HypothesisKind, starts: Sequence[tuple[float, float]], needed: float
 ) -> FoundPlace | None:
     """Plants that are not on the map: a rectangle of drag whose middle, sizes and inclination are fitted with all else.
 
@@ -329,12 +332,14 @@ def found_patch(
         Of these spots.
     starts : sequence of (float, float)
         x, y to begin from [m].
+    needed : float
+        ln E below which they are of no use [-].
 
     Returns
     -------
     FoundPlace or None
-        None if the map has no plants, no flow is found, what is found is no longer than a spot, or it lies on the
-        plants of the map.
+        None if the map has no plants, no flow is found, what is found is of no use, is no longer than a spot, or lies
+        on the plants of the map.
     """
     case, scales = search.model.case, site_scales(search.model.case, search.model.site)
     told = drag_of_patches(search, scales.canopy)
@@ -357,8 +362,8 @@ def found_patch(
             distribution="normal", mean=0.0, sd=TURNED, low=-LARGEST_TURN, high=LARGEST_TURN, unit="deg"
         )
         candidate = replace(place_candidate(effect, shapes, plausible), fitted=tuple(free.items()))
-        at = [start_with(candidate, search.point.z, share * plausible) for share in START_SHARES]
-        trials.append(RefitTrial(candidate, shapes, tuple(at)))
+        at = start_with(candidate, search.point.z, plausible)
+        trials.append(RefitTrial(candidate, shapes, (at,), needed - float(logsumexp(kind.log_prior))))
     geometry = channel_geometry(case, search.model.site, next(iter(case.experiments)))
 
     def is_spot_or_known(shapes: Mapping[str, float]) -> bool:
@@ -531,10 +536,11 @@ def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypoth
     assert isinstance(best, Refit)
     starts = [(float(places.x[spot]), float(places.y[spot])), (best.shapes["x"], best.shapes["y"])]
     apart = np.diff(starts, axis=0) / (places.length[spot], places.width[spot])
-    patch = found_patch(screening.search, places, kind, starts if np.linalg.norm(apart) > 1.0 else starts[:1])
     spots = [one.log_evidence for one in at_places if one.kind == "drag"]
     against = max(spots, default=kind.total)
-    if patch is None or tempered_odds(patch.log_evidence, against) < constants().strong_odds:
+    needed = against + np.log(constants().strong_odds) * float(tempering(np.array(against)))
+    patch = found_patch(screening.search, places, kind, starts if np.linalg.norm(apart) > 1.0 else starts[:1], needed)
+    if patch is None:
         return list(found)
     shapes = patch.refit.shapes
     nearest = int(np.argmin(np.hypot(places.x - shapes["x"], places.y - shapes["y"])))
@@ -551,8 +557,8 @@ def with_extent(screening: Screening, one: Hypothesis, outline: Mapping[str, flo
     if places is None or not isinstance(one.what, Refit):
         return one
     search = screening.search
-    there = found_extent(search, places, kind_named(screening.kinds, one.kind), one.what, outline)
-    if there is None or there.log_evidence < one.log_evidence:
+    there = found_extent(search, places, kind_named(screening.kinds, one.kind), one.what, outline, one.log_evidence)
+    if there is None:
         return one
     refit = there.refit
     possible = possible_change(search.model, search.point, places.term, refit.shapes["x"], refit.shapes["y"])

@@ -54,11 +54,14 @@ WORTH_FOLLOWING = 0.5
 
 @dataclass(frozen=True)
 class RefitTrial:
-    """What is to be refitted: a candidate with values of its shapes, and z (k, p + q) of the places to start from."""
+    """What is to be refitted: a candidate with values of its shapes, and z (k, p + q) of the places to start from;
+    needed: ln B below which it is of no use [-].
+    """
 
     candidate: Candidate
     shapes: Mapping[str, float]
     starts: tuple[Array, ...]
+    needed: float = -np.inf
 
 
 @dataclass(frozen=True)
@@ -82,24 +85,25 @@ class Refit:
 
 
 def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = silent) -> list[Refit | None]:
-    """Each trial refitted, side by side; None where no flow is found."""
-    nothing = fit(search.model, search.noise, search.point, REFIT_STEPS)
+    """Each trial refitted, side by side; None where no flow is found, or less than is needed."""
     finished = counted(watch, "refitting with each", len(trials), "refits")
-    ends = parallel_map(partial(_best_of_starts, search), [(trial,) for trial in trials], finished)
+    tasks = [(trial, search.log_evidence + trial.needed) for trial in trials]
+    ends = parallel_map(partial(_best_of_starts, search), tasks, finished)
     refits: list[Refit | None] = []
     for trial, best in zip(trials, ends, strict=True):
-        if best is None:
+        gained = -np.inf if best is None else log_evidence_under(best) - search.log_evidence
+        if best is None or gained < trial.needed:
             refits.append(None)
             continue
         amplitude, low, high = interval95(_with(search.model, trial), best, trial.candidate.parameter)
-        gained = log_evidence_under(best) - log_evidence_under(nothing)
         refits.append(Refit(trial.candidate, trial.shapes, best, gained, amplitude, (low, high)))
     return refits
 
 
-def _best_of_starts(search: SearchModel, trial: RefitTrial) -> MapEstimate | None:
+def _best_of_starts(search: SearchModel, trial: RefitTrial, needed: float) -> MapEstimate | None:
     """The best end of all starts, or of a share of the way to them from the amplitude off, each later one followed
-    while it promises more than those before it. Flows are found from the nearest that is known, the nearest first.
+    while it promises more than those before it, and any while it may have the ln evidence that is needed [-]. Flows are
+    found from the nearest that is known, the nearest first.
     """
     model, candidate, best = _with(search.model, trial), trial.candidate, None
     here = start_with(candidate, search.point.z, 0.0)
@@ -116,7 +120,7 @@ def _best_of_starts(search: SearchModel, trial: RefitTrial) -> MapEstimate | Non
     steps = REFIT_STEPS + SHAPE_STEPS * len(candidate.fitted)
     for number in sorted(points):
         enough = np.inf if best is None else best.objective - WORTH_FOLLOWING
-        found = fit(model, search.noise, points[number], steps, enough)
+        found = fit(model, search.noise, points[number], steps, enough, needed)
         best = found if best is None or found.objective < best.objective else best
     return best
 
