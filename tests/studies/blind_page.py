@@ -188,7 +188,7 @@ PAGE = """# How often the diagnosis is right
 - **In the credible set**: among the hypotheses of the verdict or, with nothing false named, among what is not excluded.
   **Groups**: effects that the data cannot distinguish.
 - **Not inspected**: without objects that were looked at, or changed, while rules were chosen.
-- **Held-out error**: at sections without measurements, against the truth, with the error of a probe added.
+- **Held-out error**: at sections without measurements, with the error of a probe added.
 
 ## Result
 
