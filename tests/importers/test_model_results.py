@@ -11,6 +11,7 @@ from result_files import GridFlow, a_flow, at_nodes, write_flow_fm, write_hec_ra
 from vegglue.errors import InputError
 from vegglue.importers.finished_results import holds_result, read_result
 from vegglue.importers.model_result import DRY_DEPTH
+from vegglue.importers.ugrid import read_ugrid
 
 
 def compare(result, flow: GridFlow, tolerance: float = 2e-5) -> None:
@@ -153,3 +154,79 @@ def test_values_of_the_format_s_own_library(tmp_path: Path, code: str) -> None:
     for key, one in theirs.items():
         there = one > -0.005 if key == "depth" else slice(None)
         np.testing.assert_allclose(getattr(ours, key)[points][there], one[there], atol=1e-7)
+
+
+def write_ugrid(path: Path, **changed: dict[str, object]) -> None:
+    """Twelve squares of water 0.5 m deep over a bed at 10 m, at three times; attributes of fields are changed, and
+    `values` of them; other fields are added.
+    """
+    x, y = np.meshgrid(np.arange(5.0), np.arange(4.0), indexing="ij")
+    corner = np.arange(20).reshape(5, 4)
+    faces = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1).reshape(-1, 4)
+    of_time = np.ones((3, 12)) * np.array([[0.2], [0.6], [1.0]])
+    fields: dict[str, dict[str, object]] = {
+        "time": {"values": np.arange(3.0), "units": "seconds since 2026-01-01"},
+        "bed": {"values": np.full(12, 10.0), "standard_name": "altitude", "units": "m"},
+        "level": {"values": 10.5 * np.ones((3, 12)), "standard_name": "sea_surface_height", "units": "m"},
+        "u": {"values": 0.4 * of_time, "standard_name": "sea_water_x_velocity", "units": "m s-1"},
+        "v": {"values": 0.1 * of_time, "standard_name": "sea_water_y_velocity", "units": "m s-1"},
+    }
+    named = {"node_coordinates": "x y", "face_node_connectivity": "faces"}
+    fields |= {"x": {"values": x.ravel(), "units": "m"}, "y": {"values": y.ravel(), "units": "m"}}
+    fields |= {"faces": {"values": faces}, "m": {"values": 0, "cf_role": "mesh_topology", **named}}
+    fields |= {name: {**fields.get(name, {}), **more} for name, more in changed.items() if more}
+    with h5py.File(path, "w") as file:
+        for name, field in fields.items():
+            dataset = file.create_dataset(field.get("called", name), data=field["values"])
+            dataset.attrs.update({key: one for key, one in field.items() if key not in ("values", "called")})
+
+
+U = {"values": 1.2 * np.ones((3, 12)), "standard_name": "sea_water_x_velocity", "units": "m s-1"}
+FLAG = {"values": np.repeat([0, 1], [3, 9]), "flag_meanings": "dry wet"}
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({}, (12, 10.0, 0.5, 0.4)),
+        ({"time": {"called": "Time"}}, (12, 10.0, 0.5, 0.4)),
+        ({"bed": {"values": np.full(12, -10.0), "positive": "down"}}, (12, 10.0, 0.5, 0.4)),
+        (
+            {"bed": {"values": np.full(12, -10.0), "standard_name": "sea_floor_depth_below_geoid"}},
+            (12, 10.0, 0.5, 0.4),
+        ),
+        ({"u": {"values": 40.0 * np.ones((3, 12)), "units": "cm/s"}}, (12, 10.0, 0.5, 0.4)),
+        (
+            {
+                one: {"values": np.full(12, high), "units": "US_survey_foot"}
+                for one, high in (("bed", 10), ("level", 12))
+            },
+            (12, 12000 / 3937, 2400 / 3937, 0.4),
+        ),
+        ({"a_maximum": {**U, "cell_methods": "time: maximum"}}, (12, 10.0, 0.5, 0.4)),
+        ({"dryness": FLAG}, (9, 10.0, 0.5, 0.4)),
+        ({"dryness": {**FLAG, "flag_meanings": "wet dry", "flag_values": np.array([1, 0])}}, (9, 10.0, 0.5, 0.4)),
+        ({"u": {"values": np.repeat([[500.0, 0.4]], [3, 9], axis=1), "valid_range": [-9.0, 9.0]}}, (9, 10.0, 0.5, 0.4)),
+        ({"u": {"values": np.repeat([[-99.0, 0.4]], [3, 9], axis=1)}}, (9, 10.0, 0.5, 0.4)),
+    ],
+)
+def test_what_a_netcdf_states_of_its_fields_counts(
+    tmp_path: Path, changed: dict[str, dict[str, object]], expected: tuple[float, ...]
+) -> None:
+    """A bed that counts downward made water 20 m deep, a maximum over time was the flow at the end."""
+    write_ugrid(tmp_path / "map.nc", **changed)
+    found = read_ugrid(tmp_path / "map.nc")
+    wet = found.wet
+    got = (wet.sum(), found.bed.mean(), found.depth[wet].mean(), found.u[wet].mean())
+    assert got == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"), [({"near_bed": U}, "near_bed, u"), ({"u": {"units": "furlongs"}}, "'furlongs'")]
+)
+def test_what_a_netcdf_leaves_open_is_refused(
+    tmp_path: Path, changed: dict[str, dict[str, object]], words: str
+) -> None:
+    write_ugrid(tmp_path / "map.nc", **changed)
+    with pytest.raises(InputError, match=words):
+        read_ugrid(tmp_path / "map.nc")

@@ -97,7 +97,7 @@ def read_delft3d_trim(path: Path) -> ModelResult:
         return model_result(
             "Delft3D-4", x[active], y[active], bed[active], level[active], depth[active],
             east[active], north[active], roughness=roughness, roughness_kind=kind, corners=corners,
-            time=last_time(variables), notes=turned,
+            time=last_time(variables.get("time")), notes=turned,
         )  # fmt: skip
 
 

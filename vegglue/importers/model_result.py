@@ -16,12 +16,14 @@ from scipy.io import netcdf_file
 
 from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
+from vegglue.importers.column_names import UNITS, unit_named
 from vegglue.importers.import_notes import FileNote, ImportNote, Noted
 
 RoughnessKind = Literal["manning", "strickler", "chezy", "nikuradse", "not-stated"]
 # Depth below which a point counts as dry [m]. Chosen: codes keep films of up to some millimetres on dry land, TELEMAC
 # also negative depths.
 DRY_DEPTH = 0.005
+FASTEST_FLOW = 20.0  # of a river [m/s]: what is faster marks no value
 # Units of length in files, in lower case [m].
 FOOT, US_SURVEY_FOOT = 0.3048, 1200.0 / 3937.0
 LENGTHS = {"m": 1.0, "meters": 1.0, "meter": 1.0, "metre": 1.0, "feet": FOOT, "ft": FOOT, "foot": FOOT}
@@ -87,7 +89,7 @@ def model_result(
     placed = np.isfinite(x) & np.isfinite(y) & np.isfinite(bed)
     unknown, stated_dry = ~np.isfinite(level) & ~np.isfinite(depth), np.nan_to_num(depth, nan=np.inf) <= DRY_DEPTH
     wet = ~unknown & ~stated_dry
-    lost = placed & wet & ~np.isfinite(level + depth + u + v)
+    lost = placed & wet & ~(np.isfinite(level + depth) & (np.hypot(u, v) <= FASTEST_FLOW))
     known = placed & ~lost
     notes = [ImportNote(Noted.PLACES_LOST, int(lost.sum()))] if lost.any() else []
     if unstated := int((placed & unknown).sum()):
@@ -149,10 +151,21 @@ class NetcdfVariable:
         raw = np.asarray(self.source[-1] if timed else self.source[()], dtype=np.float64)
         named = [self.attributes[one] for one in ("_FillValue", "missing_value") if one in self.attributes]
         marks = [float(np.ravel(one)[0]) for one in named]
-        raw = without_marks(np.where(np.isin(raw, marks), np.nan, raw))
+        low, high = np.ravel(self.attributes.get("valid_range", (-np.inf, np.inf)))[[0, -1]].astype(np.float64)
+        low = float(np.ravel(self.attributes.get("valid_min", low))[0])
+        high = float(np.ravel(self.attributes.get("valid_max", high))[0])
+        none = np.isin(raw, marks) | (raw < low) | (raw > high)
+        raw = without_marks(np.where(none, np.nan, raw))
         scale = float(np.ravel(self.attributes.get("scale_factor", 1.0))[0])
         offset = float(np.ravel(self.attributes.get("add_offset", 0.0))[0])
-        return (raw * scale + offset) * LENGTHS.get(self.text("units").strip().lower(), 1.0)
+        return (raw * scale + offset) * (self.in_si or 1.0)
+
+    @property
+    def in_si(self) -> float:
+        """SI value of its unit, of a length or a velocity; 1 without a unit, 0 for another one."""
+        stated = self.text("units").strip().replace("_", " ")
+        known = ((quantity, unit_named(stated, quantity)) for quantity in ("length", "velocity"))
+        return next((UNITS[quantity][unit] for quantity, unit in known if unit), float(stated in ("", "1", "-")))
 
     def numbers(self) -> np.ndarray[Any, Any]:
         """Whole numbers as they stand in the file."""
@@ -191,9 +204,8 @@ def why_no_variables(path: str) -> str | None:
     return None
 
 
-def last_time(variables: Mapping[str, NetcdfVariable]) -> str:
+def last_time(time: NetcdfVariable | None) -> str:
     """The last time with its unit; '' if there is none."""
-    time = variables.get("time")
     return "" if time is None else f"{float(np.ravel(time.numbers())[-1]):g} {time.text('units')}"
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from vegglue.arrays import Array
+from vegglue.arrays import Array, Mask
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.model_result import (
@@ -27,9 +27,12 @@ from vegglue.importers.model_result import (
     refuse_degrees,
 )
 
+# Standard names of a bed that counts downward from the zero of levels.
+BED_BELOW_ZERO = ("sea_floor_depth_below_geoid", "sea_floor_depth_below_mean_sea_level", "sea_floor_depth")
+SINCE, EXTREME = re.compile(r"\bsince\b"), re.compile(r"time: *(max|min|range|std|standard_dev)")
 # Of each quantity: names of D-Flow FM without the mesh, and standard names.
 UGRID_NAMES = {
-    "bed": (("flowelem_bl", "bl"), ("altitude", "sea_floor_altitude", "bed_level")),
+    "bed": (("flowelem_bl", "bl"), ("altitude", "sea_floor_altitude", "bed_level", *BED_BELOW_ZERO)),
     "level": (("s1",), ("sea_surface_height", "sea_surface_elevation", "water_surface_height_above_reference_datum")),
     "depth": (("waterdepth",), ("sea_floor_depth_below_sea_surface", "water_depth", "depth")),
     "u": (("ucxa", "ucx"), ("sea_water_x_velocity", "eastward_sea_water_velocity", "x_velocity")),
@@ -82,8 +85,9 @@ def read_ugrid(path: Path) -> ModelResult:
             none |= raw == np.ravel(fill)[0]
         # Nodes of each face (faces, most), counted from 0, and -1 where a face has fewer.
         corners = np.where(none, -1, np.where(none, 0, raw).astype(np.int64) - start)
-        faces, times = corners.shape[0], max(variables["time"].shape[0], 1) if "time" in variables else 0
-        fields = {key: _field(variables, mesh, key, (faces, len(nodes)), times) for key in UGRID_NAMES}
+        clock = next((one for one in variables.values() if SINCE.search(one.text("units"))), variables.get("time"))
+        faces, times = corners.shape[0], max(clock.shape[0], 1) if clock is not None and clock.shape else 0
+        fields = {key: _field(path, variables, mesh, key, (faces, len(nodes)), times) for key in UGRID_NAMES}
         given = {key: one for key, one in fields.items() if one is not None}
         if missing := lacking_fields(given):
             layers = any(len(one.shape) == 3 and faces in one.shape[:-1] for one in variables.values())
@@ -113,28 +117,68 @@ def read_ugrid(path: Path) -> ModelResult:
         chezy = variables.get(f"{mesh}_czs")
         if chezy is not None and at_faces and chezy.shape[-1] == faces:
             roughness, kind = chezy.values(times)[keep], "chezy"
-        of_cells = (*places.T, *bed_level_depth(given), given["u"], given["v"])
+        level_of = bed_level_depth(given)
+        depth = np.where(_dry(variables, mesh, len(places), times), 0.0, level_of[2])
+        of_cells = (*places.T, *level_of[:2], depth, given["u"], given["v"])
         return model_result(
             "D-Flow FM" if of_flow_fm else "UGRID", *(one[keep] for one in of_cells), roughness=roughness,
-            roughness_kind=kind, corners=nodes, crs=_system(variables), time=last_time(variables), notes=notes,
+            roughness_kind=kind, corners=nodes, crs=_system(variables), time=last_time(clock), notes=notes,
         )  # fmt: skip
 
 
 def _field(
-    variables: dict[str, NetcdfVariable], mesh: str, key: str, sizes: tuple[int, int], times: int
+    path: Path, variables: dict[str, NetcdfVariable], mesh: str, key: str, sizes: tuple[int, int], times: int
 ) -> Array | None:
-    """A quantity at faces or nodes, by its name, else by its standard name; None if there is none without layers."""
+    """A quantity at faces or nodes, by its name, else by its standard name; None if there is none without layers.
+
+    A depth of the bed, or a bed that counts downward, is one below zero. InputError for an unknown unit, and for two
+    variables of one standard name. Extremes over time are none.
+    """
     names, standard = UGRID_NAMES[key]
-    of_mesh = {name: one for name, one in variables.items() if one.text("mesh") in (mesh, "")}
-    by_name = [of_mesh[f"{mesh}_{name}"] for name in names if f"{mesh}_{name}" in of_mesh]
-    by_standard = [one for one in of_mesh.values() if one.text("standard_name") in standard]
-    by_standard.sort(key=lambda one: one.text("location") != "face")
-    for one in [*by_name, *by_standard]:
+
+    def of_size(one: NetcdfVariable) -> int:
+        """Whether it lies at the faces (2), at the nodes (1) or elsewhere (0), with the times in front or without."""
         of_time = times and one.shape[:1] == (times,) and len(one.shape) == 2
         rest = one.shape[1:] if of_time else one.shape
-        if len(rest) == 1 and rest[0] in sizes:
-            return one.values(times if of_time else 0)
-    return None
+        return 2 - sizes.index(rest[0]) if len(rest) == 1 and rest[0] in sizes else 0
+
+    of_mesh = {
+        name: one
+        for name, one in variables.items()
+        if one.text("mesh") in (mesh, "") and of_size(one) and not EXTREME.search(one.text("cell_methods"))
+    }
+    found = [name for one in names if (name := f"{mesh}_{one}") in of_mesh][:1]
+    if not found:
+        alike = [name for name, one in of_mesh.items() if one.text("standard_name") in standard]
+        found = [name for name in alike if of_size(of_mesh[name]) == max(map(of_size, map(of_mesh.__getitem__, alike)))]
+    if len(found) > 1:
+        raise InputError(
+            f"{shown_path(path)}: expected one variable of {key}, got {', '.join(found)}, all of standard name "
+            f"{of_mesh[found[0]].text('standard_name')}; leave one in the file."
+        )
+    if not found:
+        return None
+    one = of_mesh[found[0]]
+    if not one.in_si:
+        raise InputError(
+            f"{shown_path(path)}: expected {found[0]} in a unit of {'velocity' if key in 'uv' else 'length'}, got "
+            f"{one.text('units')!r}; write it in SI."
+        )
+    down = key == "bed" and (one.text("positive") == "down" or one.text("standard_name") in BED_BELOW_ZERO)
+    values = one.values(times if one.shape[:1] == (times,) and len(one.shape) == 2 else 0)
+    return -values if down else values
+
+
+def _dry(variables: dict[str, NetcdfVariable], mesh: str, size: int, times: int) -> Mask:
+    """Places (size,) that a flag marks as dry: a variable whose `flag_meanings` has that word."""
+    for one in variables.values():
+        meanings = one.text("flag_meanings").lower().split()
+        if "dry" in meanings and one.text("mesh") in (mesh, "") and one.shape[-1:] == (size,):
+            given = one.attributes.get("flag_values", range(len(meanings)))
+            texts = re.findall(r"-?\d+", given if isinstance(given, str) else " ".join(map(str, np.ravel(given))))
+            flags = one.numbers()[-1] if times and one.shape[:1] == (times,) and len(one.shape) == 2 else one.numbers()
+            return np.asarray(flags == int(texts[meanings.index("dry")]))
+    return np.zeros(size, dtype=bool)
 
 
 def _mean_of_corners(values: Array, corners: np.ndarray[Any, Any]) -> Array:
