@@ -45,9 +45,7 @@ class InputError(ValueError):
 
 
 class StorageError(OSError):
-    """The machine refuses: a result could not be written or read, or a process was killed. Says what, why, and what is
-    still safe.
-    """
+    """A result could not be written or read, or a process was killed: what, why, and what is still safe."""
 
     def __str__(self) -> str:
         return _in_one_line(super().__str__())

@@ -13,9 +13,7 @@ Found = TypeVar("Found")
 
 
 def memoised(most: int) -> Callable[[Callable[Arguments, Found]], Callable[Arguments, Found]]:
-    """A decorator that keeps the `most` newest results, none of them None, of a function; arguments are compared by
-    value, arrays too.
-    """
+    """A decorator that keeps the `most` newest results, none of them None, by the values of all arguments."""
 
     def of(compute: Callable[Arguments, Found]) -> Callable[Arguments, Found]:
         known = dict[bytes, Found]()

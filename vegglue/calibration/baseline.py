@@ -290,9 +290,7 @@ def for_prediction(base: Baseline) -> Baseline:
 
 
 def kept_baseline(model: Model) -> Baseline:
-    """`baseline` of a model from its prior, kept in memory: of the same grid, measurements and priors it is not
-    computed again.
-    """
+    """`baseline` of a model from its prior, kept in memory by its grid, measurements and priors."""
     if model.engine is not NEWTON or model.case.effect_file is not None:  # codes of users, which may have changed
         return baseline(model)
     digest = hashlib.sha256(json.dumps(plain_tree(dumped(model.case, ONLY_NAMED), str)).encode())

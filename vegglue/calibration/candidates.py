@@ -131,9 +131,7 @@ class Candidate:
 
 
 def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
-    """Effects of the library that do not act in the case yet and are not excluded, once for each experiment, section or
-    device.
-    """
+    """Effects of the library that neither act in the case nor are excluded, for each experiment, section or device."""
     found = []
     possible, missing = where_it_may_act(case, station), missing_needs(case, station)
     for name, listed in library(case.effect_file).items():

@@ -132,9 +132,7 @@ def fit_from(model: Model, noise: Noise, z: Array, near: Point | None = None) ->
 
 
 def _step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Array, Array, float]:
-    """The matrix H + l 1, damped until its step (p,) is no longer than `longest` (Levenberg 1944), the step, and the
-    predicted decrease.
-    """
+    """H + l 1 with a step (p,) no longer than `longest` (Levenberg 1944), the step, and the predicted decrease."""
     # Beyond FURTHEST theta equals its bound: a z that would go there is held, else it shortens the step of the others.
     held = (np.abs(point.z) >= FURTHEST) & (right * point.z > 0.0)
     matrix, right = np.where(held[:, None] | held, np.eye(held.size), matrix), np.where(held, 0.0, right)
@@ -204,9 +202,7 @@ def chance_of_misfit(misfit: float, freedom: int) -> float:
 
 
 def determined(spread: Array) -> float:
-    """p - tr V [-]: effective number of parameters, those that the data determine and not the prior; V (p, p) the
-    covariance of z.
-    """
+    """p - tr V [-]: effective number of parameters, those that the data determine; V (p, p) the covariance of z."""
     return float(spread.shape[0] - np.trace(spread))
 
 

@@ -134,9 +134,7 @@ def family_of(projected: Projected, only_sign: np.ndarray, errors: Array, seed: 
 
 
 def with_more_rows(errors: Array, rows: int, seed: int) -> Single:
-    """Draws of errors alone (draws, n) with the rows of the prior, and of other measurements, drawn too (draws, rows),
-    in single precision.
-    """
+    """Draws of errors alone (draws, n), and with them of other measurements (draws, rows), in single precision."""
     more = np.random.default_rng(seed).standard_normal((len(errors), rows - errors.shape[1]))
     return np.hstack([errors, more]).astype(np.float32)
 

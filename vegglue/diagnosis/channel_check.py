@@ -396,9 +396,7 @@ def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> I
 
 
 def remarks_on_bank_law(case: Case, site: Site) -> Iterator[BankLawHeld]:
-    """Cells in which 12 h / k_s of the law of the banks falls below its lower bound and is held there; without those of
-    plants.
-    """
+    """Cells without plants in which 12 h / k_s of the law of the banks is held at its lower bound."""
     floor = case.numerics.bank_argument_minimum
     for index, (name, friction_class) in enumerate(case.friction.classes.items()):
         if friction_class.k_s is None:

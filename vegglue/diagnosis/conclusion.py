@@ -487,9 +487,7 @@ def estimated_errors(screening: Screening, found: SearchState) -> EstimatedError
 
 
 def _model_error(screening: Screening) -> ModelErrorUsed | None:
-    """By how much the model may be wrong, and the share of it that the residual makes likeliest; None where none is
-    allowed.
-    """
+    """By how much the model may be wrong, and the share that the residual makes likeliest; None if none is allowed."""
     search, allowed = screening.search, screening.base.model.case.model_error
     noise = search.noise
     if not noise.model_error.any():

@@ -47,9 +47,7 @@ FIELD_SIZES: Mapping[Term, tuple[float, ...]] = {
 
 @dataclass(frozen=True)
 class FieldHypothesis:
-    """A field of one term with bumps `over` and standard deviation `size` [unit of the term]; log_factor: ln B against
-    none [-].
-    """
+    """A field of one term over bumps, its standard deviation `size` [unit of the term] and ln B against none [-]."""
 
     term: Term
     over: GaussianBasis

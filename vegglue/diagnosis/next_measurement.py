@@ -148,9 +148,7 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
 
 
 def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
-    """Lines of the bed midway between those of its surveys, and the outlines of plants; none of a site that states no
-    such error.
-    """
+    """Lines of the bed midway between surveyed ones, and outlines of plants; none if the site states no such error."""
     case, grid, nothing = model.case, model.site.grid, np.zeros(0, dtype=int)
     found, no_station = [], model.station.iloc[:0]
     of_work = case.planned or Planned()
@@ -259,9 +257,7 @@ def with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
 
 
 def least_distances(slope: Array, traces: Array) -> Array:
-    """The least D^2 between each rival and any other, either way, (rival,); from the model without any when there is
-    only one.
-    """
+    """The least D^2 between each rival and any other, either way, (rival,); from no rival if there is only one."""
     count, priors = traces.shape[1], slope.shape[1]
     if count == 1:
         return np.array([_left(slope, traces[:, 0], priors)])

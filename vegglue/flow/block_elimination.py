@@ -60,9 +60,7 @@ def take_away(of, values):
 
 @compiled_exactly
 def factor(blocks, far):
-    """Eliminate in place: blocks[i] becomes (L_i, D_i^-1, G_i = D_i^-1 U_i), so that solving is three products a
-    column.
-    """
+    """Eliminate in place: blocks[i] becomes (L_i, D_i^-1, G_i = D_i^-1 U_i); a solution is three products a column."""
     nx, _, n, _ = blocks.shape
     for i in range(nx):
         if i > 1:

@@ -78,9 +78,7 @@ def changes_of_whole(problem: Problem, inflow: InflowSegment, before: Array, aft
 
 
 def with_kept_shares(problem: Problem, before: Array, after: Array) -> Problem:
-    """A problem at depths `after` (nx, ny, m) [m] with discharges Q W_after / W_before: Q / W is that at `before`
-    (nx, ny, 1).
-    """
+    """A problem at depths `after` (nx, ny, m) [m] with Q W_after / W_before; Q / W is that at `before` (nx, ny, 1)."""
 
     def kept(inflow: InflowSegment) -> InflowSegment:
         at = cells_of(problem, inflow)

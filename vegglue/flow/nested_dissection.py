@@ -152,9 +152,7 @@ def collect_stencil(values, far, base, rates, colours, step):
 
 @compiled_exactly
 def compact(values, far):
-    """M (nx, ny, 3, 3, 3, 3) of the entries of A, see `collect_stencil`: those of second cells are put down to first
-    ones.
-    """
+    """M (nx, ny, 3, 3, 3, 3) of A, see `collect_stencil`: entries of second cells are put down to first ones."""
     nx, ny = values.shape[0], values.shape[1]
     found = np.zeros((nx, ny, 3, 3, 3, 3), np.float32)
     for i in range(nx):

@@ -252,9 +252,7 @@ def predictions_at_sensors(problem: Problem, state: Array, grid: Grid, station: 
 def predictions_under_effects(
     problem: Problem, state: Array, grid: Grid, station: pd.DataFrame, effects: Sequence[tuple[ActiveEffect, ...]]
 ) -> Array:
-    """`predictions_at_sensors` of flows (nx, 3, ny, m) under each set of effects, which differ on instruments alone:
-    (m, set, station).
-    """
+    """`predictions_at_sensors` under sets of effects that differ on instruments alone: (m, set, station)."""
     flow = GriddedFlow(problem, state, grid)
     value = _without_effects(flow, station)
     around = _around_stations(flow, value, station)

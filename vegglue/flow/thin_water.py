@@ -240,9 +240,7 @@ def slope_of_friction(problem: Problem, state: Array) -> Array:
 
 
 def face_depths(problem: Problem, state: Array) -> Array:
-    """Depths [m] of the faces that velocities of a state are given on, (nx, 3, ny, m); infinite for levels and on the
-    sides of the grid.
-    """
+    """Depths [m] of the faces of velocities (nx, 3, ny, m); infinite for levels and on the sides of the grid."""
     level = np.ascontiguousarray(state[:, LEVEL])
     _, along, across, _ = all_depths(problem, level)
     found = np.full_like(state, np.inf)

@@ -143,9 +143,7 @@ class UnitsAssumed:
 
 @dataclass(frozen=True)
 class CentrelineTaken:
-    """A centreline: its length [m], its turn to the left from end to end [degrees], and its least radius [m], None if
-    straight.
-    """
+    """A centreline: length [m], turn to the left [degrees], and least radius [m], None if straight."""
 
     length: float
     turn: float

@@ -289,9 +289,7 @@ def solve_in_experiment(
 
 
 def rows_of_chunk(case: Case, observations: Observations, parts: list[Rows]) -> Rows:
-    """The rows of a chunk, of those of each experiment in the order of the case; a member that failed in one has no
-    predictions.
-    """
+    """The rows of a chunk, of those of each experiment; a member that failed in one has no predictions."""
     rows = {
         "prediction": np.full((len(parts[0]["status"]), len(observations.table)), np.nan),
         "section_flow": np.stack([part["section_flow"] for part in parts], axis=1),

@@ -604,9 +604,7 @@ def transfer_statements(
 def transfer_verdict(
     posterior: Posterior, transfer: Transfer, symbols: Mapping[str, str] | None = None
 ) -> CalibrationTransfers | CalibrationDiffers:
-    """Whether the calibration transfers between experiments: no parameter differs, nor do all together
-    (p < DIFFERS_BELOW).
-    """
+    """Whether the calibration transfers: no parameter differs, nor do all together (p < DIFFERS_BELOW)."""
     moves = differing(dict(zip(posterior.parameters, transfer.p, strict=True)))
     if not moves and not transfer.p_all < DIFFERS_BELOW:
         return CalibrationTransfers()

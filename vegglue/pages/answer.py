@@ -232,9 +232,7 @@ def error_fall(ladder: ModelComparison, causes: str = "") -> ErrorFall:
 
 
 def causes_of(run: Run) -> str:
-    """What the diagnosis of the ladder's first model accepted, in words, if the ladder adds all of it and nothing else;
-    '' otherwise.
-    """
+    """What the diagnosis of the ladder's first model accepted, in words, if the ladder adds exactly that; else ''."""
     ladder = run.loop.ladder
     known = [one for one in (run.loop.behind, run.diagnosis) if one is not None]
     found = next((one for one in known if ladder and one.name == ladder.steps[0].name), None)

@@ -64,9 +64,7 @@ def save_channel_figure(case: Case, site: Site, observations: Observations, path
 
 @styled
 def draw_channel(case: Case, site: Site, observations: Observations) -> Figure:
-    """Above the whole grid (not to scale), below it the reach of interest where that is a part of it, last the bed
-    across its middle.
-    """
+    """The whole grid (not to scale), the reach of interest if that is a part of it, and the bed across its middle."""
     along = [corner for patch in case.plants.patches for corner in corners_of(case, patch)[:, 0]]
     along += list(observations.table["x"])
     reach = case.grid.x

@@ -149,9 +149,7 @@ class ExcludedStation:
 
 @dataclass(frozen=True)
 class DiagnosisSection:
-    """What the page has of a diagnosis beside its pictures; doubtful: whether all of it holds only if the measurements
-    turn out to be right.
-    """
+    """What the page has of a diagnosis; doubtful: whether it holds only if the measurements turn out to be right."""
 
     found: Diagnosis
     doubtful: bool
@@ -165,9 +163,7 @@ class DiagnosisSection:
 
 
 def diagnosis_section(found: Diagnosis) -> DiagnosisSection:
-    """Everything the page writes about a diagnosis; its first candidates are those worth reading first, none if the
-    verdict doubts the data.
-    """
+    """Everything the page writes about a diagnosis, first what is worth reading first, unless the data are in doubt."""
     rows = candidate_rows(found)
     doubtful = found.verdict.doubts_the_data
     shown = 0 if doubtful else max(CANDIDATES_LISTED, len(found.set))

@@ -102,9 +102,7 @@ def megabytes(case: Case, window: FieldWindow) -> float:
 
 @dataclass(frozen=True)
 class FieldsTooLarge:
-    """`simulate.fields` keeps `megabytes` of `members`, beyond the budget [MB]; length of its range and one that fits
-    [m].
-    """
+    """`simulate.fields` exceeds its budget [MB]; length of its range and one that fits [m]."""
 
     megabytes: float
     members: int

@@ -263,9 +263,7 @@ class FieldPlan:
 
 
 def hours_of(pieces: Sequence[PlannedPiece], another_flow: float, present: frozenset[str] = frozenset()) -> float:
-    """Hours of some pieces together, with those of each flow beside the first; present: flows that are measured in
-    anyhow.
-    """
+    """Hours of some pieces together, with those of each flow beside the first; present: flows measured in anyhow."""
     flows = {one.experiment for one in pieces if one.experiment} - present
     free = 0 if present else 1
     return math.fsum(one.hours for one in pieces) + another_flow * max(len(flows) - free, 0)

@@ -77,9 +77,7 @@ FIELDS_PART = "fields.part"
 
 @dataclass(frozen=True)
 class UnfinishedFields:
-    """Where the fields of a run wait: an array of `shape` (member, ...) in single precision, behind a mark
-    that names the run.
-    """
+    """Where the fields of a run wait: an array of `shape` (member, ...) in single precision, behind the run's mark."""
 
     path: Path
     mark: bytes

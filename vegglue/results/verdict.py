@@ -1,6 +1,4 @@
-"""The verdict of a diagnosis as a value. The words stand in wording/templates/verdict.j2, one macro for each class of
-this file.
-"""
+"""The verdict of a diagnosis as a value; its words stand in wording/templates/verdict.j2, a macro for each class."""
 
 import math
 from collections.abc import Mapping
@@ -305,9 +303,7 @@ class InflowDevelops:
 
 @dataclass(frozen=True)
 class CellsTooCoarse:
-    """Error of the cells in velocities that is larger than the error of the readings, both as root mean squares
-    [m/s].
-    """
+    """Error of the cells in velocities, larger than that of the readings, both as root mean squares [m/s]."""
 
     grid_error: float
     data_error: float

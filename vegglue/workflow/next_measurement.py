@@ -202,9 +202,7 @@ def _asked(case: Case, found: Diagnosis, names: Sequence[str]) -> list[tuple[Sub
 
 
 def laws_to_tell_apart(laws: CandidateLaws | None) -> list[str]:
-    """Laws that could be what is missing, the likeliest of each term and quantity: the forms of one leave traces that
-    hardly differ.
-    """
+    """Laws that could be missing, the likeliest of each term and quantity: traces of its other forms hardly differ."""
     likeliest: dict[tuple[str, str], str] = {}
     for one in () if laws is None else laws.laws:
         likeliest.setdefault((one.term, one.quantity), one.name)
