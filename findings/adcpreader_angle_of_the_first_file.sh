@@ -17,7 +17,7 @@ trap 'rm -rf "$work"' EXIT
 "$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check --no-deps \
     adcpreader==0.2.1 numpy==2.3.1 scipy==1.16.0 gsw==3.6.20 netCDF4==1.7.2 cftime==1.6.4.post1 certifi==2025.6.15
 cd "$work"
-timeout 200 "$work/venv/bin/python" -W ignore - <<'PYTHON'
+timeout 600 "$work/venv/bin/python" -W ignore - <<'PYTHON'
 import struct
 from importlib.metadata import version
 from pathlib import Path

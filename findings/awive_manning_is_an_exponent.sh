@@ -18,7 +18,7 @@ trap 'rm -rf "$work"' EXIT
 "$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check --no-deps \
     awive==3.3.2 numpy==1.26.4
 cd "$work"
-timeout 200 "$work/venv/bin/python" -W ignore - <<'PYTHON'
+timeout 600 "$work/venv/bin/python" -W ignore - <<'PYTHON'
 from importlib.metadata import version
 
 import numpy as np

@@ -18,7 +18,7 @@ trap 'rm -rf "$work"' EXIT
 "$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check --no-deps \
     pytoast-core==0.1.0b3 numpy==2.3.1 scipy==1.16.0
 cd "$work"
-timeout 200 "$work/venv/bin/python" -W ignore - <<'PYTHON'
+timeout 600 "$work/venv/bin/python" -W ignore - <<'PYTHON'
 from importlib.metadata import version
 
 import numpy as np

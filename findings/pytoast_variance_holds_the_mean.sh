@@ -20,7 +20,7 @@ trap 'rm -rf "$work"' EXIT
     pytoast-core==0.1.0b3 numpy==2.3.1 scipy==1.16.0 pandas==2.3.3 xarray==2025.7.1 packaging==25.0 \
     python-dateutil==2.9.0.post0 pytz==2025.2 six==1.17.0
 cd "$work"
-timeout 200 "$work/venv/bin/python" -W ignore - <<'PYTHON'
+timeout 600 "$work/venv/bin/python" -W ignore - <<'PYTHON'
 from importlib.metadata import version
 
 import numpy as np

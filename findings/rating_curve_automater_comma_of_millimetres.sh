@@ -17,7 +17,7 @@ trap 'rm -rf "$work"' EXIT
 "$work/venv/bin/python" -m pip install -qq --no-compile --disable-pip-version-check \
     rating-curve-automater==0.3.10 numpy==2.3.1 pandas==2.3.3 matplotlib==3.10.3 openpyxl==3.1.5 PyYAML==6.0.2
 cd "$work"
-timeout 200 "$work/venv/bin/python" -W ignore - <<'PYTHON'
+timeout 600 "$work/venv/bin/python" -W ignore - <<'PYTHON'
 from importlib.metadata import version
 from pathlib import Path
 
