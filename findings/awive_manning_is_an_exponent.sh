@@ -9,7 +9,8 @@
 #             column is "distance between depths" and read as places: verticals 1 m apart, given as distances, have 0
 #             m3/s. No warning.
 # Matters:    the discharge of a camera at a river, 25 times too small, or larger after the plants have grown.
-# Documented: otherwise. The docstring says Manning's n and distances; the example in the repository has places and 8.
+# Documented: otherwise. The docstring says Manning's n and distances; in the configuration the setting is described as
+#             Manning's roughness coefficient, and is 8 unless given.
 # Versions:   awive 3.3.2 (its module water_flow, without the image libraries), numpy 1.26.4.
 set -eu
 work=$(mktemp -d)

@@ -10,7 +10,7 @@
 #             one. No message.
 # Matters:    gauges near a confluence or an estuary, whose reversed days are the ones in which the base flow is 0;
 #             records with a gap during a flood.
-# Documented: no remark was found; the argument is named streamflow.
+# Documented: no remark in the docstrings; no public thread found.
 # Versions:   baseflow 0.1.0, numpy 2.2.6, pandas 2.3.3, numba 0.61.2.
 set -eu
 work=$(mktemp -d)

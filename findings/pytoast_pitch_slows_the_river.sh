@@ -5,8 +5,8 @@
 #             that water at 1 m/s is water at 1 m/s whatever the attitude of the boat.
 # Seen:       one sign of the nine is exchanged, that of the instrument's z in the velocity to the north. Velocities of
 #             the booklet's rotation come back as 0.985 m/s at 5 degrees of pitch, 0.940 at 10 and 0.766 at 20; water
-#             that rises at 1 m/s has 0.34 m/s to the north. Roll alone is right. The default beam angle, 25 degrees, is
-#             that of no such instrument (20 or 30).
+#             that rises at 1 m/s has 0.34 m/s to the north. Roll alone is right. The beam angle is 25 degrees unless it
+#             is given, 20 in most of these instruments.
 # Matters:    discharges and stresses of a moored or towed ADCP that are too small, growing with the square of the
 #             pitch.
 # Documented: the docstring names the coordinate transformation for these instruments. No public thread found.
