@@ -391,7 +391,7 @@ class PlanSearch:
     def _best_in(self, budget: float, flows: Flows[str]) -> list[int]:
         """Pieces in some flows by gain per hour, from nothing, or from the best equally spaced transects that fit."""
         spaced = max(self._equally_spaced(budget, flows), key=self.worth, default=[])
-        return max((self._filled(budget, some, flows) for some in ([], spaced)), key=self.worth)
+        return max(in_threads(self._filled, [(budget, some, flows) for some in ([], spaced)]), key=self.worth)
 
     def _exchanged(self, budget: float, best: list[int], flows: Flows[str]) -> list[int]:
         """Each piece in turn left out, and its hours filled, while that helps."""
