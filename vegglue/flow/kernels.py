@@ -235,6 +235,12 @@ def _neighbours_of_u(far, near, east, f, u, carrier, flux, face, cell):
 
 
 @compiled_inside
+def _turned(out, values):
+    for t in range(out.size):
+        out[t] = -values[t]
+
+
+@compiled_inside
 def _neighbours_of_v(far, near, east, m, i, v, carrier):
     """v [m/s] two columns and one west of column i and one east of it, ((ny + 1) m,) each; where a side is nearer, into
     what is given.
@@ -245,10 +251,10 @@ def _neighbours_of_v(far, near, east, m, i, v, carrier):
     if i == last:
         beyond_outlet(east[m:-m], v[i, m:-m], v[max(i - 1, 0), m:-m], carrier)
     if i == 0:
-        near[:] = -v[0]
+        _turned(near, v[0])
         straight_on(far, near, v[0])
     if i == 1:
-        far[:] = -v[0]
+        _turned(far, v[0])
     return v[i - 2] if i > 1 else far, v[i - 1] if i > 0 else near, v[i + 1] if i < last else east
 
 
