@@ -83,7 +83,10 @@ def ease(out, state, depth, drag, west, slope, film, at_outlet):
     before, per_thin = west / depth[0], 0.5 / (THIN * film)
     for i in range(nx):
         for j in range(ny):
-            if depth[i, j].min() > 2.0 * THIN * film:
+            deep = True
+            for k in range(m):  # not by `min`, which takes as long to compile as the rest
+                deep &= depth[i, j, k] > 2.0 * THIN * film
+            if deep:
                 continue
             if i == nx - 1 and not at_outlet[j]:
                 continue
@@ -117,12 +120,18 @@ def _above(state, bed, rise, i, j, a, b, k):
 @compiled
 def answers(state, bed, rise, half_range, film, thick):
     """u d(rho)/dz [1/s] of one member's faces (nx, 3, ny) where rho is one, z the level of either cell beside."""
-    answer = np.zeros(thick.shape)
-    for i, e, j in np.argwhere(thick < THIN * film):
-        a, b = _beyond(i, e, j)
-        wide, share = 0.5 * (half_range[i, j] + half_range[a, b]), thick[i, e, j] / (THIN * film)
-        wet = min(max(0.5 * (_above(state, bed, rise, i, j, a, b, 0) - FILM_ON_LAND * film + wide) / wide, 0.0), 1.0)
-        answer[i, e, j] = (1.0 - share * share) * 0.5 * wet / thick[i, e, j] * state[i, e, j, 0]
+    nx, _, ny = thick.shape
+    answer = np.zeros((nx, 3, ny))
+    for i in range(nx):
+        for e in range(3):
+            for j in range(ny):
+                if not thick[i, e, j] < THIN * film:
+                    continue
+                a, b = _beyond(i, e, j)
+                wide, share = 0.5 * (half_range[i, j] + half_range[a, b]), thick[i, e, j] / (THIN * film)
+                above = _above(state, bed, rise, i, j, a, b, 0) - FILM_ON_LAND * film
+                wet = min(max(0.5 * (above + wide) / wide, 0.0), 1.0)
+                answer[i, e, j] = (1.0 - share * share) * 0.5 * wet / thick[i, e, j] * state[i, e, j, 0]
     return answer
 
 
