@@ -69,8 +69,8 @@ release: $(TESTABLE)  # wheel and sdist in dist: built twice with the same bytes
 house: $(TESTABLE)  # counts of files, lines, helpers and words, for a reader
 	@$(BIN)/python tests/house.py
 
-bench: $(TESTABLE)  # measured speed: members/s, cell-steps/s, share of the kernel
-	$(BIN)/python tests/studies/bench.py
+bench: $(TESTABLE)  # measured speed: members/s, cell-steps/s, share of the kernel; BESIDE=CHECKOUT: two builds by turns
+	$(BIN)/python tests/studies/$(if $(BESIDE),beside.py $(BESIDE),bench.py)
 
 blind: $(TESTABLE)  # the study of docs/blind.md: hours; goes on where it was stopped
 	nice $(BIN)/python tests/studies/blind.py --jobs $(JOBS)

@@ -1,4 +1,7 @@
-"""Measured start of the commands: `python tests/studies/startup.py`, a part of `make bench`. Asserts nothing."""
+"""Measured start of the commands: `python tests/studies/startup.py`, a part of `make bench`. Asserts nothing.
+
+What the first diagnosis on a machine takes longer: `python tests/studies/beside.py CHECKOUT --only first`.
+"""
 
 import os
 import resource
