@@ -47,7 +47,7 @@ FOREIGN = (
 )  # fmt: skip
 
 
-def refuse_foreign(path: Path) -> None:
+def refuse_foreign_format(path: Path) -> None:
     """InputError for a file that begins as one of FOREIGN: what it is, and as what to save it."""
     try:
         with path.open("rb") as file:

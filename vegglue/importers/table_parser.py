@@ -18,7 +18,13 @@ from vegglue.arrays import Array
 from vegglue.errors import InputError
 from vegglue.importers.column_names import is_row_of_units, is_unit, role_of
 from vegglue.importers.import_notes import FileNote, ImportNote, Noted
-from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_foreign, refuse_larger
+from vegglue.importers.library_files import (
+    importing,
+    read_by_library,
+    readable_text,
+    refuse_foreign_format,
+    refuse_larger,
+)
 
 WORKBOOKS = (".xlsx", ".xlsm")
 COMMENTS = ("#", "%", "//", "!", "$")
@@ -166,7 +172,7 @@ def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
     """
     if path.suffix.lower() in WORKBOOKS:
         return _without_summaries(_table(path, *_lines_of_sheet(path, sheet), "", False))
-    refuse_foreign(path)
+    refuse_foreign_format(path)
     there = [(number, text) for number, text in enumerate(readable_text(path).splitlines(), 1) if text.strip(" \t;,")]
     lines = [
         (number, text)

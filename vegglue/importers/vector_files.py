@@ -24,7 +24,7 @@ from vegglue.importers.column_roles import columns_of_table, taken_as_si
 from vegglue.importers.coordinate_systems import StatedSystem, epsg_number, refuse_other_system, system_of_wkt
 from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.import_notes import CentrelineTaken, ImportNote, Noted, PatchesRead, UnitsAssumed
-from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_foreign
+from vegglue.importers.library_files import importing, read_by_library, readable_text, refuse_foreign_format
 from vegglue.importers.measured_rows import (
     MeasuredRows,
     Placement,
@@ -317,7 +317,7 @@ def geojson_features(path: Path, what: str, frame: Frame | None = None) -> Itera
 
     InputError if it is none, names another system than the frame does, or lacks what is read of it within.
     """
-    refuse_foreign(path)
+    refuse_foreign_format(path)
     try:
         tree = json.loads(readable_text(path))
         number = epsg_number(json.dumps(tree.get("crs")))
