@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 from field_folders import CHANNEL, JUNE, import_of, refusal_of
 
@@ -378,3 +379,29 @@ def test_own_columns_and_units_are_kept_in_the_case(tmp_path: Path) -> None:
 def test_a_share_is_no_quantity(tmp_path: Path, heading: str) -> None:
     """`%Q` of a gauging was its discharge in m3/s."""
     assert rows_of(tmp_path, f"x;{heading};u\n1;40;0.4\n2;60;0.5\n").numbers.keys() == {"x", "u"}
+
+
+@pytest.mark.parametrize(
+    "mean", ["Mean Velocity (m/s)", "Average Velocity [m/s]", "Avg velocity", "Mittlere Geschwindigkeit"]
+)
+def test_the_mean_of_a_vertical_stands_beside_that_of_a_point(tmp_path: Path, mean: str) -> None:
+    """A gauging has `Velocity` of its last point and `Mean Velocity`; the first of both counted."""
+    taken = rows_of(tmp_path, f"x;Velocity (m/s);{mean}\n1;0.512;0.457\n2;0.351;0.351\n")
+    assert taken.numbers["u"].tolist() == [0.457, 0.351]
+
+
+@pytest.mark.parametrize(("unit", "mark"), [("m/s", "-32.768"), ("cm/s", "-3276.8"), ("mm/s", "-32768")])
+def test_a_mark_of_a_boat_is_one_in_any_unit(tmp_path: Path, unit: str, mark: str) -> None:
+    u = rows_of(tmp_path, f"x;u [{unit}]\n1;{mark}\n2;0.35\n").numbers["u"]
+    assert np.isnan(u).tolist() == [True, False]
+
+
+def test_a_workbook_whose_first_sheet_has_words_names_the_others(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    book.active.title, book.active["A1"] = "Notes", "Mill brook"
+    june = book.create_sheet("June")
+    for row in (("x", "u"), (1, 0.4), (2, 0.5)):
+        june.append(row)
+    book.save(tmp_path / "a.xlsx")
+    with pytest.raises(InputError, match="'Notes', got none; name another by `sheet` of this file: June"):
+        read_rows(tmp_path / "a.xlsx", FileOptions())

@@ -92,7 +92,7 @@ def test_verticals_beside_a_survey_are_refused_with_both_places(tmp_path: Path) 
     survey = "x;y;z\n" + "".join(f"{x};{y};{abs(y - 3) / 4}\n" for x in (0, 20) for y in range(7))
     rows = "".join(f"10;{y};{height};0.4\n" for y in (2, 3, 4) for height in (0.1, 0.2))
     points = f"x;Dist. from left bank (m);height above bed;u\n{rows}"
-    options = "zero: [0, 10], columns: {y: 'Dist. from left bank (m)'}"
+    options = "zero: [0, 14], flip: y, columns: {y: 'Dist. from left bank (m)'}"
     site = f"bed: {{file: bed.csv, sections: true}}\n{JUNE}files: {{adv.csv: {{{options}}}}}\n"
     error = refusal(folder_of(tmp_path / "brook", site, bed__csv=survey, adv__csv=points))
     assert "adv.csv" in error
@@ -382,3 +382,37 @@ def test_a_frame_turns_there_and_back(tmp_path: Path) -> None:
     options = FileOptions(units={"speed": "cm/s"})
     taken = in_the_channel(read_rows(tmp_path / "a.csv", options), Placement(frame), options)
     assert (taken.numbers["u"][0], taken.numbers["v"][0]) == pytest.approx((0.5, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "heading", "refused"),
+    [
+        ("{line: [[8, 2], [8, -2]]}", "Distance from right bank (m)", True),
+        ("{line: [[8, -2], [8, 2]]}", "Distance from right bank (m)", False),
+        ("{line: [[8, 2], [8, -2]]}", "Abstand vom linken Ufer (m)", False),
+        ('{x: 8, columns: {y: "Dist. from LB (m)"}}', "Dist. from LB (m)", True),
+        ('{x: 8, columns: {y: "Dist. from LB (m)"}, flip: y, zero: [0, 2]}', "Dist. from LB (m)", False),
+        ('{x: 8, columns: {y: "Dist. from RB (m)"}, flip: y, zero: [0, 2]}', "Dist. from RB (m)", True),
+        ('{x: 8, columns: {y: "y (+ left) (m)"}}', "y (+ left) (m)", False),
+    ],
+)
+def test_distances_count_from_the_bank_of_their_heading(
+    tmp_path: Path, options: str, heading: str, refused: bool
+) -> None:
+    """The section was mirrored without a word."""
+    table = f"{heading};Velocity (m/s)\n0.5;0.4\n1.5;0.5\n"
+    if refused:
+        assert "bank, as" in refusal_of(tmp_path, entry(options), a__csv=table)
+    else:
+        assert len(import_of(tmp_path, entry(options), a__csv=table).table) == 2
+
+
+def test_ends_of_a_tape_on_the_map_are_those_of_the_channel(tmp_path: Path) -> None:
+    """The channel runs north: its left bank lies to the west."""
+    site = CHANNEL + JUNE + "frame: {origin: [5000, 2000], angle: 90}\nfiles: {a.csv: {line: LINE}}\n"
+    table = "Distance from left bank (m);Velocity (m/s)\n0.5;0.4\n1.5;0.5\n"
+    found = import_of(tmp_path, site.replace("LINE", "[[4998, 2008], [5002, 2008]]"), a__csv=table)
+    assert found.table["y"].tolist() == pytest.approx([1.5, 0.5])
+    (tmp_path / "other").mkdir()
+    other = site.replace("LINE", "[[5002, 2008], [4998, 2008]]")
+    assert "exchange the ends of `line`" in refusal_of(tmp_path / "other", other, a__csv=table)

@@ -44,6 +44,7 @@ VAGUE_NAMES = {
     | {"fliessgeschwindigkeit", "average velocity", "avg velocity", "velocity mean", "velocity avg", "velocidad"}
     | {"vitesse moyenne", "velocidad media", "snelheid", "gemiddelde snelheid", "velocita", "velocita media"},
 }
+OF_A_MEAN = re.compile(r"\b(mean|average|avg|mittlere|moyenne|media|gemiddelde)|meanv")
 # What errors and scatters are of, and so in the unit of if they state none.
 VALUES_OF = {
     "u_se": ("u", "east_velocity"),
@@ -72,6 +73,7 @@ BAD_CODES, GOOD_CODES = {3.0, 4.0, 9.0}, {1.0, 2.0}
 OF_CODES = {"flag", "qc", "qa", "qaqc"}  # words of a heading above such numbers; others may be ratings
 MEANS_GOOD = {"valid", "ok", "use", "used", "good"}
 MEANS_BAD = {"bad", "reject", "rejected", "outlier"}
+SCALED_MARKS = (32.768, 327.68, 3276.8)  # -32768 mm/s of a boat in m/s, dm/s and cm/s
 FEWEST_NINES = 3  # in a mark; 0.9 and 99 are measured
 # What no reading of a quantity or a role exceeds [SI]: no stream among plants runs at 7 m/s, a direction is less than
 # two turns, plants grow in no 50 m of water, and no river lies 7 km above the sea. 7777 mm is a level in a flume, 7777
@@ -154,6 +156,8 @@ def _is_of_something_else(heading: str, role: str, headings: tuple[str, ...], na
         roles = [*named, *(known[0] for known in map(role_of, headings) if known is not None)]
         return "level" not in roles or any(ROLES[one].quantity == "velocity" for one in roles if one != "u_se")
     vague = VAGUE_NAMES.get(role, set())
+    if own in vague and role == "u" and not OF_A_MEAN.search(own) and any(map(OF_A_MEAN.search, others)):
+        return True  # that of a point, beside the mean of its vertical
     return own in vague and any(name not in vague for name in others)
 
 
@@ -240,7 +244,8 @@ def numbers_of_column(
     quantity, heading = ROLES[role].quantity, table.headings[place]
     factor = scale_of_column(unit, quantity, shown_path(path))
     largest = LARGEST_OF.get(role, LARGEST_OF.get(quantity, math.inf))
-    marks = [sign * mark for mark in MARKS_OR_VALUES if mark * factor > largest for sign in (1.0, -1.0)]
+    scaled = SCALED_MARKS if quantity == "velocity" else ()
+    marks = [sign * mark for mark in (*MARKS_OR_VALUES, *scaled) if mark * factor > largest for sign in (1.0, -1.0)]
     values = table.numbers(path, place)
     marked = np.isin(values, [*missing, *marks]) | np.array([*map(is_mark_anywhere, values.tolist())], dtype=bool)
     values = np.where(marked, np.nan, values)

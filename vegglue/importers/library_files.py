@@ -43,7 +43,8 @@ FOREIGN = (
     (rb"SQLite format 3", "a GeoPackage", DRAWN), (rb"(<\?xml[^>]*>\s*)?<kml", "a KML", DRAWN),
     (rb"(<\?xml[^>]*>\s*)?<gpx", "a GPX track", DRAWN), (rb"(<\?xml[^>]*>\s*)?<LandXML", "a LandXML", DRAWN),
     (rb"\xd0\xcf\x11\xe0", "a workbook of Excel 97 (.xls)", WORKBOOK), (rb"PK\x03\x04", "a packed file", WORKBOOK),
-    (rb"%PDF", "a PDF", WORKBOOK), (rb"PAR1", "a Parquet file", WORKBOOK), (rb"<[?!a-zA-Z]", "an XML", WORKBOOK),
+    (rb"%PDF", "a PDF", WORKBOOK), (rb"PAR1", "a Parquet file", WORKBOOK),
+    (rb"\*?11\d{4}[+-]", "a record of a Leica (GSI)", WORKBOOK), (rb"<[?!a-zA-Z]", "an XML", WORKBOOK),
 )  # fmt: skip
 
 

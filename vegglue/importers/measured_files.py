@@ -30,6 +30,7 @@ from vegglue.importers.measured_rows import (
     in_the_channel,
     joined_rows,
     refuse_far_places,
+    refuse_other_bank,
     with_experiments,
 )
 from vegglue.importers.site_file import HELD_OUT, FieldSite, held_out_files, site_file
@@ -286,6 +287,7 @@ def _converted(
             )
     read = [with_experiments(reader_of(path)(path, options), known.names) for path, options in group]
     for one, (path, options) in zip(read, group, strict=True):
+        refuse_other_bank(path, one, place, options)
         if {"x", "y"} <= one.numbers.keys():
             on_map = Placement() if options.coordinates == "channel" else place
             refuse_far_places(shown_path(path), one.numbers["x"], one.numbers["y"], on_map)

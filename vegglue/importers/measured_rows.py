@@ -11,7 +11,7 @@ from vegglue.arrays import Array, Mask
 from vegglue.case.grid import Centreline, along_and_across, heading_at, on_map
 from vegglue.case.site_schema import Frame
 from vegglue.errors import InputError, shown_path
-from vegglue.importers.column_names import ROLES, UNITS, known_name, unit_in_words
+from vegglue.importers.column_names import ROLES, UNITS, known_name, unit_in_words, words_of
 from vegglue.importers.column_roles import (
     NAMES_OF_BED,
     columns_of_table,
@@ -40,6 +40,12 @@ OF_RECORDS = {
 FAR, DIGITS_IN_FRONT, MOST_PLACES = 2e4, 1e6, 50
 # Places of a reach within such a span, below a full turn and finer than a tenth of a millimetre, are degrees.
 SPAN_OF_DEGREES, FULL_TURN, FINER, FEWEST_PLACES = 0.02, 360.0, 1e-7, 3
+# Words of a heading for a bank, and for the one that distances count from.
+OF_A_BANK = {"bank", "lb", "rb", "lew", "rew", "ufer", "rive", "orilla", "sponda", "oever"}
+BANKS = {
+    "left": {"left", "lb", "lew", "linken", "linkes", "links", "linker", "gauche", "izquierda", "sinistra"},
+    "right": {"right", "rb", "rew", "rechten", "rechtes", "rechts", "rechter", "droite", "derecha", "destra"},
+}
 # Pairs of components, those that are named after the map first.
 COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 
@@ -192,10 +198,12 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
             numbers[role], more = numbers_of_column(path, table, place, role, units[role], options.missing or ())
             notes += more
     if not numbers:
+        unheaded = all(map(str.isdigit, table.headings))
         raise InputError(
             f"{shown_path(path)}: expected columns with known names, got {', '.join(table.headings)}; name them by "
-            f"`columns` of this file, by what they hold: {', '.join(sorted(ROLES))}; or move a file without "
-            "measurements out of the folder."
+            f"`columns` of this file, by what they hold: {', '.join(sorted(ROLES))}"
+            f"{' (without headings by their number, `{x: 3, y: 2, z: 4}`)' if unheaded else ''}; or move a file "
+            "without measurements out of the folder."
         )
     unread = [place for place in range(len(table.headings)) if place not in columns.values()]
     # A unit in a line above the heading, in a comment or in an unread column, of what is taken for SI.
@@ -307,6 +315,28 @@ def refuse_far_places(where: str, east: Array, north: Array, place: Placement) -
     raise InputError(
         "far_places", where=where, origin=origin.tolist(), got=at[0].tolist(), apart=apart(at), cause=cause
     )
+
+
+def refuse_other_bank(path: Path, taken: MeasuredRows, place: Placement, options: FileOptions) -> None:
+    """InputError for distances that by their heading count from one bank, and by `line` or `flip` from the other."""
+    role = "tape" if options.line is not None else "y"
+    heading = words_of(taken.columns.get(role, "")).split()
+    banks = [bank for bank, words in BANKS.items() if words & set(heading)]
+    on_map = place.turned and options.coordinates != "channel"
+    if len(banks) != 1 or not OF_A_BANK & set(heading) or (options.line is None and on_map):
+        return
+    if options.line is not None:
+        east, north = np.array(options.line).T
+        _, ends = place.to_channel(east, north) if on_map else (east, north)
+        to_the_left = bool(ends[1] > ends[0]) != ("y" in options.flip)
+        mend = "exchange the ends of `line`"
+    else:
+        to_the_left, mend = "y" not in options.flip, "write `flip: y` for a left bank alone"
+    if to_the_left != (banks[0] == "right"):
+        raise InputError(
+            f"{shown_path(path)}: expected places from the {banks[0]} bank, as {taken.columns[role]!r} counts, got "
+            f"them from the other one (y is positive to the left, looking downstream); {mend}."
+        )
 
 
 def vertical_role(taken: MeasuredRows) -> str | None:

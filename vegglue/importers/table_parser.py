@@ -250,7 +250,8 @@ def _table(
     lines = [(number, _without_empty_end(fields)) for number, fields in whole]
     numeric = [number > typed for number, _ in lines] if typed else _rows_of_numbers(lines, separator)
     if not any(numeric):
-        raise InputError("no_table", file=path)
+        sheets = [one.names for one in form if isinstance(one, ImportNote) and one.kind == Noted.ONE_SHEET]
+        raise InputError("no_table", file=path, sheets=sheets[0] if sheets else ())
     width = _usual_width(lines, numeric)
     first = next(i for i, (_, fields) in enumerate(lines) if numeric[i] and len(fields) == width)
     begin = first - next((i for i, row in enumerate(reversed(numeric[:first])) if not row), first)
