@@ -92,7 +92,7 @@ def test_verticals_beside_a_survey_are_refused_with_both_places(tmp_path: Path) 
     survey = "x;y;z\n" + "".join(f"{x};{y};{abs(y - 3) / 4}\n" for x in (0, 20) for y in range(7))
     rows = "".join(f"10;{y};{height};0.4\n" for y in (2, 3, 4) for height in (0.1, 0.2))
     points = f"x;Dist. from left bank (m);height above bed;u\n{rows}"
-    options = "zero: [0, 14], flip: y, columns: {y: 'Dist. from left bank (m)'}"
+    options = "zero: [0, 16], flip: y, columns: {y: 'Dist. from left bank (m)'}"
     site = f"bed: {{file: bed.csv, sections: true}}\n{JUNE}files: {{adv.csv: {{{options}}}}}\n"
     error = refusal(folder_of(tmp_path / "brook", site, bed__csv=survey, adv__csv=points))
     assert "adv.csv" in error
