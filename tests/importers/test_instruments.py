@@ -534,6 +534,16 @@ def test_images_of_a_camera_become_means_of_what_they_saw(tmp_path: Path, classi
     assert taken.notes == ("pyorc", ImportNote(Noted.IMAGES, 400, ("factor",)))
 
 
+def test_a_cell_seen_once_has_no_error(tmp_path: Path) -> None:
+    """Of two times: its velocity had an error of 0 m/s, and the errors of the others were 0.7 times too small."""
+    along = np.stack([np.full((4, 6), 0.4), np.full((4, 6), 0.6)])
+    along[1, :2, :2] = np.nan
+    write_velocimetry(tmp_path / "piv.nc", along, 0.0 * along, 0.0)
+    taken = read_velocimetry(tmp_path / "piv.nc", FileOptions())
+    assert taken.numbers["east_velocity"] == pytest.approx(0.5)
+    assert (taken.numbers["u_se"] > 0.0).all()
+
+
 def test_images_named_under_files_are_no_result_of_a_model(tmp_path: Path) -> None:
     """At 0.85 of the surface, in the channel: its frame lies 30 degrees from the east, as the images do."""
     frame = "frame: {origin: [998, 1999], angle: 30 degrees}\n"

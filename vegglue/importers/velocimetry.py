@@ -76,14 +76,14 @@ def read_velocimetry(path: Path, options: FileOptions) -> MeasuredRows:
     to_y = np.array([np.mean(np.diff(part, axis=0) / np.diff(y)[:, None]) for part in (east, north)])
     series = to_x[:, None, None, None] * along + to_y[:, None, None, None] * across
     seen = np.isfinite(series[0]).sum(axis=0)
-    enough = seen >= max(LEAST_SEEN * times, 1.0)
+    enough = seen >= max(LEAST_SEEN * times, min(times, 2))  # one value has no spread
     if not enough.any():
         raise InputError(
             f"{shown_path(path)}: expected velocities at {100 * LEAST_SEEN:.0f} % of {times} times in some cell, got "
             "none; mask less in pyorc."
         )
     series = np.where(enough, series, 0.0)
-    mean, spread = np.nanmean(series, axis=1), np.nanstd(series, axis=1)
+    mean, spread = np.nanmean(series, axis=1), np.nanstd(series, axis=1, ddof=min(times - 1, 1))
     tau = autocorrelation_time(one[np.isfinite(one)] for part in series for one in part[:, enough].T)
     error = spread * np.sqrt(tau / np.maximum(seen, 1))
     moving = means_of_blocks(np.where(enough, [*mean, *error], np.nan))
