@@ -38,7 +38,7 @@ DATA_FILE = "datafile.json"
 FLOWTRACKER = re.compile(r"^Sensor_Type\s+FlowTracker|FlowTracker_Handheld_ADV", re.MULTILINE)
 RIVERSURVEYOR = re.compile(r"^System Type;\s*RS-|RiverSurveyor Stationary", re.MULTILINE)
 AQUACALC = re.compile(r"\A.{0,100}^\W*AquaCalc", re.MULTILINE | re.DOTALL)
-OF_POINTS = re.compile(r"^\s*OB\s*,\s*DIST\s*,", re.MULTILINE)  # the table of an AquaCalc 5000
+TABLE_OF_POINTS = re.compile(r"^\s*OB\s*,\s*DIST\s*,", re.MULTILINE)  # the table of an AquaCalc 5000
 QREVIEW = re.compile(r"^Time\s*\tNr\s*\tPnts\s*\tPos\.", re.MULTILINE)
 # Columns of place, depth and mean velocity of the vertical, and its error.
 COLUMNS_OF_GAUGINGS = {
@@ -208,7 +208,7 @@ def _table_of_gauging(path: Path, text: str) -> ParsedTable:
 
     lines = text.splitlines()
     head = below + next((i for i, line in enumerate(lines) if mark.match(line)), len(lines))
-    if head >= len(lines) and OF_POINTS.search(text):
+    if head >= len(lines) and TABLE_OF_POINTS.search(text):
         raise InputError(
             f"{shown_path(path)}: expected verticals of an AquaCalc Pro, got points of an AquaCalc 5000; write a table "
             "with DIST, DEPTH, VEL times COS:VF as `velocity`, and DEPTH times LOC / 10 as `below surface`, with units."

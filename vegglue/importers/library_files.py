@@ -34,14 +34,14 @@ LONGEST_COMPLAINT = 200  # letters of a library's complaint; some quote the file
 MATLAB_READER = f"{__name__}:unpack_matlab"  # as the process of its own knows it
 MATLAB_5 = "MATLAB 5"
 # How files begin that are no table, up to so much of them [bytes]; what they are, and as what a program saves them.
-POINTS, DRAWN, WORKBOOK = "points", "drawn", "workbook"
+POINTS, CAD_MAP, WORKBOOK = "points", "drawn", "workbook"
 LONGEST_BEGINNING = 1000
 FOREIGN = (
     (rb"LASF", "a point cloud (LAS, LAZ)", POINTS), (rb"ASTM-E57", "a point cloud (E57)", POINTS),
-    (rb"ply\r?\n", "a point cloud (PLY)", POINTS), (rb"AC10\d\d", "a drawing (DWG)", DRAWN),
-    (rb"(999\r?\n.*\r?\n\s*)?0\r?\n\s*SECTION", "a drawing (DXF)", DRAWN),
-    (rb"SQLite format 3", "a GeoPackage", DRAWN), (rb"(<\?xml[^>]*>\s*)?<kml", "a KML", DRAWN),
-    (rb"(<\?xml[^>]*>\s*)?<gpx", "a GPX track", DRAWN), (rb"(<\?xml[^>]*>\s*)?<LandXML", "a LandXML", DRAWN),
+    (rb"ply\r?\n", "a point cloud (PLY)", POINTS), (rb"AC10\d\d", "a drawing (DWG)", CAD_MAP),
+    (rb"(999\r?\n.*\r?\n\s*)?0\r?\n\s*SECTION", "a drawing (DXF)", CAD_MAP),
+    (rb"SQLite format 3", "a GeoPackage", CAD_MAP), (rb"(<\?xml[^>]*>\s*)?<kml", "a KML", CAD_MAP),
+    (rb"(<\?xml[^>]*>\s*)?<gpx", "a GPX track", CAD_MAP), (rb"(<\?xml[^>]*>\s*)?<LandXML", "a LandXML", CAD_MAP),
     (rb"\xd0\xcf\x11\xe0", "a workbook of Excel 97 (.xls)", WORKBOOK), (rb"PK\x03\x04", "a packed file", WORKBOOK),
     (rb"%PDF", "a PDF", WORKBOOK), (rb"PAR1", "a Parquet file", WORKBOOK),
     (rb"\*?11\d{4}[+-]", "a record of a Leica (GSI)", WORKBOOK), (rb"<[?!a-zA-Z]", "an XML", WORKBOOK),

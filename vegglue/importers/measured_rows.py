@@ -37,9 +37,9 @@ OF_RECORDS = {
 }
 # Places on a map further from a site are none of it, as no reach is so long [m]; digits that maps put in front, such as
 # 2 and 1 million of the Swiss ones, come in such steps [m]. How many places are looked at.
-FAR, DIGITS_IN_FRONT, MOST_PLACES = 2e4, 1e6, 50
+FAR, DIGITS_IN_FRONT, PLACES_COMPARED = 2e4, 1e6, 50
 # Places of a reach within such a span, below a full turn and finer than a tenth of a millimetre, are degrees.
-SPAN_OF_DEGREES, FULL_TURN, FINER, FEWEST_PLACES = 0.02, 360.0, 1e-7, 3
+REACH_IN_DEGREES, FULL_TURN, FINE_DIGITS, FEWEST_PLACES = 0.02, 360.0, 1e-7, 3
 # Words of a heading for a bank, and for the one that distances count from.
 OF_A_BANK = {"bank", "lb", "rb", "lew", "rew", "ufer", "rive", "orilla", "sponda", "oever"}
 BANKS = {
@@ -291,8 +291,8 @@ def refuse_far_places(where: str, east: Array, north: Array, place: Placement) -
     if not len(at):
         return
     span, size = np.ptp(at, axis=0), np.abs(at).max(axis=0)
-    finer = bool((np.abs(at - np.round(at, 4)) > FINER).any())
-    degrees = len(at) >= FEWEST_PLACES and bool((span < SPAN_OF_DEGREES).all() and max(size) <= FULL_TURN)
+    finer = bool((np.abs(at - np.round(at, 4)) > FINE_DIGITS).any())
+    degrees = len(at) >= FEWEST_PLACES and bool((span < REACH_IN_DEGREES).all() and max(size) <= FULL_TURN)
     if degrees and finer and min(size) > 0.0 and max(size) > 1.0:
         raise InputError("places_in_degrees", where=where, role="x")
     if not place.turned:
@@ -302,7 +302,7 @@ def refuse_far_places(where: str, east: Array, north: Array, place: Placement) -
     def apart(places: Array) -> float:
         """Median distance from the site [m]."""
         x, y = place.frame.to_model(*places.T) if place.frame is not None else places.T
-        return float(np.median([np.hypot(*(reach - one).T).min() for one in np.column_stack([x, y])[:MOST_PLACES]]))
+        return float(np.median([np.hypot(*(reach - one).T).min() for one in np.column_stack([x, y])[:PLACES_COMPARED]]))
 
     if apart(at) <= FAR:
         return
