@@ -114,7 +114,9 @@ def test_parts_begin_on_the_map_and_head_there(tmp_path: Path) -> None:
     east, north = FRAME.to_map(1.0, 2.0)
     parts = f"{{parts: [{{length: 12}}, {{radius: 20, angle: 60}}], start: [{east}, {north}], heading: 32}}"
     case = imported(
-        tmp_path / "Bend", GROUND + EXPERIMENTS + SAID + f"grid: {{centreline: {parts}}}\n", a__csv="E,N,u\n1,2,0.5\n"
+        tmp_path / "Bend",
+        GROUND + EXPERIMENTS + SAID + f"grid: {{centreline: {parts}}}\n",
+        a__csv=f"E,N,u\n{east},{north},0.5\n",
     )
     assert case.grid.centreline is not None
     assert case.grid.centreline.start == pytest.approx((1.0, 2.0))

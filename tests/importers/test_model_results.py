@@ -6,6 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from result_files import GridFlow, a_flow, at_nodes, write_flow_fm, write_hec_ras, write_selafin, write_trim
 
 from vegglue.errors import InputError
@@ -182,6 +183,13 @@ def write_ugrid(path: Path, **changed: dict[str, object]) -> None:
 
 
 U = {"values": 1.2 * np.ones((3, 12)), "standard_name": "sea_water_x_velocity", "units": "m s-1"}
+
+
+def partly(value: float) -> NDArray[np.float64]:
+    """u at three times, three of twelve faces of this value [m/s]."""
+    return np.repeat([[value, 0.4]] * 3, [3, 9], axis=1)
+
+
 FLAG = {"values": np.repeat([0, 1], [3, 9]), "flag_meanings": "dry wet"}
 
 
@@ -206,8 +214,11 @@ FLAG = {"values": np.repeat([0, 1], [3, 9]), "flag_meanings": "dry wet"}
         ({"a_maximum": {**U, "cell_methods": "time: maximum"}}, (12, 10.0, 0.5, 0.4)),
         ({"dryness": FLAG}, (9, 10.0, 0.5, 0.4)),
         ({"dryness": {**FLAG, "flag_meanings": "wet dry", "flag_values": np.array([1, 0])}}, (9, 10.0, 0.5, 0.4)),
-        ({"u": {"values": np.repeat([[500.0, 0.4]], [3, 9], axis=1), "valid_range": [-9.0, 9.0]}}, (9, 10.0, 0.5, 0.4)),
-        ({"u": {"values": np.repeat([[-99.0, 0.4]], [3, 9], axis=1)}}, (9, 10.0, 0.5, 0.4)),
+        (
+            {"u": {"values": np.repeat([[500.0, 0.4]] * 3, [3, 9], axis=1), "valid_range": [-9.0, 9.0]}},
+            (9, 10.0, 0.5, 0.4),
+        ),
+        ({"u": {"values": np.repeat([[-99.0, 0.4]] * 3, [3, 9], axis=1)}}, (9, 10.0, 0.5, 0.4)),
     ],
 )
 def test_what_a_netcdf_states_of_its_fields_counts(

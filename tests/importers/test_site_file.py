@@ -187,7 +187,8 @@ def test_a_system_that_is_unknown_or_not_in_metres_is_refused(tmp_path: Path, cr
 
 def test_a_frame_may_have_its_place_in_feet(tmp_path: Path) -> None:
     frame = {"origin": ["2000000 ftUS", "100 ft"], "towards": [609701.2192, 30.48]}
-    folder = field_folder(tmp_path / "site", frame=frame)
+    files = {name: {"coordinates": "channel"} for name in ("velocities.csv", "levels.csv", "holdout.csv")}
+    folder = field_folder(tmp_path / "site", frame=frame, files=files)
     case = import_folder(folder, tmp_path / "site.yaml")
     assert case.frame is not None
     assert (*case.frame.origin, case.frame.angle) == pytest.approx((609601.2192, 30.48, 0.0), abs=1e-4)
