@@ -142,9 +142,11 @@ def test_an_output_that_is_full_is_told() -> None:
     assert done.stderr == _file(LAST_WORDS["output"], "No space left on device") + "\n"
 
 
-def test_an_output_that_nobody_reads_on_ends_the_command_without_a_word() -> None:
-    shell = f"set -o pipefail; {' '.join(command('effects'))} | true"
-    done = subprocess.run(["bash", "-c", shell], capture_output=True, env=ENVIRONMENT, text=True)
+@pytest.mark.parametrize("at_once", ["", "1"])
+def test_an_output_that_nobody_reads_on_ends_the_command_without_a_word(at_once: str) -> None:
+    """Whether it is written line by line or at the end, which was told as a full disk is."""
+    shell, environment = f"set -o pipefail; {' '.join(command('effects'))} | true", {"PYTHONUNBUFFERED": at_once}
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, env=ENVIRONMENT | environment, text=True)
     assert (done.returncode, done.stderr) == (1, "")
 
 

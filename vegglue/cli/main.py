@@ -15,7 +15,7 @@ from vegglue.cli.terminal import FLAG
 from vegglue.errors import InputError, StorageError
 from vegglue.wording.commands import HELP, LAST_WORDS
 
-MISTAKE, MACHINE, STOPPED = 2, 3, 130  # exit codes
+UNREAD, MISTAKE, MACHINE, STOPPED = 1, 2, 3, 130  # exit codes
 
 
 def ending_well(command: Callable[[], object]) -> None:
@@ -69,6 +69,8 @@ def _flush() -> None:
     except OSError as error:
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python tries, and complains, again
+        if isinstance(error, BrokenPipeError):  # `| head` has read enough: as click ends it where it prints at once
+            sys.exit(UNREAD)
         _end(LAST_WORDS["file"].format(LAST_WORDS["output"], error.strerror), MACHINE)
 
 
