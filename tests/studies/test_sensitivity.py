@@ -27,7 +27,9 @@ def test_what_is_recorded_is_not_run_again() -> None:
 
 def test_a_constant_forks_when_it_is_first_read() -> None:
     read_twice = """
-import os, sensitivity
+import os, sys
+sys.path.insert(0, os.getcwd())  # which a command of the same process may have taken out (PYTHONSAFEPATH)
+import sensitivity
 from vegglue.decision_constants import DecisionConstants
 of = sensitivity.Forking(DecisionConstants(), {"field_odds": (0.5, 2.0), "spot_drag": (2.0,), "set_chance": (0.5,)})
 found = [of.field_odds, of.spot_drag, of.field_odds]
