@@ -7,11 +7,12 @@ from reach import write_reach
 from small_case import SMALL, changed, write
 
 from vegglue.case.config import load_case, read_tree
-from vegglue.case.messages import nearest, nearest_effect
+from vegglue.case.messages import nearest_effect
 from vegglue.case.resolved_config import case_hash, digest_of, resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.effects.library import library
 from vegglue.errors import InputError
+from vegglue.wording.numbers import nearest
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 PAPER = ("d0", "d3a", "d3b", "d3b_paper")

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from vegglue.case.messages import CaseError, KeyPath, dotted, first_refusal, nearest, refuse_unknown_without_value
+from vegglue.case.messages import CaseError, KeyPath, dotted, first_refusal, refuse_unknown_without_value
 from vegglue.case.resolved_config import Tree
 from vegglue.case.safe_yaml import safe_yaml, yaml_problem
 from vegglue.case.schema import Case, Experiment, Observation, share_below
@@ -27,6 +27,7 @@ from vegglue.case.site_schema import (
 from vegglue.case.size_limits import LARGEST_CONFIG, LARGEST_DATA, LONGEST_CHAIN
 from vegglue.case.text_files import read_text
 from vegglue.errors import InputError, shown_path
+from vegglue.wording.numbers import nearest
 from vegglue.wording.sentences import phrase
 
 # Keys whose value is a path, relative to the file it is written in.

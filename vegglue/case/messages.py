@@ -9,6 +9,7 @@ from typing import Any, get_args, get_origin
 from vegglue.case.schema import Case
 from vegglue.case.site_schema import Part
 from vegglue.case.text_files import case_name
+from vegglue.wording.numbers import most_like, nearest
 from vegglue.wording.sentences import phrase
 
 OF_A_PAIR = 2  # numbers in a range, or in a place
@@ -90,14 +91,10 @@ def refuse_unknown_without_value(tree: Mapping[str, Any], above: KeyPath = ()) -
             raise CaseError((*above, key), f"is not a known key: {nearest(str(key), known)}")
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """The end of a sentence about an unknown word: the known word most like it, else all known ones."""
-    return phrase("nearest", word, list(known))
-
-
 def nearest_effect(word: str, known: Iterable[str]) -> str:
     """The end of a sentence about an unknown effect: the known one most like it, else where they are listed."""
-    return phrase("nearest_effect", word, list(known))
+    near = most_like(word, known)
+    return f"did you mean `{near}`?" if near else phrase("effects_listed")
 
 
 def dotted(place: KeyPath) -> str:

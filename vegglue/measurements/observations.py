@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 
 from vegglue.case.grid import along_and_across, centreline_in
-from vegglue.case.messages import nearest
 from vegglue.case.schema import Case, Observation
 from vegglue.case.size_limits import MOST_STATIONS
 from vegglue.errors import InputError, shown_path
@@ -16,6 +15,7 @@ from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_r
 from vegglue.measurements.kinds import KINDS, STREAMWISE, TRANSVERSE, WATER_LEVEL, Kind, Unused, kind_of
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
+from vegglue.wording.numbers import nearest
 
 # Columns of every table of stations, of ADV points and of verticals, with their types; points may have more, as in
 # their file (v, u_se, ...).

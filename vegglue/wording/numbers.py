@@ -1,5 +1,6 @@
 """How numbers, units and symbols are written: as plain text, as HTML of the page and as mathtext of figures."""
 
+import difflib
 import html
 import math
 import os
@@ -15,6 +16,7 @@ LARGEST_IN_FULL = 1e5
 NARROW = "\u202f"  # between a number and its unit, never broken
 FIRM = "\u00a0"  # a space at which a line must not break
 MINUS = "\u2212"
+MOST_NAMED = 30  # words that one sentence lists; no part of a case has more keys
 # Parts of a symbol that mathtext draws as they are.
 LETTER, LOWERED = re.compile(r"[^\W_]+"), re.compile(r"(?:[^\W_]|[\[\] .,:+-])*")
 POWER = re.compile(r"\^\(?(-?[\d/.]+)\)?|(?<=[a-z])(\d)")  # in a unit: ^(-1/3), ^2, or the 3 of m3/s
@@ -32,6 +34,23 @@ class Written:
 
     def __html__(self) -> str:
         return self.page
+
+
+def most_like(word: str, known: Iterable[str]) -> str:
+    """The known word most like another, '' if none is."""
+    return next(iter(difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)), "")
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The end of a sentence about an unknown word: the known word most like it, else all known ones.
+
+    Not by a template: a case with an effect that is not known is refused before jinja is imported.
+    """
+    known = list(known)
+    if near := most_like(word, known):
+        return f"did you mean `{near}`?"
+    more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
+    return f"known here are {', '.join(known[:MOST_NAMED]) or 'none'}{more}"
 
 
 def in_short(heading: str, lines: Iterable[str]) -> str:

@@ -1,6 +1,5 @@
 """Values as words: each class of values has one macro of its own name in `templates/`, for terminal and page."""
 
-import difflib
 import html
 import math
 import re
@@ -24,6 +23,7 @@ from vegglue.wording.numbers import (
     in_digits,
     interval,
     listed,
+    nearest,
     percent,
     plus_minus,
     range_in_digits,
@@ -168,7 +168,7 @@ WRITTEN_BY: dict[str, Callable[..., Any]] = {
     "upper_first": lambda text: f"{str(text)[:1].upper()}{str(text)[1:]}",
     "listed": _listed,
     "many": so_many,
-    "most_like": lambda word, known: next(iter(difflib.get_close_matches(word, known, n=1, cutoff=0.6)), ""),
+    "nearest": nearest,
     "chance": chance_in_words,
     "experiments": experiments_in_words,
     "path": shown_path,
