@@ -17,11 +17,9 @@ from vegglue.errors import InputError
 from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.model_result import (
     DRY_DEPTH,
-    FOOT,
-    LENGTHS,
-    US_SURVEY_FOOT,
     ModelResult,
     model_result,
+    si_value,
     text_of,
     without_marks,
 )
@@ -60,8 +58,11 @@ def read_hec_ras(path: Path) -> ModelResult:
             raise InputError("not_computed", file=path, areas=geometry is not None and results is None)
         system, projection = text_of(file.attrs.get("Units System")), text_of(file.attrs.get("Projection"))
         customary = system != "" and "SI" not in system.upper()
-        horizontal = 1.0 if not customary else US_SURVEY_FOOT if "FOOT_US" in projection.upper() else FOOT
-        parts = [_flow_of_area(geometry[name], results[name], FOOT if customary else 1.0, horizontal) for name in names]
+        horizontal = 1.0 if not customary else si_value("us-ft" if "FOOT_US" in projection.upper() else "ft")
+        parts = [
+            _flow_of_area(geometry[name], results[name], si_value("ft") if customary else 1.0, horizontal)
+            for name in names
+        ]
         stamps = file.get(f"{SERIES}/Time Date Stamp")
         time = text_of(stamps[-1]) if stamps is not None and len(stamps) else ""
         notes = [ImportNote(Noted.WITHOUT_BED, sum(part["ghosts"] for part in parts))]
@@ -118,7 +119,7 @@ def _last_of(dataset: Any, default: float) -> Array:
     of 6.x, the quantity's own name in 5.0; else by the default.
     """
     stated = [text_of(one).lower() for one in dataset.attrs.values() if isinstance(one, bytes | np.bytes_)]
-    unit = next((LENGTHS[one] for one in stated if one in LENGTHS), default)
+    unit = next(filter(None, map(si_value, stated)), default)
     return without_marks(np.asarray(dataset[-1], dtype=np.float64)) * unit
 
 

@@ -24,10 +24,6 @@ RoughnessKind = Literal["manning", "strickler", "chezy", "nikuradse", "not-state
 # also negative depths.
 DRY_DEPTH = 0.005
 FASTEST_FLOW = 20.0  # of a river [m/s]: what is faster marks no value
-# Units of length in files, in lower case [m].
-FOOT, US_SURVEY_FOOT = 0.3048, 1200.0 / 3937.0
-LENGTHS = {"m": 1.0, "meters": 1.0, "meter": 1.0, "metre": 1.0, "feet": FOOT, "ft": FOOT, "foot": FOOT}
-LENGTHS |= {"m/s": 1.0, "m s-1": 1.0, "ms-1": 1.0, "ft/s": FOOT, "ft s-1": FOOT}
 FILLS_OF_CODES = (-999.0, -999.999, -9999.0, -99999.0)  # that codes write without declaring them
 
 
@@ -125,6 +121,12 @@ def without_marks(values: Array) -> Array:
     return np.where(marked, np.nan, values)
 
 
+def si_value(unit: str) -> float:
+    """SI value of a unit of length or velocity [SI unit per unit], 0 of another one."""
+    known = ((quantity, unit_named(unit.replace("_", " "), quantity)) for quantity in ("length", "velocity"))
+    return next((UNITS[quantity][name] for quantity, name in known if name), 0.0)
+
+
 def text_of(value: Any) -> str:
     """An attribute of a file as text; '' if there is none."""
     if isinstance(value, np.ndarray):
@@ -145,10 +147,13 @@ class NetcdfVariable:
     def text(self, name: str) -> str:
         return text_of(self.attributes.get(name))
 
-    def values(self, last_of: int = 0) -> Array:
-        """Values in m, NaN where none is; last_of: number of times, of which the last is read."""
-        timed = last_of and self.shape[:1] == (last_of,)
-        raw = np.asarray(self.source[-1] if timed else self.source[()], dtype=np.float64)
+    def of_time(self, times: int) -> bool:
+        """Whether the first of its axes is that of so many times."""
+        return len(self.shape) > 1 and self.shape[0] == times
+
+    def values(self, times: int = 0) -> Array:
+        """Values in SI at the last of so many times, NaN where none is."""
+        raw = self.numbers(times).astype(np.float64)
         named = [self.attributes[one] for one in ("_FillValue", "missing_value") if one in self.attributes]
         marks = [float(np.ravel(one)[0]) for one in named]
         low, high = np.ravel(self.attributes.get("valid_range", (-np.inf, np.inf)))[[0, -1]].astype(np.float64)
@@ -163,13 +168,12 @@ class NetcdfVariable:
     @property
     def in_si(self) -> float:
         """SI value of its unit, of a length or a velocity; 1 without a unit, 0 for another one."""
-        stated = self.text("units").strip().replace("_", " ")
-        known = ((quantity, unit_named(stated, quantity)) for quantity in ("length", "velocity"))
-        return next((UNITS[quantity][unit] for quantity, unit in known if unit), float(stated in ("", "1", "-")))
+        stated = self.text("units").strip()
+        return si_value(stated) or float(stated in ("", "1", "-"))
 
-    def numbers(self) -> np.ndarray[Any, Any]:
-        """Whole numbers as they stand in the file."""
-        return np.asarray(self.source[()])
+    def numbers(self, times: int = 0) -> np.ndarray[Any, Any]:
+        """Numbers as they stand in the file, at the last of so many times."""
+        return np.asarray(self.source[-1] if self.of_time(times) else self.source[()])
 
 
 @contextmanager

@@ -138,8 +138,7 @@ def _field(
 
     def of_size(one: NetcdfVariable) -> int:
         """Whether it lies at the faces (2), at the nodes (1) or elsewhere (0), with the times in front or without."""
-        of_time = times and one.shape[:1] == (times,) and len(one.shape) == 2
-        rest = one.shape[1:] if of_time else one.shape
+        rest = one.shape[1:] if one.of_time(times) else one.shape
         return 2 - sizes.index(rest[0]) if len(rest) == 1 and rest[0] in sizes else 0
 
     of_mesh = {
@@ -165,8 +164,7 @@ def _field(
             f"{one.text('units')!r}; write it in SI."
         )
     down = key == "bed" and (one.text("positive") == "down" or one.text("standard_name") in BED_BELOW_ZERO)
-    values = one.values(times if one.shape[:1] == (times,) and len(one.shape) == 2 else 0)
-    return -values if down else values
+    return -one.values(times) if down else one.values(times)
 
 
 def _dry(variables: dict[str, NetcdfVariable], mesh: str, size: int, times: int) -> Mask:
@@ -176,8 +174,7 @@ def _dry(variables: dict[str, NetcdfVariable], mesh: str, size: int, times: int)
         if "dry" in meanings and one.text("mesh") in (mesh, "") and one.shape[-1:] == (size,):
             given = one.attributes.get("flag_values", range(len(meanings)))
             texts = re.findall(r"-?\d+", given if isinstance(given, str) else " ".join(map(str, np.ravel(given))))
-            flags = one.numbers()[-1] if times and one.shape[:1] == (times,) and len(one.shape) == 2 else one.numbers()
-            return np.asarray(flags == int(texts[meanings.index("dry")]))
+            return np.asarray(one.numbers(times) == int(texts[meanings.index("dry")]))
     return np.zeros(size, dtype=bool)
 
 
