@@ -389,6 +389,8 @@ def test_a_frame_turns_there_and_back(tmp_path: Path) -> None:
     [
         ("{line: [[8, 2], [8, -2]]}", "Distance from right bank (m)", True),
         ("{line: [[8, -2], [8, 2]]}", "Distance from right bank (m)", False),
+        ("{line: [[8, -2], [8, 2]]}", "Dist LB (m)", True),
+        ("{line: [[8, -2], [8, 2]]}", "Distance from REW (m)", False),
         ("{line: [[8, 2], [8, -2]]}", "Abstand vom linken Ufer (m)", False),
         ('{x: 8, columns: {y: "Dist. from LB (m)"}}', "Dist. from LB (m)", True),
         ('{x: 8, columns: {y: "Dist. from LB (m)"}, flip: y, zero: [0, 2]}', "Dist. from LB (m)", False),

@@ -177,6 +177,18 @@ def test_spaces_part_numbers_with_decimal_commas(tmp_path: Path, rows: list[str]
     assert table.decimal_comma
 
 
+def test_quoted_commas_are_decimal_unless_they_may_part_thousands(tmp_path: Path) -> None:
+    """A spreadsheet of the web writes `"0,35"` where the country has a decimal comma, another `"1,236"` for a depth in
+    millimetres: told apart where one number has no three digits behind its comma, and none a point.
+    """
+    decimal = parse_table(table_of(tmp_path, "x,y,u,note", '12,"4,125","0,35","reeds, left"', '12,"5,250","0,4",'))
+    assert decimal.numbers(tmp_path, 1).tolist() == [4.125, 5.25]
+    assert decimal.numbers(tmp_path, 2).tolist() == [0.35, 0.4]
+    for rows in (['1,"1,236",0.4', '2,"1,240",0.5'], ['1,"1,236",4', '2,"1,240","reeds, left"']):
+        with pytest.raises(InputError, match="1,236"):
+            parse_table(table_of(tmp_path, "x,depth,u", *rows)).numbers(tmp_path, 1)
+
+
 @pytest.mark.parametrize("rows", [["1;2;0,5", "3;4;0,6"], ["A;1;dry", "B;2;0,6"], ["A;1;dry", "B;2;wet"]])
 def test_a_title_with_a_unit_is_no_row(tmp_path: Path, rows: list[str]) -> None:
     table = parse_table(table_of(tmp_path, "Site;Mill brook", "Discharge;620;l/s", "x;y;u", *rows))

@@ -216,6 +216,8 @@ ROLES = {
         Role("tape", "length", ("loc", "location", "tape", "distance from bank", "distance", "dist",
                                 "distance from left bank", "distance from right bank", "dist from left bank",
                                 "dist from right bank", "dist from bank", "distance from lb", "distance from rb", "dmg",
+                                "dist from lb", "dist from rb", "dist lb", "dist rb", "distance lb", "distance rb",
+                                "distance from lew", "distance from rew", "dist from lew", "dist from rew",
                                 "abstand vom ufer", "abstand vom linken ufer", "abstand vom rechten ufer",
                                 "distance a la rive", "distancia desde la orilla", "afstand", "distancia",
                                 "distanza")),

@@ -45,6 +45,7 @@ HIDDEN_ROW = re.compile(rb"<row\b[^>]*>")  # in the XML of a sheet
 NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?")
 # Thousands apart by one sign, decimals by another, which is thereby known: 1.236,00 and 1,236.00 and 1 236,00.
 GROUPED = re.compile(r"[-+]?\d{1,3}(?P<apart>[.,'’\s])\d{3}((?P=apart)\d{3})*(?!(?P=apart))(?P<decimal>[.,])\d*")
+THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
 # Rows of a summary among measurements: what their only words are.
 SUMMARY = re.compile(
     r"(?:grand |sub ?)?(?:mean|average|avg|total|sum|mittel|mittelwert|summe|gesamt|moyenne|moy|somme|media|promedio"
@@ -92,9 +93,16 @@ def number_in(text: str, decimal_comma: bool) -> float | None:
         raise ValueError("no number") from None
 
 
-def has_decimal_comma(fields: Iterable[str]) -> bool:
-    """Whether more of these numbers are written with a decimal comma than with a point."""
-    signs = [sign for field in fields if (sign := _decimal_sign(field.strip().translate(DASHES)))]
+def has_decimal_comma(fields: Iterable[str], quoted: bool = False) -> bool:
+    """Whether more of these numbers are written with a decimal comma than with a point.
+
+    quoted: whether commas part the fields, so that one within a field was quoted; between thousands in `"1,236"`, so
+    that a number of another form and none with a point are asked for.
+    """
+    numbers = [number for field in fields if _decimal_sign(number := field.strip().translate(DASHES))]
+    signs = [_decimal_sign(number) for number in numbers]
+    if quoted and ("." in signs or all(map(THOUSANDS.fullmatch, numbers))):
+        return False
     return signs.count(",") > signs.count(".")
 
 
@@ -185,7 +193,7 @@ def parse_table(path: Path, sheet: str | None = None) -> ParsedTable:
     lines = [line for line in lines if line[0] != typed]
     separator = _separator([text for _, text in lines])
     fields = [(number, _fields(text, separator)) for number, text in lines]
-    comma = separator != "," and has_decimal_comma(field for _, row in fields for field in row)
+    comma = has_decimal_comma((field for _, row in fields for field in row), quoted=separator == ",")
     form: list[FileNote] = [SEPARATORS[separator], *([ImportNote(Noted.DECIMAL_COMMA)] if comma else [])]
     form += [ImportNote(Noted.COMMENTS, len(comments))] if comments else []
     form += [ImportNote(Noted.TYPES)] if typed else []
