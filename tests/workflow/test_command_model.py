@@ -18,7 +18,7 @@ from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.engine.command import command_runs
 from vegglue.engine.corrected import Correction, corrected, correction_at
-from vegglue.engine.interface import Model, Point, linearise, predict, responses
+from vegglue.engine.interface import Model, Point, linearise, linearise_around, predict, responses
 from vegglue.engine.model import coarser, model_of
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
@@ -64,6 +64,18 @@ def test_where_it_is_corrected_predictions_and_slopes_are_those_of_the_command(c
     steps = 1e-4 * np.eye(2)
     slope = (of_the_command(model, HERE + steps) - of_the_command(model, HERE - steps)).T / 2e-4
     np.testing.assert_allclose(point.slope, slope, rtol=0.01, atol=1e-4)
+
+
+def test_places_around_a_point_are_corrected_as_each_alone(case: Case, tmp_path: Path) -> None:
+    _, model = models(case, tmp_path)
+    near = linearise(model, HERE)
+    assert near is not None
+    for z, around in zip(Z, linearise_around(model, Z, near), strict=True):
+        alone = linearise(model, z, near)
+        assert around is not None
+        assert alone is not None
+        np.testing.assert_allclose(around.prediction, alone.prediction, atol=1e-5)
+        np.testing.assert_allclose(around.slope, alone.slope, atol=1e-3)
 
 
 def test_many_predictions_are_runs_of_the_command(case: Case, tmp_path: Path) -> None:

@@ -101,12 +101,10 @@ def with_correction(added: Added, name: str) -> Engine:
         return replace(point, prediction=point.prediction + value, slope=point.slope + slope)
 
     def linearise_around(model: Model, z: Array, near: Point) -> list[Point | None]:
-        found = []
-        for point, (value, slope) in zip(
-            NEWTON.linearise_around(model, z, near), (added(model, one) for one in z), strict=True
-        ):
-            corrected = point and replace(point, prediction=point.prediction + value, slope=point.slope + slope)
-            found.append(corrected)
+        found: list[Point | None] = []
+        for point, one in zip(NEWTON.linearise_around(model, z, near), z, strict=True):
+            value, slope = added(model, one)
+            found.append(point and replace(point, prediction=point.prediction + value, slope=point.slope + slope))
         return found
 
     def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
@@ -116,7 +114,14 @@ def with_correction(added: Added, name: str) -> Engine:
         own = [replace(one, prediction=one.prediction - added(model, one.z)[0]) for one in points]
         return NEWTON.responses(model, own, causes)
 
-    return replace(NEWTON, name=name, linearise=linearise_corrected, predict=predict, responses=responses)
+    return replace(
+        NEWTON,
+        name=name,
+        linearise=linearise_corrected,
+        linearise_around=linearise_around,
+        predict=predict,
+        responses=responses,
+    )
 
 
 def corrected(correction: Correction, runs: CommandRuns, watch: Watch) -> Engine:
