@@ -18,7 +18,6 @@ A state of m members is one array (nx, 3, ny, m): level at cell centres, v on th
 walls and side inflows set it), u on the east face of each cell.
 """
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -266,61 +265,4 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
         ),
         geometry=None if problem.geometry is None else rows_of(problem.geometry, south, north),
         bend=None if problem.bend is None else problem.bend._replace(south=problem.bend.south + south * problem.dy),
-    )
-
-
-def joined(problems: Sequence[Problem]) -> Problem:
-    """Problems of one experiment on one grid as one, the members of each after those of the one before.
-
-    What is alike, as the grid and its classes, is that of the first; effects of each are off in members of all others.
-    """
-    first, members = problems[0], [one.members for one in problems]
-    start, total = np.cumsum([0, *members]), sum(members)
-
-    def together(parts: Iterable[Array]) -> Array:
-        return np.concatenate(list(parts), axis=-1)
-
-    def as_far_as_any(parts: Sequence[Array]) -> Array:
-        """Arrays (nx, ny, m), 0 of a problem without one; empty if none has one."""
-        shape = next((one.shape[:2] for one in parts if one.size), None)
-        if shape is None:
-            return EMPTY
-        return together(
-            one if one.size else np.zeros((*shape, count)) for one, count in zip(parts, members, strict=True)
-        )
-
-    inflows = []
-    for alike in zip(*(one.boundaries.inflows for one in problems), strict=True):
-        cells = max(len(one.spread) for one in alike)
-        spread = [np.broadcast_to(one.spread, (cells, count)) for one, count in zip(alike, members, strict=True)]
-        inflows.append(replace(alike[0], discharge=together(one.discharge for one in alike), spread=together(spread)))
-    effects = []
-    for one, begin in zip(problems, start, strict=False):
-        for active in one.effects:
-            amplitude = active.effect.amplitude
-            values = {name: np.full(total, value[0]) for name, value in active.values.items()}
-            values[amplitude.name][:] = amplitude.off
-            for name, value in active.values.items():
-                values[name][begin : begin + one.members] = value
-            effects.append(replace(active, values=values))
-    return replace(
-        first,
-        friction=replace(first.friction, coefficient=together(one.friction.coefficient for one in problems)),
-        plants=replace(
-            first.plants,
-            phi=together(one.plants.phi for one in problems),
-            canopy_height=together(one.plants.canopy_height for one in problems),
-            bare_chezy=together(one.plants.bare_chezy for one in problems),
-        ),
-        viscosity=together(one.viscosity for one in problems),
-        boundaries=replace(
-            first.boundaries,
-            inflows=tuple(inflows),
-            outlet_level=together(one.boundaries.outlet_level for one in problems),
-            lateral_inflow=as_far_as_any([one.boundaries.lateral_inflow for one in problems]),
-        ),
-        bed_rise=as_far_as_any([one.bed_rise for one in problems]),
-        walls=replace(first.walls, rate=together(one.walls.rate for one in problems)),
-        effects=tuple(effects),
-        geometry=next((one.geometry for one in problems if one.geometry is not None), None),
     )
