@@ -392,7 +392,7 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
 
 
 def _first_place(model: Model, correction_there: Callable[[Array, bool], Correction]) -> tuple[Array, Correction]:
-    """The middle of the prior or, if the command fails there, the next of its Sobol' points."""
+    """The middle of the prior or, if the command fails there, the next of `places_of_prior`."""
     refused = InputError("no_start", case=model.case.name)
     for z in places_of_prior(len(model.names)):
         try:
