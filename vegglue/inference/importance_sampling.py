@@ -296,7 +296,7 @@ def _terms(u: Array, powers: tuple[tuple[int, ...], ...]) -> Array:
 
 
 # Rounds at most, draws of the first, and of any other at most. Chosen, not measured: they bound the runs of the model
-# (6,336 at most), and a larger first round makes a better emulator of a proposal that may be poor.
+# (5,696 at most), and a larger first round makes a better emulator of a proposal that may be poor.
 SAMPLING_ROUNDS, FIRST_DRAWS, MOST_DRAWS = 7, 192, 1024
 # Draws of a round over those before at most: chosen, so that a proposal that turns out to be poor costs two thirds of
 # all draws so far, while 192 draws and two more rounds are enough for 1,000 effective ones of six in ten.
