@@ -102,7 +102,19 @@ EnsembleDoubt = (
 
 
 def doubts_of_predictions(ensemble: Ensemble) -> tuple[EnsembleDoubt, ...]:
-    """What is odd about the members of a command: predictions that do not follow the parameters, failures that do."""
+    """What is odd about the members of a command: predictions that do not follow the parameters, failures that do.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+        Of any engine; one of the built-in engine is never doubted.
+
+    Returns
+    -------
+    tuple of EnsembleDoubt
+        `PredictionsUnchanged` alone if all predictions are the same. A parameter has no influence if no station of a
+        quadratic regression shows it (Fisher's F), and failures follow it by the test of Mann and Whitney.
+    """
     used = ensemble.station["used"].to_numpy(bool)
     solved = np.isfinite(ensemble.prediction[:, used]).all(axis=1) & (ensemble.status != FAILED)
     members, station = int(solved.sum()), ensemble.station[used]
@@ -162,7 +174,18 @@ def _without_influence(theta: Array, predicted: Array, names: tuple[str, ...]) -
 
 
 def refuse_useless(case: Case, ensemble: Ensemble) -> None:
-    """Raise InputError for an ensemble of which nothing can be inferred; it is kept all the same."""
+    """Refuse an ensemble of which nothing can be inferred; its file stays.
+
+    Parameters
+    ----------
+    case : Case
+    ensemble : Ensemble
+
+    Raises
+    ------
+    InputError
+        If all members failed, or the members of a command predict the same.
+    """
     failed = ensemble.status == FAILED
     if failed.all():
         reason, many = Counter(map(str, ensemble.reason[failed])).most_common(1)[0]
@@ -187,9 +210,28 @@ def run_ensemble(
 ) -> None:
     """Run all members of the case and write them to `path`; what an earlier run of the same case has run is kept.
 
-    jobs: processes of the built-in solver, if the case has effects; given: members in place of those that the case
-    draws from its priors. Raises InputError for a case without parameters,
-    StorageError if another run holds the folder or the disk is full (what was written stays).
+    Parameters
+    ----------
+    case : Case
+        With at least one parameter.
+    observations : Observations
+        Stations at which the command predicts.
+    path : Path
+        Of the HDF5 file.
+    runs : CommandRuns
+    jobs : int
+        Processes of the built-in solver, if the case has effects.
+    watch : callable
+        Is called after each run.
+    given : PriorSample, optional
+        Members in place of those that the case draws from its priors; as many as it has.
+
+    Raises
+    ------
+    InputError
+        If the case has no parameters, or too many predictions.
+    StorageError
+        If another run holds the folder or the disk is full; what was written stays.
     """
     wanted = ensemble_hash(case, given)
     refuse_too_many(case, observations)

@@ -111,8 +111,17 @@ def fit_members(prediction: Array, station: pd.DataFrame, rule: str) -> MemberFi
 
 
 def sizes_as_stated(station: pd.DataFrame) -> dict[str, float]:
-    """Standard errors of kinds with fewer than LEAST_FOR_SIZE used readings [unit of the kind]: the root mean square of
-    those stated, the usual one if any is not.
+    """Standard errors of kinds with fewer than LEAST_FOR_SIZE used readings: too few to estimate them from a residual.
+
+    Parameters
+    ----------
+    station : DataFrame
+        All stations.
+
+    Returns
+    -------
+    dict of float
+        Root mean square of those stated, by kind [its unit]; the usual one of a kind if any is not stated.
     """
     error = station["standard_error"].to_numpy(float)
     few = {kind: error[rows] for kind, rows in stations_by_kind(station).items() if rows.size < LEAST_FOR_SIZE}

@@ -133,9 +133,18 @@ def chance_of_as_much(chi2: float, freedom: int, free: float = math.inf) -> floa
 
 
 def without_prior(case: Case, z: Array, variance: Array) -> tuple[Array, Array]:
-    """x (p,) and s (p,) of a MAP estimate z (p,) with variances v (p,), without the prior: 1/s_z^2 = 1/v - 1.
+    """1/s_z^2 = 1/v - 1,   x = x(z) + x' z (s_z^2 / v - 1),   s = |x'| s_z: an estimate without its prior.
 
-    They are on the scale of `on_flat_scale`; NaN for parameters with v >= UNINFORMED.
+    Parameters
+    ----------
+    case : Case
+    z, variance : ndarray (p,)
+        A MAP estimate and v, on the scale of standard normal priors [-].
+
+    Returns
+    -------
+    ndarray (p,), ndarray (p,)
+        x and s on the scale of `on_flat_scale` [unit of the parameter, or log10 of it]; NaN if v >= UNINFORMED.
     """
     informed = variance < UNINFORMED
     own = np.where(informed, variance / np.where(informed, 1.0 - variance, 1.0), np.nan)

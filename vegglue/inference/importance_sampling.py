@@ -51,12 +51,35 @@ class Mixture:
 
 
 def mixture_at_modes(centres: Array, covariances: Array, log_mass: Array) -> Mixture:
-    """A component for each mode (k, p) with its covariance (k, p, p); shares go with exp(log_mass) (k,)."""
+    """A component t(centre_k, cov_k) for each mode, share_k ~ exp(ln mass_k).
+
+    Parameters
+    ----------
+    centres : ndarray (k, p)
+    covariances : ndarray (k, p, p)
+    log_mass : ndarray (k,)
+        Up to a constant [-].
+
+    Returns
+    -------
+    Mixture
+    """
     return Mixture(np.exp(log_mass - logsumexp(log_mass)), centres, np.asarray(np.linalg.cholesky(covariances), float))
 
 
 def draw(mixture: Mixture, points: Array) -> Array:
-    """z (m, p) at points (m, p + 2) of the unit cube: which component, how far out, and in which direction."""
+    """z = centre_k + (f / chi2_f)^(1/2) lower_k e,   k drawn by the shares, e ~ N(0, 1), f = FREEDOM.
+
+    Parameters
+    ----------
+    mixture : Mixture
+    points : ndarray (m, p + 2)
+        Of the unit cube: the first column draws k, the second chi2, the others e.
+
+    Returns
+    -------
+    ndarray (m, p)
+    """
     points = np.clip(points, 1e-9, 1.0 - 1e-9)
     which = np.minimum(np.searchsorted(np.cumsum(mixture.share), points[:, 0]), mixture.share.size - 1)
     stretch = np.sqrt(FREEDOM / chdtri(FREEDOM, points[:, 1]))
@@ -65,7 +88,17 @@ def draw(mixture: Mixture, points: Array) -> Array:
 
 
 def log_density(mixture: Mixture, z: Array) -> Array:
-    """ln sum_k share_k t_k(z), (m,)."""
+    """ln q(z) = ln sum_k share_k t_k(z).
+
+    Parameters
+    ----------
+    mixture : Mixture
+    z : ndarray (m, p)
+
+    Returns
+    -------
+    ndarray (m,)
+    """
     return np.asarray(logsumexp(_parts(mixture, z)[0], axis=1))
 
 

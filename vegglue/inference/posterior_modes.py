@@ -61,7 +61,20 @@ def members_of(ensemble: Ensemble, model: Model) -> TriedMembers:
 def points_of_prior(model: Model) -> TriedMembers:
     """TRIED_POINTS of the prior, Sobol' points, on the coarsest cells that fits go through.
 
-    InputError if the case has no parameters.
+    Parameters
+    ----------
+    model : Model
+        On the case's own grid.
+
+    Returns
+    -------
+    TriedMembers
+        Predictions are NaN at a point without a flow; at all, if no point has one.
+
+    Raises
+    ------
+    InputError
+        If the case has no parameters.
     """
     refuse_without_parameters(model.case)
     coarsest = grids_of(model)[0]
@@ -155,7 +168,17 @@ def _refine(model: Model, coarse: Model, noise: Noise, end: MapEstimate) -> MapE
 
 
 def distinct_modes(ends: list[MapEstimate]) -> list[MapEstimate]:
-    """The fits, best first, but none within one standard deviation of a better one or NEGLIGIBLE_MODE above."""
+    """Fits, best first, without those within one standard deviation of a better one, or NEGLIGIBLE_MODE above the best.
+
+    Parameters
+    ----------
+    ends : list of MapEstimate
+        In any order; distances are (dz' V^-1 dz)^(1/2), V the covariance of the better one.
+
+    Returns
+    -------
+    list of MapEstimate
+    """
     found = _apart(ends)
     return [end for end in found if end.objective - found[0].objective < NEGLIGIBLE_MODE]
 

@@ -58,8 +58,28 @@ def posterior_of(
 ) -> Posterior:
     """The posterior of a weighted sample, without what only a refinement gives.
 
-    station: table of all stations; noise: standard deviation of their errors (station,), and sigma its root mean square
-    by kind [m/s or m]; factor: L with L L' the covariance of the errors (station, station), if they are correlated.
+    Parameters
+    ----------
+    settings : InferenceSettings
+    sample : WeightedSample
+    case : Case
+    station : DataFrame
+        All stations.
+    noise : ndarray (station,)
+        Standard deviation of their errors [m/s or m].
+    sigma : dict of float
+        Its root mean square by kind [unit of the kind].
+    factor : ndarray (station, station), optional
+        L with L L' the covariance of the errors, if they are correlated; NaN if a station is not used.
+
+    Returns
+    -------
+    Posterior
+
+    Raises
+    ------
+    InputError
+        If `canopy_correction` names a vegetation type whose phi is no parameter.
     """
     weights, predicted = sample.weights, predictive_distribution(sample, noise, settings.seed, factor)
     return Posterior(
@@ -82,9 +102,23 @@ def posterior_of(
 
 
 def marginals(theta: dict[str, Array], case: Case, weights: Array) -> Marginals:
-    """Location and spread of each parameter, what the data added to its prior, and its bounds.
+    """Location and spread of each parameter, what the data added to its prior, and the bounds it presses against.
 
-    theta: (member,) each, in the unit of the parameter; weights: (member,).
+    A bound is pressed against if it ends the 95 % range, and the mass near it is above PRESSES_ABOVE and, by three
+    standard errors, above that of the prior.
+
+    Parameters
+    ----------
+    theta : dict of ndarray (member,)
+        By parameter [its unit].
+    case : Case
+        With the priors.
+    weights : ndarray (member,)
+        Of sum 1 [-].
+
+    Returns
+    -------
+    Marginals
     """
     priors = case.parameters
     scaled = {name: _on_flat_scale(values, priors[name]) for name, values in theta.items()}
@@ -135,7 +169,20 @@ def _on_flat_scale(values: Array, prior: Parameter) -> Array:
 
 
 def on_flat_scale(case: Case, theta: dict[str, Array]) -> Array:
-    """Values (m,) of each parameter on the scale on which its prior is flat or normal, (m, p)."""
+    """x = log10(theta) of a log-uniform or lognormal prior, else theta: flat or normal before the data.
+
+    Parameters
+    ----------
+    case : Case
+        With the priors.
+    theta : dict of ndarray (m,)
+        By parameter [its unit].
+
+    Returns
+    -------
+    ndarray (m, p)
+        In the order of the parameters of the case [unit of the parameter, or -].
+    """
     return np.column_stack([_on_flat_scale(theta[name], prior) for name, prior in case.parameters.items()])
 
 

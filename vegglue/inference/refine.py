@@ -232,7 +232,18 @@ def _refinement_of(base: ModesAndErrors, drawn: Sample, precision: Array, best: 
 
 
 def groups_left_out(used: pd.DataFrame) -> dict[str, np.ndarray]:
-    """Rows of each section of each experiment, then of each experiment; none if there is only one of them."""
+    """Groups that are predicted from all other stations: each section of each experiment, then each experiment.
+
+    Parameters
+    ----------
+    used : DataFrame
+        The used stations (n rows).
+
+    Returns
+    -------
+    dict of ndarray
+        Rows by name of the group; no sections, or no experiments, if there is only one of them.
+    """
     names = used["experiment"].to_numpy()
     sections = used["section"].to_numpy()
     sections = np.where(sections == "", used["kind"] + "s", sections)

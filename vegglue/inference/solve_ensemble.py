@@ -197,7 +197,26 @@ def left_to_do(writer: EnsembleWriter, case: Case, chunks: list[np.ndarray], wat
 
 
 def solved_members(case: Case, observations: Observations, sample: PriorSample, jobs: int) -> np.ndarray:
-    """Predictions (member, station) of the members of a sample, NaN where one failed."""
+    """Predictions of the members of a sample.
+
+    Parameters
+    ----------
+    case : Case
+    observations : Observations
+    sample : PriorSample
+    jobs : int
+        Processes; -1 for one on every core.
+
+    Returns
+    -------
+    ndarray (member, station)
+        [unit of each station]; NaN of a member that failed in any experiment.
+
+    Raises
+    ------
+    StorageError
+        If a process was killed.
+    """
     site, found = build_site(case), np.full((len(sample.points), len(observations.table)), np.nan)
     start_from, chunks = starts_and_chunks(case, site, sample.points)
     for index, rows in _solve_all(case, site, observations, sample, chunks, [*range(len(chunks))], start_from, jobs):
@@ -319,7 +338,19 @@ def section_positions(observations: Observations) -> tuple[tuple[str, float], ..
 
 
 def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:
-    """Steady fields of one member at cell centres, by experiment; an experiment that finds none is left out."""
+    """Steady flow of one member at cell centres.
+
+    Parameters
+    ----------
+    case : Case
+    theta : mapping of float
+        All parameters of the case [unit of each].
+
+    Returns
+    -------
+    dict of FlowFields
+        By experiment; one without a steady flow is left out.
+    """
     site = build_site(case)
     sample = sample_of(case, {name: np.array([theta[name]]) for name in case.parameters})
 

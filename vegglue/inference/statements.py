@@ -375,7 +375,18 @@ def sizes_of(errors: Mapping[str, float]) -> Sizes:
 
 
 def measurement_error(posterior: Posterior, kind: str) -> float:
-    """Root mean square standard error of the used stations of a kind [SI]; NaN when one is unknown."""
+    """s = sqrt(mean s_i^2) of the standard errors of the used stations of a kind.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    kind : str
+
+    Returns
+    -------
+    float
+        [unit of the kind]; NaN if one is unknown.
+    """
     station = posterior.station
     error = station.loc[station["used"] & (station["kind"] == kind), "standard_error"].to_numpy(float)
     return root_mean_square(error)
@@ -447,7 +458,19 @@ def parameters_at_bounds(posterior: Posterior, symbols: Mapping[str, str] | None
 
 
 def off_its_prior(posterior: Posterior, name: str) -> bool:
-    """Whether the median of a parameter lies outside the range that holds 95 % of its prior, and against no bound."""
+    """Whether the median of a parameter lies outside the 95 % range of its prior, and against no bound.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    name : str
+        Of the parameter.
+
+    Returns
+    -------
+    bool
+        False if there are too few effective members for a posterior.
+    """
     low, high = posterior.marginals.prior_quantiles[name][[0, -1]]
     inside = low <= posterior.marginals.median[name] <= high
     return posterior.claimed and not inside and not pressed_bounds(posterior, name)
@@ -473,8 +496,18 @@ def parameter_statements(posterior: Posterior, name: str, symbols: Mapping[str, 
 
 
 def correlations(posterior: Posterior, symbols: Mapping[str, str] | None = None) -> Iterator[ParametersCorrelated]:
-    """Pairs of parameters correlated more strongly than STRONG_CORRELATION; none among few members, as any two of them
-    are correlated perfectly.
+    """Pairs of parameters with |r| > STRONG_CORRELATION.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    symbols : mapping of str, optional
+        Of parameters, by name.
+
+    Yields
+    ------
+    ParametersCorrelated
+        None if there are too few effective members: any two parameters of few members are correlated perfectly.
     """
     if not posterior.claimed:
         return
@@ -501,7 +534,17 @@ def fit_statements(posterior: Posterior) -> Iterator[object]:
 
 
 def misfit_tested(posterior: Posterior) -> MisfitTested | None:
-    """chi2 of a refined posterior whose errors are not estimated from the misfit itself."""
+    """P(chi2_f >= chi2) below UNBELIEVED: unexplained, below DOUBTED: hardly explained; too close to 1: too small.
+
+    Parameters
+    ----------
+    posterior : Posterior
+
+    Returns
+    -------
+    MisfitTested or None
+        None without a refinement, or if errors are estimated from the misfit itself.
+    """
     refined = posterior.refinement
     if refined is None or refined.error_model.errors == "estimated":
         return None
@@ -546,7 +589,17 @@ def validation_statements(posterior: Posterior) -> Iterator[object]:
 
 
 def stations_standing_out(posterior: Posterior) -> Iterator[StationsStandOut]:
-    """Each station that stands out; of more than OUTLIERS_NAMED their number and the worst."""
+    """Stations whose residual is no chance: each, or of more than OUTLIERS_NAMED their number and the worst.
+
+    Parameters
+    ----------
+    posterior : Posterior
+
+    Yields
+    ------
+    StationsStandOut
+        None without a refinement.
+    """
     if posterior.refinement is None:
         return
     misfit = posterior.refinement.misfit
@@ -604,7 +657,19 @@ def transfer_statements(
 def transfer_verdict(
     posterior: Posterior, transfer: Transfer, symbols: Mapping[str, str] | None = None
 ) -> CalibrationTransfers | CalibrationDiffers:
-    """Whether the calibration transfers: no parameter differs, nor do all together (p < DIFFERS_BELOW)."""
+    """The calibration transfers if no parameter differs between experiments, nor all together (p < DIFFERS_BELOW).
+
+    Parameters
+    ----------
+    posterior : Posterior
+    transfer : Transfer
+    symbols : mapping of str, optional
+        Of parameters, by name.
+
+    Returns
+    -------
+    CalibrationTransfers or CalibrationDiffers
+    """
     moves = differing(dict(zip(posterior.parameters, transfer.p, strict=True)))
     if not moves and not transfer.p_all < DIFFERS_BELOW:
         return CalibrationTransfers()

@@ -333,8 +333,8 @@ def _errors_of_surrogate(
 ) -> tuple[float, float]:
     """Standard errors of medians [standard deviations] and of standard deviations [-], the largest of any parameter.
 
-    They are those over realisations of d at weighted draws theta (k, p); along, error (r, k): see `_along`; shared
-    (k, k): covariance of d, over S.
+    They are those over realisations of d at weighted draws theta (k, p); along, error (r, k): see `_residuals_along`;
+    shared (k, k): covariance of d, over S.
     """
     factor = np.linalg.cholesky(shared + JITTER * (1.0 + np.trace(shared)) * np.eye(len(theta)))
     logs = np.log(np.maximum(weights, 1e-300)) + 0.5 * np.sum(along**2 / (1.0 + error) + np.log1p(error), axis=0)

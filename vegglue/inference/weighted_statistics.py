@@ -89,7 +89,20 @@ def mixture_quantile(centres: Array, weights: Array, sd: Array, levels: ArrayLik
 
 
 def weighted_covariance(values: Array, weights: Array) -> Array:
-    """cov_ij = sum_k w_k (x_ki - m_i)(x_kj - m_j) / sum w, m the weighted mean; values (member, i), returns (i, j)."""
+    """cov_ij = sum_k w_k (x_ki - m_i)(x_kj - m_j) / sum w,   m the weighted mean.
+
+    Parameters
+    ----------
+    values : ndarray (member, i)
+        x, in any units.
+    weights : ndarray (member,)
+        w; members of weight zero do not count [-].
+
+    Returns
+    -------
+    ndarray (i, i)
+        [product of the two units]
+    """
     share = weights[weights > 0] / weights.sum()
     centred = values[weights > 0] - share @ values[weights > 0]
     return (centred * share[:, None]).T @ centred
@@ -101,28 +114,80 @@ def weighted_median(values: Array, weights: Array) -> float:
 
 
 def weighted_sd(values: Array, weights: Array) -> float:
-    """Square root of the weighted variance of values (member,), in their unit; NaN if a weighted one is infinite."""
+    """sd = sqrt(sum_k w_k (x_k - m)^2 / sum w),   m the weighted mean.
+
+    Parameters
+    ----------
+    values : ndarray (member,)
+        x, in any unit.
+    weights : ndarray (member,)
+        w [-].
+
+    Returns
+    -------
+    float
+        In the unit of the values; NaN if one of a weight above zero is not finite.
+    """
     if not np.isfinite(values[weights > 0]).all():
         return float("nan")
     return float(np.sqrt(weighted_covariance(values[:, None], weights)[0, 0]))
 
 
 def correlation(covariance: Array) -> Array:
-    """r_ij = cov_ij / sqrt(cov_ii cov_jj) [-]; NaN if a quantity does not vary."""
+    """r_ij = cov_ij / sqrt(cov_ii cov_jj).
+
+    Parameters
+    ----------
+    covariance : ndarray (i, i)
+
+    Returns
+    -------
+    ndarray (i, i)
+        [-]; NaN if a quantity does not vary.
+    """
     sd = np.sqrt(np.diag(covariance))
     scale = np.outer(sd, sd)
     return np.divide(covariance, scale, out=np.full_like(covariance, np.nan), where=scale > 0)
 
 
 def effective_size(weights: Array) -> float:
-    """n = (sum w)^2 / sum w^2: the effective sample size of weights [-]. Kish (1965), Survey Sampling."""
+    """n = (sum w)^2 / sum w^2: the effective sample size.
+
+    Parameters
+    ----------
+    weights : ndarray
+        w, of any sum above 0 [-].
+
+    Returns
+    -------
+    float
+        From 1 to the number of weights [-].
+
+    References
+    ----------
+    Kish (1965), Survey Sampling.
+    """
     return float(weights.sum() ** 2 / np.sum(weights**2))
 
 
 def systematic_draws(weights: Array, count: int, random: np.random.Generator) -> NDArray[np.int64]:
-    """Indices of `count` equal-weight draws: members where (u + i) / count falls in the cumulated weights, shuffled.
+    """Members in whose step of the cumulated weights a point (u + i) / count falls, u uniform in 0 to 1, shuffled.
 
-    u is uniform in 0 to 1. Each member is drawn floor or ceil of count * weight times.
+    Parameters
+    ----------
+    weights : ndarray (member,)
+        Of any sum above 0 [-].
+    count : int
+        Draws, i from 0.
+    random : Generator
+
+    Returns
+    -------
+    ndarray (count,)
+        Indices of members, each floor or ceil of count times its share of the weights.
+
+    References
+    ----------
     Kitagawa (1996), https://doi.org/10.2307/1390750.
     """
     cumulated = np.cumsum(weights)
@@ -131,11 +196,23 @@ def systematic_draws(weights: Array, count: int, random: np.random.Generator) ->
 
 
 def pareto_shape(weights: Array) -> float:
-    """k-hat [-]: shape of the generalised Pareto distribution of the largest min(n/5, 3 sqrt(n)) weights.
+    """k-hat: shape of the generalised Pareto distribution of the largest min(n/5, 3 sqrt(n)) of n weights.
 
-    Above TRUSTED_K_HAT the weighted means are not to be trusted, whatever the effective size is; NaN if fewer than 5
-    weights stand out. Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html; fit of Zhang and Stephens
-    (2009), https://doi.org/10.1198/tech.2009.08017.
+    Parameters
+    ----------
+    weights : ndarray (n,)
+        [-]
+
+    Returns
+    -------
+    float
+        [-]; above TRUSTED_K_HAT the weighted means are not to be trusted, whatever the effective size is. NaN if fewer
+        than 5 weights stand out.
+
+    References
+    ----------
+    Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html; fit of Zhang and Stephens (2009),
+    https://doi.org/10.1198/tech.2009.08017.
     """
     ordered = np.sort(weights / np.max(weights))
     tail = _tail(len(ordered))
@@ -183,7 +260,18 @@ def _generalised_pareto(excess: Array) -> tuple[float, float]:
 
 
 def root_mean_square(values: Array) -> float:
-    """sqrt(mean x^2), in the unit of the values; NaN without any, or with one that is unknown."""
+    """sqrt(mean x^2).
+
+    Parameters
+    ----------
+    values : ndarray
+        x, in any unit.
+
+    Returns
+    -------
+    float
+        In the unit of the values; NaN without any, or if one is NaN.
+    """
     return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
 
 
@@ -211,7 +299,20 @@ class StationScores:
 
 
 def log_likelihoods(residual: Array, precision: Array) -> Array:
-    """ln p(y_i | the other stations, draw) (m, n) of residuals (m, n), errors of the inverse covariance (n, n)."""
+    """ln p(y_i | the other stations, draw) = ln(Q_ii / 2 pi) / 2 - (Q r)_i^2 / (2 Q_ii).
+
+    Parameters
+    ----------
+    residual : ndarray (m, n)
+        r of each draw [unit of the station].
+    precision : ndarray (n, n)
+        Q, the inverse of the covariance of the errors.
+
+    Returns
+    -------
+    ndarray (m, n)
+        [ln of 1 / unit of the station]; NaN of a draw that failed.
+    """
     own = np.diag(precision)
     return np.asarray(0.5 * np.log(own / (2.0 * np.pi)) - 0.5 * (residual @ precision) ** 2 / own)
 
@@ -252,7 +353,21 @@ def leave_one_out(residual: Array, precision: Array, weights: Array) -> StationS
 
 
 def leave_out(residual: Array, precision: Array, weights: Array, group: np.ndarray) -> LeftOut:
-    """The stations `group` left out together: mean y_g - Q_gg^-1 (Q r)_g, covariance Q_gg^-1; else `leave_one_out`."""
+    """p(y_g | others, draw) = N(y_g; y_g - Q_gg^-1 (Q r)_g, Q_gg^-1), the stations g left out together.
+
+    Parameters
+    ----------
+    residual : ndarray (m, n)
+    precision : ndarray (n, n)
+    weights : ndarray (m,)
+        As of `leave_one_out`.
+    group : ndarray (k,)
+        g, columns of the residual.
+
+    Returns
+    -------
+    LeftOut
+    """
     part = precision[np.ix_(group, group)]
     pull = (residual @ precision)[:, group]
     size = np.sum(pull * np.linalg.solve(part, pull.T).T, axis=1)
@@ -267,5 +382,18 @@ def _log_mean(logs: Array, weights: Array) -> float:
 
 
 def share_inside(below: Array, level: float) -> float:
-    """Share of measurements within the band that should hold `level` of them [-]."""
+    """Share of measurements within the band that should hold `level` of them: |F - 1/2| < level / 2.
+
+    Parameters
+    ----------
+    below : ndarray (n,)
+        F, the share of each prediction below its measurement [-].
+    level : float
+        [-]
+
+    Returns
+    -------
+    float
+        [-]
+    """
     return float(np.mean(np.abs(below - 0.5) < 0.5 * level))
