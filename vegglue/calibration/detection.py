@@ -75,7 +75,22 @@ def detection_chance(length: Array, threshold: Array, only_sign: np.ndarray | in
 
 
 def detected_length(threshold: Array, chance: float = PLANNED_POWER, only_sign: np.ndarray | int = 0) -> Array:
-    """l at which `detection_chance` is `chance` [standard errors]."""
+    """l at which `detection_chance` is `chance`, by halving.
+
+    Parameters
+    ----------
+    threshold : ndarray
+        t [standard errors].
+    chance : float
+        [-]
+    only_sign : ndarray of int
+        As of `detection_chance`.
+
+    Returns
+    -------
+    ndarray
+        [standard errors]
+    """
 
     def enough(length: Array) -> Mask:
         return np.asarray(detection_chance(length, threshold, only_sign) >= chance)
@@ -102,8 +117,17 @@ def chance_over_prior(size: Array, threshold: Array) -> Array:
 
 
 def chance_to_separate(squared_distance: Array) -> Array:
-    """Phi(D / 2) of D^2: chance that of two equally probable hypotheses, whose predictions lie D standard errors apart,
-    the true one has the larger likelihood [-].
+    """Phi(D / 2): chance that the true one of two equally probable hypotheses has the larger likelihood.
+
+    Parameters
+    ----------
+    squared_distance : ndarray
+        D^2, D the standard errors by which their predictions differ.
+
+    Returns
+    -------
+    ndarray
+        [-]
     """
     return np.asarray(ndtr(0.5 * np.sqrt(squared_distance)))
 
@@ -210,22 +234,55 @@ class PossibleMeasurements:
 
 
 def possible_measurements(own_variance: Array, nuisances: Array, traces: Array) -> PossibleMeasurements:
-    """None of them made: own_variance (..., N), nuisances (..., N, q), traces (..., N, c) in the unit of a station."""
+    """N / D^(1/2) and S / D^(1/2) of measurements of which none is made.
+
+    Parameters
+    ----------
+    own_variance : ndarray (..., N)
+        D [squared unit of the station].
+    nuisances : ndarray (..., N, q)
+        [J, U] [unit of the station].
+    traces : ndarray (..., N, c)
+        S [unit of the station per unit of gain].
+
+    Returns
+    -------
+    PossibleMeasurements
+    """
     error = np.sqrt(own_variance)[..., None]
     nothing = np.zeros((*traces.shape[:-2], traces.shape[-1]))
     return PossibleMeasurements(nothing, nuisances / error, traces / error)
 
 
 def trace_lengths(own_variance: Array, nuisances: Array, traces: Array) -> Array:
-    """|S_perp| of each trace (c,) with all measurements made [standard errors per unit of gain]."""
+    """|S_perp| of each trace with all measurements made.
+
+    Parameters
+    ----------
+    own_variance, nuisances, traces
+        As of `possible_measurements`.
+
+    Returns
+    -------
+    ndarray (c,)
+        [standard errors per unit of gain]
+    """
     possible = possible_measurements(own_variance, nuisances, traces)
     return possible.made(np.arange(own_variance.size)).lengths
 
 
 def squared_distance(first: Array, second: Array, both: Array) -> Array:
-    """D^2 of two traces S and T if the other may have any size, the less of both: G_SS - G_ST^2 / G_TT or the reverse.
+    """D^2 = (G_SS G_TT - G_ST^2) / max(G_SS, G_TT): least distance of two traces S and T, the size of one of them free.
 
-    first, second, both (...,): G_SS, G_TT, and that of S + T [-].
+    Parameters
+    ----------
+    first, second, both : ndarray (...,)
+        G_SS, G_TT, and that of S + T [-].
+
+    Returns
+    -------
+    ndarray (...,)
+        [-]
     """
     cross = 0.5 * (both - first - second)
     return np.asarray(np.maximum(first * second - cross**2, 0.0) / np.maximum(np.maximum(first, second), 1e-300))

@@ -126,7 +126,21 @@ def fit(
 
 
 def fit_from(model: Model, noise: Noise, z: Array, near: Point | None = None) -> MapEstimate | None:
-    """`fit` from a place z (p,); None if no flow is found there. near: a point to start the flow from."""
+    """`fit` from a place.
+
+    Parameters
+    ----------
+    model : Model
+    noise : Noise
+    z : ndarray (p,)
+    near : Point, optional
+        To start the flow from.
+
+    Returns
+    -------
+    MapEstimate or None
+        None if no flow is found at the place.
+    """
     start = linearise(model, z, near)
     return None if start is None else fit(model, noise, start)
 
@@ -159,7 +173,20 @@ def _bent(model: Model, noise: Noise, point: Point, damped: Array, step: Array) 
 
 
 def prediction_at(model: Model, z: Array, near: Point | None) -> Array | None:
-    """f(z) without slopes, from a point to start from; None if no flow is found."""
+    """f(z) without slopes.
+
+    Parameters
+    ----------
+    model : Model
+    z : ndarray (p,)
+    near : Point or None
+        To start the flow from.
+
+    Returns
+    -------
+    ndarray (station,) or None
+        [unit of each station]; None if no flow is found.
+    """
     kept = list[Array]()
 
     def without_slopes(prediction: Array) -> bool:
@@ -181,50 +208,142 @@ def chi2(noise: Noise, point: Point) -> float:
 
 
 def squared_misfit(noise: Noise, prediction: Array) -> float:
-    """|W (y - f)|^2 of predictions f (station,) [-]."""
+    """|W (y - f)|^2 over the used stations.
+
+    Parameters
+    ----------
+    noise : Noise
+    prediction : ndarray (station,)
+        f [unit of each station].
+
+    Returns
+    -------
+    float
+        [-]
+    """
     return float(np.sum(noise.whiten(noise.residual(prediction)) ** 2))
 
 
 def objective(noise: Noise, point: Point) -> float:
-    """|W (y - f)|^2 + |z|^2 [-]."""
+    """|W (y - f)|^2 + |z|^2: -2 ln of likelihood times prior, up to a constant.
+
+    Parameters
+    ----------
+    noise : Noise
+    point : Point
+
+    Returns
+    -------
+    float
+        [-]
+    """
     return chi2(noise, point) + float(point.z @ point.z)
 
 
 def covariance(noise: Noise, point: Point) -> Array:
-    """(J' W' W J + I)^-1 (p, p): the covariance of z around a MAP estimate, J = df/dz."""
+    """(J' W' W J + I)^-1,   J = df/dz: the covariance of z around a MAP estimate.
+
+    Parameters
+    ----------
+    noise : Noise
+    point : Point
+
+    Returns
+    -------
+    ndarray (p, p)
+        [squared standard deviations of the prior]
+    """
     slope = noise.whiten(noise.used(point.slope))
     return np.asarray(np.linalg.inv(slope.T @ slope + np.eye(point.z.size)))
 
 
 def chance_of_misfit(misfit: float, freedom: int) -> float:
-    """P(chi2_f >= chi2): the chance of a misfit as large under errors alone [-]; freedom: its degrees."""
+    """P(chi2_f >= chi2): the chance of a misfit as large by errors alone.
+
+    Parameters
+    ----------
+    misfit : float
+        chi2 [-].
+    freedom : int
+        f, counted as 1 if it is less.
+
+    Returns
+    -------
+    float
+        [-]
+    """
     return float(chdtrc(max(freedom, 1), misfit))
 
 
 def determined(spread: Array) -> float:
-    """p - tr V [-]: effective number of parameters, those that the data determine; V (p, p) the covariance of z."""
+    """p - tr V: effective number of parameters, those that the data determine.
+
+    Parameters
+    ----------
+    spread : ndarray (p, p)
+        V, the covariance of z.
+
+    Returns
+    -------
+    float
+        From 0 to p [-].
+    """
     return float(spread.shape[0] - np.trace(spread))
 
 
 def freedom_of_misfit(readings: int, spread: Array) -> int:
-    """n - (p - tr V), to a whole number: the mean of chi2 at the best fit of n readings, V (p, p) the covariance of z.
+    """n - (p - tr V), to a whole number: the mean of chi2 at the best fit.
 
     A parameter that the data leave at its prior takes no residual away, and costs no degree of freedom.
+
+    Parameters
+    ----------
+    readings : int
+        n.
+    spread : ndarray (p, p)
+        V, the covariance of z.
+
+    Returns
+    -------
+    int
     """
     return round(readings - determined(spread))
 
 
 def log_evidence_under(fitted: MapEstimate) -> float:
-    """ln p(y) = -1/2 F - 1/2 ln|H| by Laplace [-], F the objective and H^-1 the covariance of z, up to what all models
-    have in common under the same covariance of the errors.
+    """ln p(y) = -F/2 - ln|H|/2,   F the objective and H^-1 the covariance of z: Laplace's approximation.
 
-    Source: Kass and Raftery (1995), doi:10.2307/2291091, their equation 5; not checked against it.
+    Parameters
+    ----------
+    fitted : MapEstimate
+
+    Returns
+    -------
+    float
+        [-], up to what all models have in common under the same covariance of the errors.
+
+    References
+    ----------
+    Kass and Raftery (1995), doi:10.2307/2291091, their equation 5; not checked against it.
     """
     return float(-0.5 * fitted.objective + 0.5 * np.linalg.slogdet(fitted.covariance)[1])
 
 
 def interval95(model: Model, fitted: MapEstimate, name: str) -> tuple[float, float, float]:
-    """theta(z_j) and theta(z_j -/+ 1.96 s_j) of a parameter, in its unit, s_j^2 the variance of z_j."""
+    """theta(z_j) and theta(z_j -/+ 1.96 s_j),   s_j^2 the variance of z_j.
+
+    Parameters
+    ----------
+    model : Model
+    fitted : MapEstimate
+    name : str
+        Of parameter j.
+
+    Returns
+    -------
+    float, float, float
+        Estimate, lower and upper end [unit of the parameter].
+    """
     j = model.names.index(name)
     z = np.repeat(fitted.point.z[None], 3, axis=0)
     z[:, j] += NORMAL95 * np.sqrt(fitted.covariance[j, j]) * np.array([0.0, -1.0, 1.0])

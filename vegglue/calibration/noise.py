@@ -153,7 +153,18 @@ def _separation(used: pd.DataFrame) -> Array:
 
 
 def with_grid_error(noise: Noise, difference: Array) -> Noise:
-    """The noise with g = grid_error_share difference (station,), that of predictions to cells of twice the size."""
+    """g = grid_error_share (f - f_coarse): the noise with an error of the grid.
+
+    Parameters
+    ----------
+    noise : Noise
+    difference : ndarray (station,)
+        f - f_coarse, to cells of twice the size [unit of each station].
+
+    Returns
+    -------
+    Noise
+    """
     return _with_cholesky(replace(noise, grid_error=constants().grid_error_share * difference[noise.rows]))
 
 
@@ -177,19 +188,50 @@ def with_scale(noise: Noise, scale: float) -> Noise:
 
 
 def with_model_error(noise: Noise, columns: Array) -> Noise:
-    """The noise with M = columns columns' (station, k), see `model_error_columns`."""
+    """M = columns columns': the noise with an error of the model in place of the one that it has.
+
+    Parameters
+    ----------
+    noise : Noise
+    columns : ndarray (station, k)
+        See `model_error_columns` [unit of each station].
+
+    Returns
+    -------
+    Noise
+    """
     used = noise.used(columns)
     return _with_cholesky(replace(noise, model_error=used @ used.T))
 
 
 def with_more_error(noise: Noise, columns: Array) -> Noise:
-    """The noise with M + columns columns', columns (n, k) of the used stations."""
+    """M + columns columns': the noise with one more error of the model.
+
+    Parameters
+    ----------
+    noise : Noise
+    columns : ndarray (n, k)
+        Of the used stations [unit of each].
+
+    Returns
+    -------
+    Noise
+    """
     return _with_cholesky(replace(noise, model_error=noise.model_error + columns @ columns.T))
 
 
 def with_unknown_errors(noise: Noise, columns: Array) -> Noise:
-    """The noise with one more instrument that is off: what columns (n, k) [-] can make in its readings, zero elsewhere,
-    counts for nothing, see `candidates.error_columns`.
+    """O with columns u = UNKNOWN_ERROR max(s) c / max|c| more: what an instrument that is off adds counts for nothing.
+
+    Parameters
+    ----------
+    noise : Noise
+    columns : ndarray (n, k)
+        c, what it can add to its readings, of standard errors s; 0 elsewhere. See `candidates.error_columns`.
+
+    Returns
+    -------
+    Noise
     """
     largest = np.where(columns != 0.0, noise.error[:, None], 0.0).max()
     unknown = UNKNOWN_ERROR * largest * columns / np.abs(columns).max(axis=0)
@@ -197,9 +239,18 @@ def with_unknown_errors(noise: Noise, columns: Array) -> Noise:
 
 
 def draw_whitened_errors(noise: Noise, draws: int, random: np.random.Generator) -> Array:
-    """Whitened errors W e (draws, n) [-], e ~ N(0, cov(rho)), rho drawn from its posterior probabilities.
+    """W e,   e ~ N(0, cov(rho)),   rho drawn from its posterior probabilities.
 
-    They are independent and standard normal only if rho is certain.
+    Parameters
+    ----------
+    noise : Noise
+    draws : int
+    random : Generator
+
+    Returns
+    -------
+    ndarray (draws, n)
+        [-]; independent and standard normal only if rho is certain.
     """
     parts = []
     levels, chances = noise.correlation_chances
@@ -214,14 +265,34 @@ def _with_cholesky(noise: Noise) -> Noise:
 
 
 def covariance_of(noise: Noise) -> Array:
-    """s^2 D R D + E + M + O O' of the used stations (n, n) [unit of a station, squared]."""
+    """s^2 D R D + E + M + O O', see the head of this file.
+
+    Parameters
+    ----------
+    noise : Noise
+
+    Returns
+    -------
+    ndarray (n, n)
+        Of the used stations [product of their units].
+    """
     shared = noise.grid_correlation * np.outer(noise.grid_error, noise.grid_error)
     own = np.diag((1.0 - noise.grid_correlation) * noise.grid_error**2)
     return np.asarray(covariance_of_data(noise) + shared + own + noise.model_error + noise.unknown @ noise.unknown.T)
 
 
 def covariance_of_data(noise: Noise) -> Array:
-    """s^2 D R D of the used stations (n, n) [unit of a station, squared]."""
+    """s^2 D R D: the covariance of the measurements' own errors.
+
+    Parameters
+    ----------
+    noise : Noise
+
+    Returns
+    -------
+    ndarray (n, n)
+        Of the used stations [product of their units].
+    """
     rho, size = noise.correlation, noise.rows.size
     correlations = np.eye(size) if rho == 0.0 else np.exp(noise.separation * np.log(rho))
     return np.asarray(noise.scale**2 * correlations * np.outer(noise.error, noise.error))

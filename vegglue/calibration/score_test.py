@@ -86,8 +86,20 @@ def project(slopes: Array, residual: Array, z: Array, fingerprints: Array) -> Pr
 
 
 def with_evidence(projected: Projected, residual: Array, columns: Array) -> Projected:
-    """With rows more of other measurements of the same amplitudes, that depend on no calibrated parameter: residual
-    (rows,) and columns (rows, c), whitened.
+    """The projection with rows of other measurements of the same amplitudes, which depend on no calibrated parameter.
+
+    Parameters
+    ----------
+    projected : Projected
+        Of c fingerprints.
+    residual : ndarray (rows,)
+        Whitened [-].
+    columns : ndarray (rows, c)
+        Whitened [per unit of amplitude].
+
+    Returns
+    -------
+    Projected
     """
     seen = np.vstack([projected.fingerprints, columns])
     length = np.linalg.norm(seen, axis=0)
@@ -96,7 +108,19 @@ def with_evidence(projected: Projected, residual: Array, columns: Array) -> Proj
 
 
 def scores(projected: Projected, only_sign: np.ndarray) -> Array:
-    """T = S_perp' r / |S_perp| (c,); 0 if an effect that only has one sign would need the other."""
+    """T = S_perp' r / |S_perp|.
+
+    Parameters
+    ----------
+    projected : Projected
+    only_sign : ndarray (c,) of int
+        The only sign that an amplitude may have, 0 for both.
+
+    Returns
+    -------
+    ndarray (c,)
+        [standard errors]; 0 if an effect of one sign would need the other.
+    """
     return _signed(projected.score, only_sign)
 
 
@@ -127,14 +151,43 @@ class Family:
 
 
 def family_of(projected: Projected, only_sign: np.ndarray, errors: Array, seed: int) -> Family:
-    """Scores of fingerprints against their residual, and against whitened errors (draws, n) alone."""
+    """Scores of fingerprints against their residual, and the largest T^2 against draws of errors alone.
+
+    Parameters
+    ----------
+    projected : Projected
+    only_sign : ndarray (c,) of int
+        As of `scores`.
+    errors : ndarray (draws, n)
+        Whitened errors alone [-].
+    seed : int
+        Of the rows of the prior.
+
+    Returns
+    -------
+    Family
+    """
     drawn = with_more_rows(errors, projected.residual.size, seed) @ projected.units.astype(np.float32)
     squares = _signed(np.asarray(drawn, dtype=np.float64), only_sign) ** 2
     return Family(scores(projected, only_sign), np.asarray(squares.max(axis=1, initial=0.0)))
 
 
 def with_more_rows(errors: Array, rows: int, seed: int) -> Single:
-    """Draws of errors alone (draws, n), and with them of other measurements (draws, rows), in single precision."""
+    """Draws of errors alone, with N(0, 1) for the rows below those of the data.
+
+    Parameters
+    ----------
+    errors : ndarray (draws, n)
+        Whitened [-].
+    rows : int
+        All of them, n at least.
+    seed : int
+
+    Returns
+    -------
+    ndarray (draws, rows)
+        In single precision [-].
+    """
     more = np.random.default_rng(seed).standard_normal((len(errors), rows - errors.shape[1]))
     return np.hstack([errors, more]).astype(np.float32)
 
@@ -176,9 +229,23 @@ def chances(projected: Projected, family: Sequence[np.ndarray], allowed: Mapping
 def likeliest_families(
     projected: Projected, family: Sequence[np.ndarray], chance: Array, level: float
 ) -> list[list[int]]:
-    """The fewest groups of families that hold a chance of `level` together, likelier groups and families first.
+    """The fewest groups of families that hold a chance together, likelier groups and families first.
 
-    chance (c,): of each fingerprint; a family is grouped by its likeliest.
+    Parameters
+    ----------
+    projected : Projected
+        Of c fingerprints.
+    family : sequence of ndarray
+        Columns of each family; it is grouped by its likeliest.
+    chance : ndarray (c,)
+        Of each fingerprint, see `chances` [-].
+    level : float
+        The chance to be held [-].
+
+    Returns
+    -------
+    list of list of int
+        Families of each group, by number.
     """
     of_family = np.array([chance[columns].sum() for columns in family])
     possible = [int(j) for j in np.argsort(-of_family) if of_family[j] > 0]
@@ -187,19 +254,55 @@ def likeliest_families(
 
 
 def fewest_groups(found: Sequence[list[int]], chance: Array, level: float) -> list[list[int]]:
-    """The fewest groups that hold a chance of `level` together, likelier ones first; chance (k,): of each member."""
+    """The fewest groups that hold a chance together, likelier ones first.
+
+    Parameters
+    ----------
+    found : sequence of list of int
+        Members of each group.
+    chance : ndarray (k,)
+        Of each member [-].
+    level : float
+        The chance to be held [-].
+
+    Returns
+    -------
+    list of list of int
+    """
     ranked = sorted(found, key=lambda group: -chance[group].sum())
     held = np.cumsum([chance[group].sum() for group in ranked])
     return ranked[: int(np.searchsorted(held, level)) + 1]
 
 
 def cosines(projected: Projected) -> Array:
-    """Cosine between every two projected fingerprints (c, c) [-]."""
+    """cos_ij = S_i' S_j / |S_i| |S_j| of projected fingerprints.
+
+    Parameters
+    ----------
+    projected : Projected
+
+    Returns
+    -------
+    ndarray (c, c)
+        [-]
+    """
     return np.asarray(projected.units.T @ projected.units)
 
 
 def alike_groups(names: Sequence[Name], cosine: Array) -> list[list[Name]]:
-    """Names, or numbers, that the data cannot separate, linked where |cosine| > alike_cosine."""
+    """Members that the data cannot separate, linked if |cosine| > alike_cosine (single linkage).
+
+    Parameters
+    ----------
+    names : sequence of str or int
+    cosine : ndarray (k, k)
+        Of projected fingerprints, of each pair of names [-].
+
+    Returns
+    -------
+    list of list
+        Names of each group; every name is in one.
+    """
     remaining, found = list(range(len(names))), []
     while remaining:
         group, grown = [remaining.pop(0)], True
@@ -260,7 +363,24 @@ def kind_named(kinds: Iterable[HypothesisKind], name: str) -> HypothesisKind:
 def kind_of_hypotheses(
     name: str, projected: Projected, plausible: Array, prior: Array, only_sign: np.ndarray | None = None
 ) -> HypothesisKind:
-    """plausible (c,): s [unit of the size]; prior (c,): chance of each column before the data."""
+    """a = s |S_perp| and T of each hypothesis of a kind.
+
+    Parameters
+    ----------
+    name : str
+    projected : Projected
+        Of c fingerprints.
+    plausible : ndarray (c,)
+        s [unit of the gain]; 0 for one that is not looked for.
+    prior : ndarray (c,)
+        Chance of each column before the data, above 0 [-].
+    only_sign : ndarray (c,) of int, optional
+        As of `scores`.
+
+    Returns
+    -------
+    HypothesisKind
+    """
     if only_sign is None:
         only_sign = np.zeros(plausible.size, dtype=int)
     found = scores(projected, only_sign)
@@ -268,7 +388,20 @@ def kind_of_hypotheses(
 
 
 def log_factors(scores: Array, size: Array) -> Array:
-    """ln B (..., c) of scores (..., c) and sizes a (c,)."""
+    """ln B = T^2/2 a^2 / (1 + a^2) - ln(1 + a^2)/2.
+
+    Parameters
+    ----------
+    scores : ndarray (..., c)
+        T [standard errors].
+    size : ndarray (c,)
+        a [-].
+
+    Returns
+    -------
+    ndarray (..., c)
+        [-]
+    """
     return np.asarray(0.5 * scores**2 * prior_shrinkage(size) - 0.5 * np.log1p(size**2))
 
 
@@ -293,7 +426,18 @@ def expected_gain(scores: Array, length: Array, size: Array) -> Array:
 
 
 def prior_shrinkage(size: Array) -> Array:
-    """a^2 / (1 + a^2) (c,) [-]: by how much the prior draws an estimate of that size towards nothing."""
+    """a^2 / (1 + a^2): share of an estimate that its prior leaves.
+
+    Parameters
+    ----------
+    size : ndarray
+        a [-].
+
+    Returns
+    -------
+    ndarray
+        [-]
+    """
     return np.asarray(size**2 / (1.0 + size**2))
 
 
@@ -321,7 +465,20 @@ def alarm_p(kinds: Sequence[HypothesisKind], errors: Array, seed: int, slack: fl
 
 
 def alarm_level(kinds: Sequence[HypothesisKind], errors: Array, seed: int, rate: float) -> float:
-    """ln of the sum of Bayes factors over all kinds that errors alone exceed at a rate [-]; arguments of `alarm_p`."""
+    """ln of the sum of Bayes factors over all kinds that errors alone exceed at a rate.
+
+    Parameters
+    ----------
+    kinds, errors, seed
+        As of `alarm_p`.
+    rate : float
+        [-]
+
+    Returns
+    -------
+    float
+        [-]
+    """
     return float(np.quantile(_sums_under_errors(kinds, errors, seed), 1.0 - rate))
 
 
