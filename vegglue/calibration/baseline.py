@@ -166,10 +166,21 @@ def _best_from_prior(model: Model, noise: Noise) -> Point:
 
 
 def places_of_prior(parameters: int) -> Array:
-    """The middle of the prior, and points of a Latin hypercube around it, z (PRIOR_POINTS, p): one in each of as many
-    equal shares of each parameter, in random order.
+    """z = START_SPREAD Phi^-1((k + 1/2) / PRIOR_POINTS), k in random order for each parameter: a Latin hypercube.
 
-    Source: McKay, Beckman and Conover (1979), doi:10.2307/1268522; not checked against it.
+    Parameters
+    ----------
+    parameters : int
+        p.
+
+    Returns
+    -------
+    ndarray (PRIOR_POINTS, p)
+        [standard deviations of the prior]; the first is replaced by the middle of the prior.
+
+    References
+    ----------
+    McKay, Beckman and Conover (1979), doi:10.2307/1268522; not checked against it.
     """
     shares = np.tile(np.arange(PRIOR_POINTS), (parameters, 1))
     order = np.random.default_rng(1).permuted(shares, axis=1).T
@@ -179,7 +190,17 @@ def places_of_prior(parameters: int) -> Array:
 
 
 def under_error_of_grid(trial: Baseline) -> Baseline:
-    """The model calibrated on its own cells from a trial, the error of its grid computed again where that ends."""
+    """The model calibrated on its own cells from a trial, the error of its grid computed again where that ends.
+
+    Parameters
+    ----------
+    trial : Baseline
+
+    Returns
+    -------
+    Baseline
+        Without the model's own error, unless the trial has it.
+    """
 
     def with_error_of_grid(base: Baseline) -> Baseline:
         noise = with_grid_error(base.noise, grid_difference(base.fitted.point, base.on_coarse))
@@ -189,7 +210,19 @@ def under_error_of_grid(trial: Baseline) -> Baseline:
 
 
 def grid_difference(point: Point, on_coarse: Point | None) -> Array:
-    """f - f_coarse (station,) [m/s or m], to cells of twice the size; zero if no steady flow is found on these."""
+    """f - f_coarse, to cells of twice the size.
+
+    Parameters
+    ----------
+    point : Point
+    on_coarse : Point or None
+        At the same z; None if no steady flow is found there.
+
+    Returns
+    -------
+    ndarray (station,)
+        [unit of each station]; zero without the coarse point.
+    """
     return point.prediction - (point if on_coarse is None else on_coarse).prediction
 
 
@@ -202,7 +235,17 @@ def with_coarse_point(base: Baseline) -> Baseline:
 
 
 def with_own_error(base: Baseline) -> Baseline:
-    """The baseline with the model's own error as the case allows it, computed at its point, and calibrated under it."""
+    """The baseline with the model's own error M as the case allows it, computed at its point, and calibrated under it.
+
+    Parameters
+    ----------
+    base : Baseline
+
+    Returns
+    -------
+    Baseline
+        The same if no error is allowed.
+    """
     allowed = base.model.case.model_error
     if not any_error(base.model.case, allowed):
         return base
@@ -213,7 +256,18 @@ def with_own_error(base: Baseline) -> Baseline:
 
 
 def with_own_error_again(base: Baseline, z: Array) -> Baseline:
-    """`with_own_error`, unless coarse cells gave it at a place z (p,) within FAR_MOVED standard errors of the best."""
+    """`with_own_error`, unless coarse cells gave it near enough: |z - z_best| <= FAR_MOVED standard errors.
+
+    Parameters
+    ----------
+    base : Baseline
+    z : ndarray (p,)
+        Where coarse cells gave it. If sides of patches may lie off it is computed anew in any case.
+
+    Returns
+    -------
+    Baseline
+    """
     if base.noise.model_error.any() and not base.model.case.model_error.edges:
         moved = np.abs(base.fitted.point.z - z) / np.sqrt(np.diag(base.fitted.covariance))
         if moved.max(initial=0.0) <= FAR_MOVED:
@@ -245,9 +299,16 @@ def with_error_there(where: SearchModel, cells: CellResponses | None = None) -> 
 
 
 def search_model(base: Baseline) -> SearchModel:
-    """The model on cells of twice the size, y_coarse = y - (f - f_coarse): residuals are those of the fine model.
+    """y_coarse = y - (f - f_coarse): the model on cells of twice the size, with the residuals of the fine one.
 
-    The model itself if the coarse one has fewer than FEWEST_CELLS_ACROSS.
+    Parameters
+    ----------
+    base : Baseline
+
+    Returns
+    -------
+    SearchModel
+        The model itself if the coarse one has fewer than FEWEST_CELLS_ACROSS.
     """
     point, searched = base.fitted.point, coarse_search(base)
     if searched is None:
@@ -273,16 +334,34 @@ def searched_by_itself(base: Baseline) -> Baseline:
 
 
 def log_evidence(base: Baseline) -> float:
-    """ln p(y) - 1/2 ln|C| of a calibrated model [-], C the covariance of its errors, up to a constant of the data.
+    """ln p(y) - ln|C|/2,   C the covariance of the errors: evidence of models whose errors differ.
 
-    Under the errors of its noise: a screening estimates them again, and keeps the place of the fit.
+    Parameters
+    ----------
+    base : Baseline
+        Under the errors of its noise: a screening estimates them again, and keeps the place of the fit.
+
+    Returns
+    -------
+    float
+        [-], up to a constant of the data.
     """
     here = at_point(base.noise, base.fitted.point)
     return log_evidence_under(here) - float(np.log(np.diag(base.noise.lower)).sum())
 
 
 def for_prediction(base: Baseline) -> Baseline:
-    """The model calibrated for predictions on its own grid: errors of the grid are independent between stations."""
+    """The model calibrated for predictions on its own grid: c = 0, errors of the grid independent between stations.
+
+    Parameters
+    ----------
+    base : Baseline
+
+    Returns
+    -------
+    Baseline
+        The same if its grid cannot be coarsened.
+    """
     if base.coarse is None:
         return base
     noise = with_independent_grid_errors(base.noise)
@@ -290,7 +369,22 @@ def for_prediction(base: Baseline) -> Baseline:
 
 
 def kept_baseline(model: Model) -> Baseline:
-    """`baseline` of a model from its prior, kept in memory by its grid, measurements and priors."""
+    """`baseline` of a model from its prior, kept in memory by its grid, measurements and priors.
+
+    Parameters
+    ----------
+    model : Model
+        One with code of the user, an engine or effects, is calibrated each time: it may have changed.
+
+    Returns
+    -------
+    Baseline
+
+    Raises
+    ------
+    InputError
+        As `baseline`.
+    """
     if model.engine is not NEWTON or model.case.effect_file is not None:  # codes of users, which may have changed
         return baseline(model)
     digest = hashlib.sha256(json.dumps(plain_tree(dumped(model.case, ONLY_NAMED), str)).encode())

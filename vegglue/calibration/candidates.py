@@ -131,7 +131,19 @@ class Candidate:
 
 
 def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
-    """Effects of the library that neither act in the case nor are excluded, for each experiment, section or device."""
+    """Effects of the library that neither act in the case nor are excluded, where each may act.
+
+    Parameters
+    ----------
+    case : Case
+    station : DataFrame
+        All stations.
+
+    Returns
+    -------
+    list of Candidate
+        Those whose needs the site fulfils.
+    """
     found = []
     possible, missing = where_it_may_act(case, station), missing_needs(case, station)
     for name, listed in library(case.effect_file).items():
@@ -189,7 +201,15 @@ def missing_needs(case: Case, station: pd.DataFrame) -> set[Need]:
 def at_work(case: Case, candidate: Candidate) -> bool:
     """Whether this effect acts in the case just where the candidate does, whatever its key is there.
 
-    A key of the same name counts too: the candidate would take its place.
+    Parameters
+    ----------
+    case : Case
+    candidate : Candidate
+
+    Returns
+    -------
+    bool
+        True if the case has an effect of the candidate's key, too: the candidate would take its place.
     """
 
     def acts_in(one: Candidate) -> tuple[object, ...]:
@@ -274,7 +294,19 @@ def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -
 
 
 def cause_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Cause:
-    """The case with one effect more, all shapes numbers; the response to it is the fingerprint of the effect."""
+    """The case with one effect more, all shapes numbers; the response to it is the fingerprint of the effect.
+
+    Parameters
+    ----------
+    case : Case
+    candidate : Candidate
+    shapes : mapping of float
+        Values of its shapes [unit of each], for those that are not fixed.
+
+    Returns
+    -------
+    Cause
+    """
     shapes_as_numbers = tuple(replace(one, sd=0.0) for one in candidate.effect.shapes)
     candidate = replace(candidate, effect=replace(candidate.effect, shapes=shapes_as_numbers))
     changed = with_effect(case, candidate, shapes)
@@ -282,14 +314,38 @@ def cause_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> C
 
 
 def start_amplitude(amplitude: Amplitude, gain: float) -> float:
-    """The amplitude of that gain, kept off the ends of its support."""
+    """off + |g|^(1/power) sign(g), kept START_OFF_ENDS plausible sizes off the ends of its support.
+
+    Parameters
+    ----------
+    amplitude : Amplitude
+    gain : float
+        g [unit of the amplitude, to its power].
+
+    Returns
+    -------
+    float
+        [unit of the amplitude]
+    """
     margin = START_OFF_ENDS * min(amplitude.scale, amplitude.high - amplitude.low)
     return float(np.clip(amplitude.at(gain), amplitude.low + margin, amplitude.high - margin))
 
 
 def start_with(candidate: Candidate, z: Array, gain: float) -> Array:
-    """z (p + q,) with a candidate: z (p,), the amplitude of that gain, its q - 1 free shapes in the middle, those that
-    are fitted at their values.
+    """z of the case with a candidate: that of the case, of the amplitude, of free shapes, of fitted shapes.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Free shapes start in the middle of their priors, fitted ones at their values.
+    z : ndarray (p,)
+    gain : float
+        Of the amplitude.
+
+    Returns
+    -------
+    ndarray (p + q,)
+        q - 1 of them of shapes [standard deviations of the prior].
     """
     amplitude, at = start_amplitude(candidate.amplitude, gain), dict(candidate.fixed)
     middle = np.zeros(len(candidate.free) - len(candidate.fitted))
@@ -314,8 +370,16 @@ class Instrument:
 
 
 def plausible_offset(kind: InstrumentKind) -> float:
-    """Over the median standard error of its readings [-]: a reading that went wrong, or an instrument that is off; of a
-    surveyed line in m.
+    """Plausible size of an instrument's offset: a reading that went wrong, or an instrument that is off.
+
+    Parameters
+    ----------
+    kind : InstrumentKind
+
+    Returns
+    -------
+    float
+        Over the median standard error of its readings [-]; of a surveyed line [m].
     """
     of = constants()
     of_probe = {"position": of.probe_offset, "probe": of.probe_offset}
@@ -323,8 +387,20 @@ def plausible_offset(kind: InstrumentKind) -> float:
 
 
 def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument, ...]]:
-    """Those of the used stations: every reading; probes at one place in several experiments, and at one y in several
-    sections; gauges at one place in several experiments. Readings of other kinds have offsets of their own.
+    """Instruments of the used stations: every reading, and places or lines across that several readings share.
+
+    A probe at one place in several experiments is a `position`, one at one y in several sections a `probe`. Readings of
+    other kinds have offsets of their own.
+
+    Parameters
+    ----------
+    used : DataFrame
+        The used stations (n rows).
+
+    Returns
+    -------
+    dict of tuple of Instrument
+        By kind, without surveyed lines.
     """
     kinds = [kind_of(str(name)) for name in used["kind"]]
     places = used[["x", "y"]].to_numpy(float)
@@ -352,8 +428,17 @@ def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument,
 
 
 def error_columns(instrument: Instrument, value: Array) -> Array:
-    """What an instrument that is off may add to its readings, of measured values (n,): an offset, and for a probe of
-    several readings a factor, value itself (n, 1 or 2).
+    """[1, y] in its readings, else 0: an instrument that is off adds an offset and, as a probe, a share of the value y.
+
+    Parameters
+    ----------
+    instrument : Instrument
+    value : ndarray (n,)
+        y, measured at the used stations [unit of each].
+
+    Returns
+    -------
+    ndarray (n, 1 or 2)
     """
     offset = offset_columns((instrument,), value.size)
     factor = offset[:, 0] * value
@@ -362,7 +447,19 @@ def error_columns(instrument: Instrument, value: Array) -> Array:
 
 
 def offset_columns(instruments: tuple[Instrument, ...], stations: int) -> Array:
-    """d value / d offset of each instrument (n, instrument): 1 in its readings, else 0."""
+    """d value / d offset: 1 in the readings of an instrument, else 0.
+
+    Parameters
+    ----------
+    instruments : tuple of Instrument
+    stations : int
+        n, the used ones.
+
+    Returns
+    -------
+    ndarray (n, instrument)
+        [-]
+    """
     columns = np.zeros((stations, len(instruments)))
     for j, one in enumerate(instruments):
         columns[list(one.readings), j] = 1.0

@@ -132,12 +132,39 @@ def consecutive_columns(sizes: Sequence[int]) -> list[np.ndarray]:
 
 
 def digits_of_place(width: float) -> int:
-    """Decimals of coordinates [m] of something of a half width [m]."""
+    """Decimals of coordinates: a centimetre, or a tenth of the half width.
+
+    Parameters
+    ----------
+    width : float
+        Half width of what lies there [m].
+
+    Returns
+    -------
+    int
+    """
     return max(2, 1 - math.floor(math.log10(width)))
 
 
 def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
-    """Fingerprints of the search model, exact enough for a direction; half_width: of the floor of the channel [m]."""
+    """S = d prediction / d gain of all candidates, and the fingerprints of places and of surveyed lines.
+
+    Parameters
+    ----------
+    search : SearchModel
+    half_width : float
+        Of the floor of the channel [m].
+
+    Returns
+    -------
+    Fingerprints
+        Exact enough for a direction.
+
+    Raises
+    ------
+    InputError
+        If an effect gives values that are not finite.
+    """
     model, point = search.model, search.point
     candidates = candidates_of(model.case, model.station)
     tried = [one.settings() for one in candidates]
@@ -174,8 +201,21 @@ def terms_at_places(case: Case) -> list[Term]:
 
 
 def places_of(model: Model, point: Point, half_width: float, cells: CellResponses | None = None) -> tuple[Places, ...]:
-    """Spots of every term that is not excluded, all over the water; half_width: of the floor of the channel [m]; cells:
-    how predictions answer to these terms, if it is at hand.
+    """Spots of every term that is not excluded, all over the water.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+    half_width : float
+        Of the floor of the channel [m].
+    cells : CellResponses, optional
+        To these terms, if they are at hand.
+
+    Returns
+    -------
+    tuple of Places
+        One for each term.
     """
     width, grid = SPOT_WIDTH * half_width, model.site.grid
     rasters = {
@@ -187,8 +227,22 @@ def places_of(model: Model, point: Point, half_width: float, cells: CellResponse
 
 
 def places_around(model: Model, point: Point, term: Term, place: Mapping[str, float], share: float) -> Places:
-    """Spots of one term and size around a place, its x, y, length and width [m]; share: how far apart they stand over
-    their half length and half width.
+    """Spots of one term and size around a place, STEPS_AROUND on either side.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+    term : Term
+    place : mapping of float
+        x, y, length and width [m].
+    share : float
+        Spacing over half length and half width [-].
+
+    Returns
+    -------
+    Places
+        Those under water in the grid.
     """
     length, width = place["length"], place["width"]
     steps = share * np.arange(-STEPS_AROUND, STEPS_AROUND + 1, dtype=float)
@@ -248,7 +302,17 @@ def _places_over(
 
 
 def least_depth(model: Model) -> float:
-    """Depth above which a cell counts as under water [m]."""
+    """h_min = LEAST_DEPTH times the depth of the site: above it a cell counts as under water.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    float
+        [m]
+    """
     return LEAST_DEPTH * site_scales(model.case, model.site).depth
 
 

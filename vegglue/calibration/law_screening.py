@@ -221,7 +221,19 @@ class LawBeyondRange:
 
 
 def laws_beyond_their_range(model: Model, point: Point) -> Iterator[LawBeyondRange]:
-    """One for each experiment in which more than SHARE_BEYOND of the cells are beyond; point: of its flow."""
+    """Laws with q < low or q > high in more than SHARE_BEYOND of the cells on which they act.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+        Of its flow.
+
+    Yields
+    ------
+    LawBeyondRange
+        One for each law and experiment.
+    """
     for key in model.case.effects:
         effect, only = effect_of(model.case, key), model.case.effects[key].experiments
         seen = effect.seen
@@ -315,7 +327,20 @@ class LawFingerprints:
 def law_fingerprints(
     base: Baseline, without: tuple[str, ...] = (), known: Fingerprints | None = None
 ) -> LawFingerprints:
-    """Of a calibrated model; without: listed effects that are left out; known: fingerprints of what is listed."""
+    """Fingerprints of what is listed and of the laws of a case.
+
+    Parameters
+    ----------
+    base : Baseline
+    without : tuple of str
+        Listed effects that are left out.
+    known : Fingerprints, optional
+        Of what is listed.
+
+    Returns
+    -------
+    LawFingerprints
+    """
     search = search_model(base)
     found = known or fingerprints_of(search, half_width(base.model.site))
     kept = [j for j, one in enumerate(found.candidates) if one.effect.name not in without]
@@ -334,7 +359,20 @@ def law_fingerprints(
 
 
 def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...] = ()) -> LawScreening:
-    """Score tests of a calibrated model with laws, one at least; flagged: readings that are excluded."""
+    """Score tests of a calibrated model with laws beside all that is listed.
+
+    Parameters
+    ----------
+    base : Baseline
+    found : LawFingerprints
+        With one law at least.
+    flagged : tuple of int
+        Readings that are excluded, indices of used stations.
+
+    Returns
+    -------
+    LawScreening
+    """
     full, count = screen(base, flagged, found.every, LAW_SEED), len(found.listed.settings)
     columns = [numbers - count for numbers in found.every.columns[len(found.listed.candidates) :]]
     kind = _kind_of_laws(full, found.laws, columns, slice(count, None))
@@ -437,7 +475,19 @@ def most_alike(near: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def first_order_gain(kind: HypothesisKind, column: int, law: LawInCase) -> float:
-    """The strength of a law by one of its columns, not beyond LARGEST_GAIN plausible ones [-]."""
+    """g of a law by one of its columns, within LARGEST_GAIN plausible ones.
+
+    Parameters
+    ----------
+    kind : HypothesisKind
+    column : int
+    law : LawInCase
+
+    Returns
+    -------
+    float
+        [-]
+    """
     most = LARGEST_GAIN * law.candidate.amplitude.scale
     return float(np.clip(kind.gain[column], -most, most))
 
@@ -445,9 +495,22 @@ def first_order_gain(kind: HypothesisKind, column: int, law: LawInCase) -> float
 def screen_products(
     base: Baseline, listed: Fingerprints, law: LawInCase, reference: float | None
 ) -> ProductScreening | None:
-    """Of a model calibrated with a law; listed: fingerprints of what is listed; reference: of the law, if it has one.
+    """Score tests of products of a law that is in the model with other quantities of its term.
 
-    None if the data have seen too little of every other quantity.
+    Parameters
+    ----------
+    base : Baseline
+        Calibrated with the law.
+    listed : Fingerprints
+        Of what is listed.
+    law : LawInCase
+    reference : float or None
+        Of the law, if it has one [unit of its quantity].
+
+    Returns
+    -------
+    ProductScreening or None
+        None if the data have seen too little of every other quantity.
     """
     search = search_model(base)
     products = products_in_case(search.model, search.point, law, reference)

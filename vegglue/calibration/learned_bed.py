@@ -71,7 +71,18 @@ class BedOfSpots:
 
 
 def bed_of_spots(learned: LearnedBed, x: Array, y: Array, length: Array, width: Array) -> BedOfSpots:
-    """Means with weights exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) around all x, y with l and w (spot,) [m]."""
+    """Means of the corrected bed with weights exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2).
+
+    Parameters
+    ----------
+    learned : LearnedBed
+    x, y, length, width : ndarray (spot,)
+        x_0, y_0, l and w [m].
+
+    Returns
+    -------
+    BedOfSpots
+    """
     grid = learned.grid
     along, across = (
         np.exp(-(((cells[None] - middles[:, None]) / radius[:, None]) ** 2))
@@ -89,9 +100,18 @@ def bed_of_spots(learned: LearnedBed, x: Array, y: Array, length: Array, width: 
 
 
 def learned_bed(base: Baseline) -> LearnedBed | None:
-    """That of a calibrated model, on the cells on which its own error was computed; None if no survey states an error.
+    """dz = B F' C^-1 (y - f(z)) of a calibrated model, on the cells on which its own error was computed.
 
     Experiments with a bed of their own are left out: their flow does not depend on the bed of the others.
+
+    Parameters
+    ----------
+    base : Baseline
+
+    Returns
+    -------
+    LearnedBed or None
+        None if no survey states an error.
     """
     where = model_that_errs(base)
     model, grid = where.model, where.model.site.grid
@@ -113,13 +133,25 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
 
 
 def line_offset(loose: Baseline, line: SurveyedLine, tight: Baseline) -> tuple[float, float]:
-    """By how much a surveyed line is too high, and its standard error [m], by survey and flow.
+    """By how much a surveyed line is too high, and its standard error, by survey and flow.
 
         d = d_0 + s^2 F' r,   s = (1 / s_0^2 + F' F)^(-1/2),   F = -W R w
 
-    d_0 and s_0 are those of its survey alone (`line_offsets`), r the whitened residual of the model calibrated without
-    its level, and w how the bed rises with it. W whitens by the errors of the model with its level, which have no part
-    of it, and takes off what parameters can mimic.
+    d_0 and s_0 are those of its survey alone, r the whitened residual, and w how the bed rises with the line. W whitens
+    by the errors of the model with its level, and takes off what parameters can mimic.
+
+    Parameters
+    ----------
+    loose : Baseline
+        Calibrated without the level of the line.
+    line : SurveyedLine
+    tight : Baseline
+        With its level; its errors have no part of it.
+
+    Returns
+    -------
+    float, float
+        d and s [m].
     """
     where = model_that_errs(loose)
     model, known = where.model, surveyed_lines(tight.model.case, where.model.site.grid)

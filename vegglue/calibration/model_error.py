@@ -89,7 +89,19 @@ def excluded_terms(case: Case) -> set[Term]:
 
 
 def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellResponses:
-    """Those of all experiments, in parallel."""
+    """d prediction / d term in each cell, of all experiments in parallel.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+    terms : tuple of Term
+
+    Returns
+    -------
+    CellResponses
+        [unit of each station per that of the term]
+    """
     shape = (len(model.station), model.site.grid.x.size, model.site.grid.y.size)
     found = {term: np.zeros(shape, dtype=np.float32) for term in terms}
 
@@ -121,7 +133,20 @@ class GaussianBasis:
 
 
 def gaussian_basis(grid: Grid, length: float, width: float, cells: float = LEAST_CELLS) -> GaussianBasis:
-    """Functions of half length l and half width w [m], as far apart, and of at least so many cells."""
+    """Functions of half length l and half width w, about l and w apart, over the whole grid.
+
+    Parameters
+    ----------
+    grid : Grid
+    length, width : float
+        l and w [m], made larger if they are less than `cells` cells.
+    cells : float
+        [-]
+
+    Returns
+    -------
+    GaussianBasis
+    """
     length, width = max(length, cells * grid.dx), max(width, cells * grid.dy)
     x, y = (
         np.linspace(centres[0], centres[-1], max(round((centres[-1] - centres[0]) / spacing), 1) + 1)
@@ -131,7 +156,20 @@ def gaussian_basis(grid: Grid, length: float, width: float, cells: float = LEAST
 
 
 def gaussian_basis_at(grid: Grid, x: Array, y: Array, length: float, width: float) -> GaussianBasis:
-    """Functions of half length l and half width w [m] around all x (k,) and y (j,) [m]."""
+    """b_kj = exp(-((x - x_k) / l)^2 - ((y - y_j) / w)^2), 0 below LEAST_VALUE.
+
+    Parameters
+    ----------
+    grid : Grid
+    x, y : ndarray (k,), (j,)
+        Middles; there is a function at every pair [m].
+    length, width : float
+        l and w [m].
+
+    Returns
+    -------
+    GaussianBasis
+    """
     along, across = (
         np.exp(-(((cells[None] - middles[:, None]) / radius) ** 2))
         for cells, middles, radius in ((grid.x, x, length), (grid.y, y, width))
@@ -141,7 +179,19 @@ def gaussian_basis_at(grid: Grid, x: Array, y: Array, length: float, width: floa
 
 
 def responses_to_basis(responses: CellResponses, term: Term, basis: GaussianBasis) -> Array:
-    """d prediction / d size of each function (station, k, j) [unit of a station per that of the term]."""
+    """sum_cells d prediction / d term b_kj: responses to a size of one of each function.
+
+    Parameters
+    ----------
+    responses : CellResponses
+    term : Term
+    basis : GaussianBasis
+
+    Returns
+    -------
+    ndarray (station, k, j)
+        [unit of each station per that of the term]
+    """
     of_cells = responses.of[term]
     # Across first, in the precision of the responses: a fifth of the time that a product of all three takes in double.
     by_row = of_cells.reshape(-1, of_cells.shape[2]) @ basis.across.T.astype(of_cells.dtype)
@@ -149,7 +199,19 @@ def responses_to_basis(responses: CellResponses, term: Term, basis: GaussianBasi
 
 
 def field_columns(responses: CellResponses, term: Term, basis: GaussianBasis) -> Array:
-    """Columns F (station, k j) with F F' the covariance of predictions under a field of the basis of variance one."""
+    """F with F F' the covariance of predictions under a smooth random field of variance one.
+
+    Parameters
+    ----------
+    responses : CellResponses
+    term : Term
+    basis : GaussianBasis
+
+    Returns
+    -------
+    ndarray (station, k j)
+        [unit of each station per that of the term]
+    """
     variance = (basis.along**2).sum(axis=0).mean() * (basis.across**2).sum(axis=0).mean()
     return responses_to_basis(responses, term, basis).reshape(len(responses.of[term]), -1) / np.sqrt(variance)
 
@@ -256,9 +318,22 @@ def _columns_of_shape(model: Model, point: Point, cells: CellResponses, key: str
 
 
 def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: CellResponses) -> Array:
-    """Columns (station, k) with S = columns columns'; cells: how predictions answer to friction and drag.
+    """Columns with S = columns columns', see the head of this file.
 
     A discharge, or the stems of a patch, that an effect of the case changes has no error beside it.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+    allowed : ModelError
+    cells : CellResponses
+        To friction and, if sides of patches may lie off, to drag.
+
+    Returns
+    -------
+    ndarray (station, k)
+        [unit of each station]
     """
     columns = [np.zeros((len(model.station), 0))]
     of_discharge, of_stems = set[str](), set[int]()

@@ -183,7 +183,16 @@ def screen(
 
 
 def noise_given_all(base: Baseline) -> Noise:
-    """The noise that `screen` estimates, if nothing else of a screening is needed."""
+    """The noise that `screen` estimates, if nothing else of a screening is needed.
+
+    Parameters
+    ----------
+    base : Baseline
+
+    Returns
+    -------
+    Noise
+    """
     search = search_model(base)
     fingerprints = fingerprints_of(search, half_width(base.model.site))
     instruments = instruments_of(base.model.station.iloc[base.noise.rows])
@@ -193,7 +202,18 @@ def noise_given_all(base: Baseline) -> Noise:
 
 
 def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) -> HypothesisKind:
-    """Listed effects: as likely before, but for common omissions, and so are the settings of one."""
+    """prior = w / (GROUPS sum w n): effects as likely before, but for common omissions, and so the n settings of one.
+
+    Parameters
+    ----------
+    fingerprints : Fingerprints
+    projected : Projected
+        Theirs (c columns).
+
+    Returns
+    -------
+    HypothesisKind
+    """
     plausible = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     prior = np.empty(plausible.size)
     weights = [constants().common_omission if "common" in one.effect.tags else 1.0 for one in fingerprints.candidates]
@@ -266,7 +286,19 @@ def _estimated_noise(noise: Noise, used: tuple[Array, Array], residual: Array, z
 
 
 def refit_start(screening: Screening, candidate: int, column: int) -> Array:
-    """z (p + q,) to start the refit with a candidate from: the joint linear step of all parameters."""
+    """z + (J' J + 1)^-1 (J' (r - S g) - z), the step 1 at most, and the candidate's own: where its refit starts.
+
+    Parameters
+    ----------
+    screening : Screening
+    candidate, column : int
+        Of the fingerprints; g is the gain by the score of the column.
+
+    Returns
+    -------
+    ndarray (p + q,)
+        See `start_with`.
+    """
     one = screening.fingerprints.candidates[candidate]
     gain = float(screening.effects.scores[column] / max(screening.projected.length[column], 1e-300))
     point, slope, noise = screening.base.fitted.point, screening.whitened_slopes, screening.base.noise
@@ -289,7 +321,17 @@ class ConditionalScreening:
 
 
 def conditional_screenings(screening: Screening) -> tuple[ConditionalScreening, ...]:
-    """Those from all such places where a steady flow is found; none if no parameter is off."""
+    """ln B of each effect from the places z' where one parameter that is off is back in the middle of its prior.
+
+    Parameters
+    ----------
+    screening : Screening
+
+    Returns
+    -------
+    tuple of ConditionalScreening
+        One for each such place where a steady flow is found.
+    """
     search, fingerprints = screening.search, screening.fingerprints
     model, noise = search.model, search.noise
 
