@@ -46,11 +46,21 @@ LARGEST_POSSIBLE = 3.0
 
 
 def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
-    """All effects of a screening by name, none of them refitted, to first order.
+    """All effects of a screening, none of them refitted, to first order.
 
-    gain = T / |S_perp| a^2 / (1 + a^2) with a standard error of s / (1 + a^2)^(1/2), s and a of `score_test`; objective
-    F - T^2 a^2 / (1 + a^2), F under the errors as they are now: the prior of the amplitude is in all of them, as in
-    those of a refit.
+        gain = T / |S_perp| a^2 / (1 + a^2),   standard error s / (1 + a^2)^(1/2),   objective F - T^2 a^2 / (1 + a^2)
+
+    s and a are those of `score_test`, F the objective under the errors as they are now: the prior of the amplitude is
+    in all of them, as in those of a refit.
+
+    Parameters
+    ----------
+    screening : Screening
+
+    Returns
+    -------
+    dict of CandidateEffect
+        By name; amplitudes in their units.
     """
     base, kind = screening.base, screening.kinds[0]
     projected, prints = screening.projected, screening.fingerprints
@@ -97,9 +107,18 @@ def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
 
 
 def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
-    """Groups of effects among which one that is there undetected is in nine of ten cases, the likeliest first.
+    """Groups of effects among which one that is there undetected is with a chance of NOT_EXCLUDED_CHANCE.
 
-    One is taken to be there, as long as may be missed, and at a possible size.
+    One is taken to be there, of UNDETECTED_LENGTHS, and at a possible size, see `score_test.chances`.
+
+    Parameters
+    ----------
+    screening : Screening
+
+    Returns
+    -------
+    tuple of tuple of str
+        Names of each group, the likeliest first.
     """
     families = screening.fingerprints.columns
     names = [one.name for one in screening.fingerprints.candidates]
@@ -114,7 +133,17 @@ LAWS_HELD = 0.95
 
 
 def laws_beside(screening: Screening) -> LawScreening | None:
-    """Laws screened beside all that is listed; None if there can be none: `discover` refuses a command."""
+    """Laws screened beside all that is listed.
+
+    Parameters
+    ----------
+    screening : Screening
+
+    Returns
+    -------
+    LawScreening or None
+        None without a law that has something to act on, or of a case of another model: `discover` refuses a command.
+    """
     if screening.base.model.case.of_another_model:
         return None
     traces = law_fingerprints(screening.base, (), screening.fingerprints)
@@ -129,13 +158,24 @@ def candidate_laws(
     beside_last: Callable[[], LawScreening | None],
     refitted: Callable[[LawScreening, Sequence[str], float, float], tuple[Sequence[Hypothesis], Array, float]],
 ) -> CandidateLaws | None:
-    """Laws that are significant in the last model, or in the first one if something was accepted; else None.
+    """Laws that are significant in the last model, or in the first one if something was accepted.
 
     Beside accepted effects they are reported if these are not strong_odds times as likely as they are, and go before
     these only if they are significant with these in the model, too.
 
-    beside_first, beside_last: `laws_beside` either screening, the first begun before it is known whether it is needed;
-    refitted: `laws_beside_accepted`.
+    Parameters
+    ----------
+    first, last : Screening
+    found : SearchState
+    beside_first, beside_last : callable
+        `laws_beside` either screening; the first is begun before it is known whether it is needed.
+    refitted : callable
+        `laws_beside_accepted` of a screening, accepted effects, their ln prior, ln evidence of the best of all else.
+
+    Returns
+    -------
+    CandidateLaws or None
+        With the laws that hold LAWS_HELD of the chance of all.
     """
     if found.implausible:
         return None

@@ -37,7 +37,21 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
 
     A candidate of the search comes first: its section may be called as an experiment is, or have a comma in its name.
 
-    Errors: InputError for an unknown effect, one that is at work already, or a place it cannot act in.
+    Parameters
+    ----------
+    case : Case
+    station : DataFrame
+        All stations.
+    name : str
+
+    Returns
+    -------
+    Candidate
+
+    Raises
+    ------
+    InputError
+        If the effect is unknown or at work already, or cannot act there.
     """
     searched = {one.name: one for one in candidates_of(case, station)}
     if name in searched:
@@ -79,6 +93,16 @@ def spread_over_its_error(anomaly: LocalAnomaly) -> LocalAnomaly:
         l' = (l^2 + 2 e_x^2)^(1/2),   w' = (w^2 + 2 e_y^2)^(1/2),   a' = a l w / (l' w')
 
     A spot exp(-(x / l)^2) whose middle errs by a normal e_x has this as its mean. What enters stays as much as it is.
+
+    Parameters
+    ----------
+    anomaly : LocalAnomaly
+        l, w, e_x and e_y [m], a [unit of its effect].
+
+    Returns
+    -------
+    LocalAnomaly
+        Its interval and plausible size changed with a.
     """
     length, width = (
         round(float(np.hypot(half, 2.0**0.5 * error)), digits_of_place(anomaly.width))
@@ -110,7 +134,24 @@ def with_additions(parent: Case, added: Sequence[tuple[Candidate, Mapping[str, f
 
 
 def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Tree:
-    """Keys and values of the child that `target` is to hold: effects, and the priors of their amplitudes."""
+    """Keys and values of the child that `target` is to hold: effects, and the priors of their amplitudes.
+
+    Parameters
+    ----------
+    parent : Case
+    target : Path
+    added : sequence of (Candidate, mapping of float)
+        Effects with values of their shapes [unit of each].
+
+    Returns
+    -------
+    Tree
+
+    Raises
+    ------
+    InputError
+        If an effect has no such shape.
+    """
     tree: Tree = {
         "extends": path_from(target.resolve().parent, parent.source),
         "name": child_name(parent.name, [candidate for candidate, _ in added]),

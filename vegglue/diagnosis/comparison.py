@@ -179,12 +179,20 @@ SHARE_BELOW, DRAWN_ERRORS = 0.95, 2000
 
 
 def largest_error_between(base: Baseline) -> float:
-    """The root mean square of e and the errors of data and site, over that of those alone [-], halfway between the
-    sections and beyond the last: so much in SHARE_BELOW of the cases. NaN if there are no velocities or no flow.
+    """(1 + mean e^2 / s^2)^(1/2) halfway between the sections and beyond the last, in SHARE_BELOW of the cases at most.
 
-    e is that of `errors_elsewhere`. What a survey leaves open of the bed, and where patches end, is in its cov and not
-    in M_e: errors of the site that are stated are no room for a missing effect. A reading there would be judged by
-    them, so that e counts in the errors of the data and of the site.
+    e is that of `errors_elsewhere`, s^2 the mean square of the errors of data and site. What a survey leaves open of
+    the bed, and where patches end, is in its cov and not in M_e: errors of the site that are stated are no room for a
+    missing effect. A reading there would be judged by them, so that e counts in the errors of the data and of the site.
+
+    Parameters
+    ----------
+    base : Baseline
+
+    Returns
+    -------
+    float
+        [-]; NaN if there are no velocities or no flow.
     """
     where = model_that_errs(base)
     model, noise = where.model, where.noise
@@ -222,8 +230,17 @@ class ActsElsewhere:
 
 
 def acts_elsewhere(before: Baseline, after: Baseline) -> ActsElsewhere | None:
-    """Whether something at a place acts mostly between the sections: its largest change of the velocity halfway there
-    is mostly_elsewhere times that at the stations; None when it acts at the stations as well.
+    """Whether max|du| halfway between the sections is mostly_elsewhere times max|du| at the stations.
+
+    Parameters
+    ----------
+    before, after : Baseline
+        Without and with something at a place, of the same stations.
+
+    Returns
+    -------
+    ActsElsewhere or None
+        None if it acts at the stations as well, or velocities are missing there.
     """
     station = before.model.station
     velocity = leading_velocities(station)
@@ -363,7 +380,21 @@ def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
 
 
 def held_out_rmse(score: ModelScore, by: By = "sections", untold: Collection[str] = ()) -> float:
-    """Root mean square held-out error of velocities [m/s]; untold: sections or experiments that do not count."""
+    """(mean e^2)^(1/2) of velocities whose section, or experiment, was left out.
+
+    Parameters
+    ----------
+    score : ModelScore
+    by : {"sections", "experiments"}
+        What is left out in turn.
+    untold : collection of str
+        Sections or experiments that do not count.
+
+    Returns
+    -------
+    float
+        [m/s]; NaN if nothing is held out.
+    """
     error = _of_velocities(score, by, untold)
     return root_mean_square(error[np.isfinite(error)])
 

@@ -98,18 +98,53 @@ def tempered_probabilities(evidence: Array, trace_error: float | None = None) ->
 
 
 def tempering(evidence: Array, trace_error: float | None = None) -> Array:
-    """w = 1 + e^2 2 E, at least 1, e the relative error of a fingerprint."""
+    """w = 1 + e^2 2 max(E, 0): by how much ln odds are reduced, see the head of this file.
+
+    Parameters
+    ----------
+    evidence : ndarray
+        E [-].
+    trace_error : float, optional
+        e, relative error of a fingerprint [-]; fingerprint_error of the constants if not given.
+
+    Returns
+    -------
+    ndarray
+        [-]
+    """
     error = constants().fingerprint_error if trace_error is None else trace_error
     return np.asarray(1.0 + error**2 * 2.0 * np.maximum(evidence, 0.0))
 
 
 def tempered_odds(evidence: float, other: float) -> float:
-    """p_1 / p_2 of the chances of these two alone [-]."""
+    """p_1 / p_2 = exp((E_1 - E_2) / w),   w that of the lesser of both: odds of these two alone.
+
+    Parameters
+    ----------
+    evidence, other : float
+        E_1 and E_2 [-].
+
+    Returns
+    -------
+    float
+        [-], e^LARGEST_LOG_ODDS at most.
+    """
     return float(np.exp(min((evidence - other) / float(tempering(np.array(min(evidence, other)))), LARGEST_LOG_ODDS)))
 
 
 def chances_in_set(evidence: Array) -> Array:
-    """p_j of the ln evidence of each (k,) [-], as in `competition`, with law_fingerprint_error."""
+    """`tempered_probabilities` of laws and all that they are compared with, e = law_fingerprint_error.
+
+    Parameters
+    ----------
+    evidence : ndarray (k,)
+        E [-].
+
+    Returns
+    -------
+    ndarray (k,)
+        [-], of sum 1.
+    """
     return tempered_probabilities(evidence, constants().law_fingerprint_error)
 
 
@@ -185,8 +220,23 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
 
 
 def possible_change(model: Model, point: Point, term: Term, x: float, y: float) -> tuple[float, float]:
-    """The range in which a term can change at a place [m, m3/s, m2/s or -]: a bed by the depth there, or by the mean
-    depth where that is more; water by all that flows; viscosity and friction down to none.
+    """The range in which a term can change at a place.
+
+    A bed by the depth there, or by the mean depth if that is more; water that enters by all that flows; viscosity and
+    friction down to none.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+    term : Term
+    x, y : float
+        [m]
+
+    Returns
+    -------
+    float, float
+        Least and largest change [m, m3/s, m2/s, or - of friction], infinite if it has no bound.
     """
     scales, most = site_scales(model.case, model.site), np.inf
     if term == "bed":
@@ -431,10 +481,23 @@ class Hypothesis:
 
 
 def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf) -> list[Hypothesis]:
-    """Everything that was tried, most evidence first; elsewhere: ln evidence of what competes besides.
+    """Everything that was tried, with its evidence.
 
     To first order an effect may promise more than it keeps, or have no flow at all. Then what is within reach of the
     rest is refitted, too, until nothing is.
+
+    Parameters
+    ----------
+    screening : Screening
+    watch : callable
+        Is called with each phase.
+    elsewhere : float
+        ln evidence of what competes besides [-].
+
+    Returns
+    -------
+    list of Hypothesis
+        The most evidence first.
     """
     kind, looks = screening.kinds[0], conditional_screenings(screening)
     prints, search, case = screening.fingerprints, screening.search, screening.search.model.case
@@ -569,7 +632,17 @@ def with_extent(screening: Screening, one: Hypothesis, outline: Mapping[str, flo
 
 
 def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
-    """Chance of each to be what is missing, were it one of them (k,) [-], see the head of this file."""
+    """p_j of each hypothesis to be what is missing, were it one of them: `tempered_probabilities`.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+
+    Returns
+    -------
+    ndarray (k,)
+        [-], of sum 1.
+    """
     return tempered_probabilities(np.array([one.log_evidence for one in hypotheses]))
 
 
@@ -579,7 +652,18 @@ def odds_against_nothing(evidence: Array) -> float:
 
 
 def log_odds_taken(evidence: Array) -> float:
-    """ln of these odds, 0 where they are below missing_odds and none is taken [-]."""
+    """ln sum_j e^E_j: the odds that one of them is missing, and not nothing, both as likely before.
+
+    Parameters
+    ----------
+    evidence : ndarray (k,)
+        E [-].
+
+    Returns
+    -------
+    float
+        [-]; 0 below missing_odds, where none is taken.
+    """
     odds = odds_against_nothing(evidence)
     return float(np.log(odds)) if odds >= constants().missing_odds else 0.0
 
@@ -646,7 +730,18 @@ def under_larger_errors(evidence: Array, left: Array, before: float, readings: i
 
 
 def evidence_under_larger_errors(screening: Screening, hypotheses: Sequence[Hypothesis]) -> Array:
-    """E' of each hypothesis (k,), see `under_larger_errors`."""
+    """`under_larger_errors` of hypotheses, refitted or to first order.
+
+    Parameters
+    ----------
+    screening : Screening
+    hypotheses : sequence of Hypothesis
+
+    Returns
+    -------
+    ndarray (k,)
+        E' [-].
+    """
     before = chi2(screening.search.noise, screening.search.point)
 
     def left_by(one: Hypothesis) -> float:
@@ -661,8 +756,17 @@ def evidence_under_larger_errors(screening: Screening, hypotheses: Sequence[Hypo
 
 
 def nearly_as_likely(hypotheses: Sequence[Hypothesis]) -> list[int]:
-    """Hypotheses of the best one's kind within same_kind_odds, of others within strong_odds; MOST_FOLLOWED at most,
-    what is known among them where any of it is so likely.
+    """Hypotheses of the best one's kind within same_kind_odds of it, of others within strong_odds.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+        The most evidence first.
+
+    Returns
+    -------
+    list of int
+        MOST_FOLLOWED of them at most, what is known among them if any of it is so likely.
     """
     chance = chances_of(hypotheses)
     odds = [
@@ -680,11 +784,20 @@ def chance_of_a_place(hypotheses: Sequence[Hypothesis], chances: Sequence[float]
 
 
 def chosen_hypothesis(what: Sequence[What], evidence: Array, at_a_place: float) -> int | None:
-    """The likeliest of those followed; where that is a place, the likeliest listed effect that it leads by less than
-    known_first_odds, and None without one where places do not lead all that is known by so much.
+    """The likeliest of those followed; if that is a place, the likeliest listed effect within known_first_odds of it.
 
-    what, evidence (k,): what each is, and the ln of its evidence [-]; at_a_place: chance of all places together, those
-    that were not followed among them.
+    Parameters
+    ----------
+    what : sequence of {"effect", "place", "instrument"}
+    evidence : ndarray (k,)
+        ln, of each [-].
+    at_a_place : float
+        Chance of all places together, those that were not followed among them [-].
+
+    Returns
+    -------
+    int or None
+        Without such an effect the place, or None if all places do not lead all that is known by known_first_odds.
     """
     best = int(np.argmax(evidence))
     if what[best] != "place":

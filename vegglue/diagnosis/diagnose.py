@@ -125,10 +125,24 @@ class SearchBranch:
 
 
 def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = None) -> Diagnosis:
-    """Find out what a calibrated model lacks, from a start that hangs on nothing but the case and its data.
+    """Find out what a calibrated model lacks, from a start that depends on nothing but the case and its data.
 
-    unseen: the model at measurements that no calibration sees, which silence has to agree with.
-    Errors: InputError when the model finds no flow, or a station has no standard error.
+    Parameters
+    ----------
+    model : Model
+    watch : callable
+        Is called with each phase.
+    unseen : Model, optional
+        The model at measurements that no calibration uses, with which silence has to agree.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    InputError
+        If the model finds no flow, or a station has no standard error.
     """
     watch(Progress(with_compilation(CALIBRATING)))
     implausible = tuple(implausible_values(model.case, model.site, model.station))

@@ -96,8 +96,19 @@ def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHy
 
 
 def fields_by_evidence(search: SearchModel, half_width: float) -> tuple[list[FieldHypothesis], CellResponses]:
-    """The best field of each term, the one with the most evidence first, log_factor that of all fields of its term with
-    their prior: all terms, shapes and sizes are as likely before; and the responses that they were made of.
+    """The best field of each term; all terms, shapes and sizes are as likely before.
+
+    Parameters
+    ----------
+    search : SearchModel
+    half_width : float
+        Of the floor of the channel [m].
+
+    Returns
+    -------
+    list of FieldHypothesis, CellResponses
+        The most evidence first, log_factor that of all fields of the term with their prior [-]; and the responses that
+        they were made of.
     """
     fields, responses = scanned_fields(search, half_width)
     found = []
@@ -145,14 +156,42 @@ def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypoth
 
 
 def free_of_prior(search: SearchModel) -> tuple[Array, Array]:
-    """C + J J' (n, n), and the residual at the middle of the prior to first order (n,)."""
+    """C + J J' and y - f(z) + J z: covariance and residual at the middle of the prior, to first order.
+
+    Parameters
+    ----------
+    search : SearchModel
+
+    Returns
+    -------
+    ndarray (n, n), ndarray (n,)
+        Of the used stations [product of their units, and unit of each].
+    """
     noise, point = search.noise, search.point
     slope = noise.used(point.slope)
     return covariance_of(noise) + slope @ slope.T, noise.residual(point.prediction) + slope @ point.z
 
 
 def log_density_of_residual(covariance: Array, residual: Array) -> float:
-    """ln N(r; 0, covariance) of a residual (n,), up to a constant."""
+    """ln N(r; 0, C) = -r' C^-1 r / 2 - ln|C| / 2, up to a constant.
+
+    Parameters
+    ----------
+    covariance : ndarray (n, n)
+        C.
+    residual : ndarray (n,)
+        r.
+
+    Returns
+    -------
+    float
+        [-]
+
+    Raises
+    ------
+    LinAlgError
+        If C is not positive definite.
+    """
     factor, lower = scipy.linalg.cho_factor(covariance, lower=True)
     misfit = float(residual @ scipy.linalg.cho_solve((factor, lower), residual))
     return -0.5 * misfit - float(np.log(np.diag(factor)).sum())

@@ -39,8 +39,16 @@ OF_WALLS = HandbookRange(0.008, 0.018, "chow-walls")
 
 
 def parameter_doubts(base: Baseline) -> Iterator[EstimateAtBound | BeyondHandbook | EstimateOffPrior]:
-    """One for each parameter that is at an end of its prior, beyond handbooks, or off what was stated; of amplitudes of
-    effects none, which have doubts of their own.
+    """Parameters at an end of their prior, beyond handbooks, or more than OFF_STATED off what was stated.
+
+    Parameters
+    ----------
+    base : Baseline
+
+    Yields
+    ------
+    EstimateAtBound, BeyondHandbook or EstimateOffPrior
+        None of amplitudes of effects, which have doubts of their own.
     """
     model, case = base.model, base.model.case
     scales, of_effects = site_scales(case, model.site), parameters_of_effects(case)
