@@ -153,7 +153,25 @@ def assemble_diagnosis(
     laws_beside_first: Callable[[], LawScreening | None],
     watch: Watch,
 ) -> Diagnosis:
-    """The diagnosis; effects: every candidate by its name; held_out: the model at measurements no calibration uses."""
+    """The diagnosis of what a search has found, with its verdict and all numbers.
+
+    Parameters
+    ----------
+    first, last : Screening
+    found : SearchState
+    effects : mapping of CandidateEffect
+        Every candidate by its name.
+    held_out : Model or None
+        The model at measurements that no calibration uses.
+    laws_beside_first : callable
+        `laws_beside` the first screening.
+    watch : callable
+        Is called with each phase.
+
+    Returns
+    -------
+    Diagnosis
+    """
     refitted = partial(laws_beside_accepted, watch=watch)
     laws = candidate_laws(first, last, found, laws_beside_first, partial(laws_beside, last), refitted)
     if found.places and not found.steps and not found.instruments and laws is not None and laws.clear:
@@ -449,9 +467,19 @@ def shear_layers(model: Model, point: Point, places: Sequence[LocalAnomaly]) -> 
 
 
 def significant_effects(last: Screening, found: SearchState, slack: float = 0.0) -> dict[str, float]:
-    """Effects that stand out in the last model and are not in it, with the family-wise p of each [-].
+    """Effects that are significant in the last model and not in it: P(max_j T_j^2 >= (|T| - slack)^2) < SIGNIFICANT.
 
-    slack: by how much their scores are made smaller first [standard errors].
+    Parameters
+    ----------
+    last : Screening
+    found : SearchState
+    slack : float
+        By how much scores are made smaller first [standard errors].
+
+    Returns
+    -------
+    dict of float
+        Family-wise p by name [-].
     """
     chances = {
         one.name: last.effects.p_of(max(abs(last.best_score(j)) - slack, 0.0))

@@ -221,8 +221,20 @@ WATERS = {"still": at_rest, "moving": moving_water, "backward": running_back, "n
 
 
 def breaches(effect: Effect, own: Path | None = None, scale: float = 1.0) -> list[Breach]:
-    """What an effect breaks of the contract; empty for a good one. own: the file of the effect, if it is a user's;
-    scale: of the channel, see `CHANNEL_SCALES`.
+    """What an effect breaks of the contract, in the channel of this file.
+
+    Parameters
+    ----------
+    effect : Effect
+    own : Path, optional
+        The file of the effect, if it is a user's.
+    scale : float
+        Of the channel, see `CHANNEL_SCALES` [-].
+
+    Returns
+    -------
+    list of Breach
+        Empty for a good one; what its function raises is a breach, too.
     """
     declared = list(undeclared(effect))
     if declared:

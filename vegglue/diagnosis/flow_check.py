@@ -235,7 +235,19 @@ def _discharge(case: Case, experiment: Experiment) -> float:
 
 
 def dry_outlets(case: Case, site: Site) -> dict[str, float]:
-    """Experiments whose outlet level lies below all of the bed there, and the lowest of that [m]."""
+    """Experiments whose outlet level lies below all of the bed there.
+
+    Parameters
+    ----------
+    case : Case
+        Of a prior the middle counts.
+    site : Site
+
+    Returns
+    -------
+    dict of float
+        The lowest bed at the outlet by experiment [m].
+    """
     open_ = centres_within(case.outlet.range, site.grid.y)
     if not open_.any():
         return {}
@@ -382,7 +394,18 @@ def _median(rows: pd.DataFrame) -> float:
 
 
 def exchanged_components(case: Case, observations: Observations) -> dict[str, tuple[float, float]]:
-    """Median |u| and |v| [m/s] of each experiment with more water across than along: exchanged, or of the map."""
+    """median|v| > median|u|: experiments with more water across than along, exchanged or of the map.
+
+    Parameters
+    ----------
+    case : Case
+    observations : Observations
+
+    Returns
+    -------
+    dict of (float, float)
+        Median |u| and |v| by experiment [m/s].
+    """
     middle = {
         name: tuple(float(rows.loc[rows["kind"] == kind, "value"].abs().median()) for kind in (STREAMWISE, TRANSVERSE))
         for name, rows in _by_experiment(case, observations).items()
@@ -391,9 +414,20 @@ def exchanged_components(case: Case, observations: Observations) -> dict[str, tu
 
 
 def rising_levels(case: Case, observations: Observations) -> dict[str, tuple[float, float, float]]:
-    """Experiments whose levels rise downstream: the x of two gauges and the largest rise from one to the next, or from
-    the first to the last [m], beyond its error, and beyond the head u2/2g of the fastest velocity, which a widening may
-    give back.
+    """z_j - z_i > max(RISE, u^2 / 2g, SURE (se_i^2 + se_j^2)^(1/2)): experiments whose levels rise downstream.
+
+    i and j are neighbours, or the first and the last gauge. The head of the fastest velocity u, which a widening may
+    give back, counts between neighbours of more than two gauges.
+
+    Parameters
+    ----------
+    case : Case
+    observations : Observations
+
+    Returns
+    -------
+    dict of (float, float, float)
+        x of both gauges and the rise by experiment [m].
     """
     found = {}
     for name, rows in _by_experiment(case, observations).items():

@@ -191,9 +191,22 @@ def effect_name(found: LawFound) -> str:
 
 
 def effect_text(laws: Sequence[LawFound], own: Path | None) -> str:
-    """The file of a law, and of its product if it has one; own: that of the case, whose effects are kept.
+    """The file of a law, and of its product if it has one, as effects of a user's own.
 
-    Errors: InputError if it has one of these names already.
+    Parameters
+    ----------
+    laws : sequence of LawFound
+    own : Path or None
+        The file of the case's own effects, which are kept.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        If that file has an effect of the same name already.
     """
     known = library(own)
     for name in map(effect_name, laws):
@@ -271,9 +284,24 @@ HELD = 0.95
 
 
 def discover_laws(model: Model, without: Sequence[str], watch: Watch) -> Discovery:
-    """The shortest laws that explain what a calibrated model leaves; without: listed effects that do not compete.
+    """The shortest laws that explain what a calibrated model leaves.
 
-    Errors: InputError when the model finds no flow, or a station has no standard error.
+    Parameters
+    ----------
+    model : Model
+    without : sequence of str
+        Listed effects that do not compete.
+    watch : callable
+        Is called with each phase.
+
+    Returns
+    -------
+    Discovery
+
+    Raises
+    ------
+    InputError
+        If the model finds no flow, or a station has no standard error.
     """
     watch(Progress(with_compilation(CALIBRATING)))
     return laws_beyond(baseline(model), without, watch)
@@ -366,9 +394,24 @@ def refitted_laws(screening: LawScreening, known: float, watch: Watch) -> tuple[
 def laws_beside_accepted(
     screening: LawScreening, accepted: Sequence[str], log_prior: float, known: float, watch: Watch
 ) -> tuple[list[Hypothesis], Array, float]:
-    """`refitted_laws`, and ln evidence of what was accepted: `known`, with the errors as estimated beside it, or of
-    one listed effect of this ln prior, refitted in the same model under the same errors; the larger of both, as the
-    known goes before the vague. Chosen after open-o, see DECISIONS.
+    """`refitted_laws` beside what was accepted, whose ln evidence is the larger of two.
+
+    It is `known`, with the errors as estimated beside it, or that of one listed effect refitted in the same model under
+    the same errors: the known goes before the vague. Chosen after open-o, see DECISIONS.
+
+    Parameters
+    ----------
+    screening : LawScreening
+    accepted : sequence of str
+        Names of listed effects.
+    log_prior, known : float
+        ln prior of the accepted effect, and ln evidence of the best of all but laws [-].
+    watch : callable
+
+    Returns
+    -------
+    list of Hypothesis, ndarray (l,), float
+        Those of `refitted_laws`, and ln evidence of what was accepted [-].
     """
     listed, names = screening.listed, [one.name for one in screening.listed.fingerprints.candidates]
     if len(accepted) == 1 and accepted[0] in names:

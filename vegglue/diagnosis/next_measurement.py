@@ -79,8 +79,22 @@ Explanation = tuple[Candidate, dict[str, float], float]
 def worth_of_measurements(
     model: Model, noise: Noise, here: Point, questions: Sequence[Sequence[Explanation]]
 ) -> list[list[MeasurementWorth]]:
-    """For each question the worth of all plans; a question is a few rivals to be told apart, or one effect to be told
-    from calibration: (effect, shapes, gain (amplitude - off)^power). here: the calibrated model.
+    """The least D^2 of each question now and with each measurement that could be made.
+
+    Parameters
+    ----------
+    model : Model
+    noise : Noise
+    here : Point
+        The calibrated model.
+    questions : sequence of sequence of (Candidate, dict of float, float)
+        A few rivals to be separated, or one effect to be separated from calibration: effect, values of its shapes, gain
+        (amplitude - off)^power.
+
+    Returns
+    -------
+    list of list of MeasurementWorth
+        Of each question; none if no flow is found.
     """
     for case in (*(with_other_discharges(model, lower) for lower in (LOWER, ())), model.case):
         wide, plans = planned(model, case)
@@ -230,8 +244,18 @@ def _ideas(
 
 
 def with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
-    """The case with experiments at discharges it has not seen, `lower` ones and HIGHER, where those at hand are
-    numbers.
+    """The case with experiments at discharges it has not seen, their outlet level at floor + h (Q' / Q)^LEVEL_POWER.
+
+    Parameters
+    ----------
+    model : Model
+    lower : sequence of float
+        Shares of the lowest discharge [-], beside HIGHER ones of the highest.
+
+    Returns
+    -------
+    Case
+        The same if no experiment has discharges and a level that are numbers.
     """
     case = model.case
     numbers = [

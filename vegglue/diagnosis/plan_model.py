@@ -134,7 +134,22 @@ def place_along(case: Case, x: float) -> float:
 
 
 def planned_pieces(model: Model, planned: Planned) -> list[PlannedPiece]:
-    """The pieces that a case plans, one for each experiment. Raises InputError if one has no station under water."""
+    """The pieces that a case plans, one for each experiment.
+
+    Parameters
+    ----------
+    model : Model
+    planned : Planned
+
+    Returns
+    -------
+    list of PlannedPiece
+
+    Raises
+    ------
+    InputError
+        If a piece has no station in LEAST_PLANNED_DEPTH of water.
+    """
     found = []
     for one in planned.pieces:
         for experiment in one.experiments or tuple(model.case.experiments):
@@ -181,8 +196,23 @@ def _piece(
 def possible_pieces(
     model: Model, planned: Planned, at_hand: pd.DataFrame, base: Sequence[PlannedPiece]
 ) -> list[PlannedPiece]:
-    """Every piece that could be added: transects, gauges, gaugings and points in all flows, at places along the reach
-    and at patches; lines of bed levels; and what is measured or planned again.
+    """Every piece that could be added, in all flows, at places along the reach and at patches, or once more.
+
+    Parameters
+    ----------
+    model : Model
+    planned : Planned
+        With costs and errors.
+    at_hand : DataFrame
+        The used stations.
+    base : sequence of PlannedPiece
+        The plan as it is.
+
+    Returns
+    -------
+    list of PlannedPiece
+        Transects, gauges, gaugings, points and lines of bed levels; of a transect and every second of its verticals the
+        whole one first.
     """
     wide = _with_flows(model, LOWER_DISCHARGES)
     low, high = model.case.grid.x
@@ -288,7 +318,24 @@ def plan_model(
 ) -> PlanModel:
     """Flows, slopes, fingerprints and errors in the middle of the priors and around it.
 
-    Errors: InputError if no flow is found.
+    Parameters
+    ----------
+    model : Model
+        On the case's own cells.
+    planned : Planned
+    at_hand : DataFrame
+        The used stations.
+    base, possible : sequence of PlannedPiece
+        The plan, and what could be added.
+
+    Returns
+    -------
+    PlanModel
+
+    Raises
+    ------
+    InputError
+        If no flow is found in the middle of the priors.
     """
     for wide in chain((_with_flows(model, lower) for lower in (LOWER_DISCHARGES, ())), [model]):
         kept = [one for one in possible if not one.experiment or one.experiment in wide.case.experiments]
@@ -434,8 +481,16 @@ def errors_at(wide: PlanModel, draw: PlanDraw, rows: np.ndarray) -> tuple[Array,
 
 
 def relative_lengths(wide: PlanModel) -> Array:
-    """Length of the trace of each candidate around the middle of the priors over that in the middle, on the coarsest
-    cells (draws, candidates) [-]; ones if no flow is found there.
+    """|S| around the middle of the priors over |S| in the middle, on the coarsest cells.
+
+    Parameters
+    ----------
+    wide : PlanModel
+
+    Returns
+    -------
+    ndarray (draws, candidates)
+        [-]; ones, of one draw, if no flow is found there.
     """
     rows = np.concatenate([wide.known, wide.surveyed])
 
@@ -449,7 +504,17 @@ def relative_lengths(wide: PlanModel) -> Array:
 
 
 def ratios_of_lengths(lengths: Array) -> Array:
-    """Of all but the first (draws, ...) over the first; 1 of what leaves next to no trace there."""
+    """Lengths of all but the first over those of the first, within LARGEST_LENGTH_RATIO either way.
+
+    Parameters
+    ----------
+    lengths : ndarray (draws, ...)
+
+    Returns
+    -------
+    ndarray (draws - 1, ...)
+        [-]; 1 of what leaves next to no trace in the first.
+    """
     middle, around = lengths[0], lengths[1:]
     ratio = np.clip(around / np.maximum(middle, 1e-300), 1.0 / LARGEST_LENGTH_RATIO, LARGEST_LENGTH_RATIO)
     return np.asarray(np.where(middle > 1e-9, ratio, 1.0))
@@ -478,13 +543,20 @@ def _at_plausible_size(model: Model, point: Point, candidates: Sequence[Candidat
 
 
 def bending_of(wide: PlanModel) -> Array:
-    """b >= 0 of each candidate (c,): how much shorter its trace is than to first order, the longer it is.
-
-        |S(g)| = |S'| |g| / (1 + b |g| / g_p)
+    """|S(g)| = |S'| |g| / (1 + b |g| / g_p): b, by how much a trace is shorter than to first order, the longer it is.
 
     g_p is the gain of a plausible size, S' the fingerprint. b is that of the flow with the effect at that size, the
     mean of both signs, on the coarsest cells in the middle of the priors, at the stations of the plan, or at all that
-    are possible if it has none; 0 where no flow is known, or where the trace is longer.
+    are possible if it has none.
+
+    Parameters
+    ----------
+    wide : PlanModel
+
+    Returns
+    -------
+    ndarray (candidates,)
+        b >= 0 [-]; 0 if no flow is known, or the trace is longer.
     """
     if len(wide.draws) < 2:
         return np.zeros(len(wide.candidates))
@@ -521,7 +593,19 @@ def _with_rows(values: Array, count: int) -> Array:
 
 
 def with_chosen(wide: PlanModel, chosen: Sequence[int]) -> PlanModel:
-    """With some of its pieces in the plan, and with the effects that act in sections which these bring."""
+    """With some of its pieces in the plan, and with the effects that act in sections which these bring.
+
+    Parameters
+    ----------
+    wide : PlanModel
+    chosen : sequence of int
+        Of its pieces.
+
+    Returns
+    -------
+    PlanModel
+        Without these pieces and others of their places.
+    """
     pieces = [wide.pieces[j] for j in chosen]
     lines = [rows for one, rows in zip(pieces, (wide.rows[j] for j in chosen), strict=True)
              if one.work is Work.SURVEY_LINE]  # fmt: skip

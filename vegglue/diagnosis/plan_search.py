@@ -208,7 +208,19 @@ def first_competition(
 
 
 def chances_named(competition: FirstCompetition, truths: Sequence[Projected]) -> Array:
-    """`FirstCompetition.named` of each listed effect (effect, lengths)."""
+    """Chance that each listed effect is named at each of NAMED_AT, see `first_competition`.
+
+    Parameters
+    ----------
+    competition : FirstCompetition
+    truths : sequence of Projected
+        Of each effect, at shapes that it may have.
+
+    Returns
+    -------
+    ndarray (effect, lengths)
+        [-]
+    """
     return np.array(in_threads(competition.named, list(enumerate(truths))))
 
 
@@ -462,7 +474,24 @@ def _with_each(known: PossibleMeasurements, rows: Sequence[np.ndarray]) -> Array
 def plan_search(
     wide: PlanModel, question: PlanQuestion, planned: Planned, level: float, present: frozenset[str], beyond: Array
 ) -> PlanSearch:
-    """The search for pieces to add to the stations of the plan; beyond: of each candidate, see `DesignCriterion`."""
+    """The search for pieces to add to the stations of the plan.
+
+    Parameters
+    ----------
+    wide : PlanModel
+    question : PlanQuestion
+    planned : Planned
+    level : float
+        ln of the sum of Bayes factors at which anything is named [-].
+    present : frozenset of str
+        Experiments that are measured in anyhow.
+    beyond : ndarray (candidates,)
+        By how much the score of each has to be above that of the level [standard errors].
+
+    Returns
+    -------
+    PlanSearch
+    """
     match question:
         case OneEffect():
             names = [question.name]

@@ -85,7 +85,20 @@ class Refit:
 
 
 def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = silent) -> list[Refit | None]:
-    """Each trial refitted, side by side; None where no flow is found, or less than is needed."""
+    """Each trial refitted, side by side, with ln B as in the head of this file.
+
+    Parameters
+    ----------
+    search : SearchModel
+    trials : sequence of RefitTrial
+    watch : callable
+        Is called with the number of refits that are done.
+
+    Returns
+    -------
+    list of Refit or None
+        In the order of the trials; None if no flow is found, or less than is needed.
+    """
     finished = counted(watch, "refitting with each", len(trials), "refits")
     tasks = [(trial, search.log_evidence + trial.needed) for trial in trials]
     ends = parallel_map(partial(_best_of_starts, search), tasks, finished)
@@ -126,8 +139,18 @@ def _best_of_starts(search: SearchModel, trial: RefitTrial, needed: float) -> Ma
 
 
 def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
-    """The model with an accepted hypothesis as the next baseline, the error of its grid and its own looked at again;
-    None where it finds no flow.
+    """The model with an accepted hypothesis as the next baseline, the errors of its grid and its own computed again.
+
+    Parameters
+    ----------
+    base : Baseline
+    best : Refit
+        On the cells of the search.
+
+    Returns
+    -------
+    Baseline or None
+        None if no flow is found on the case's own cells.
     """
     place, model = best.fitted.point, _with(base.model, best)
     if base.coarse is None:
@@ -199,7 +222,21 @@ def _with(model: Model, tried: RefitTrial | Refit) -> Model:
 
 
 def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, list[str]]:
-    """The model without those of its earlier effects whose amplitude has become compatible with off; their names."""
+    """The model without those of its earlier effects whose amplitude has become compatible with off.
+
+    Parameters
+    ----------
+    base : Baseline
+    earlier : list of str
+        Names of effects.
+    watch : callable
+        Is called with each that is dropped.
+
+    Returns
+    -------
+    Baseline, list of str
+        The model, and the names that it lacks now.
+    """
     unneeded: list[str] = []
     for name in earlier:
         one = candidate_in_case(base.model.case, name)
@@ -214,16 +251,39 @@ def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, 
 
 
 def is_near_off(interval: tuple[float, float, float], off: float) -> bool:
-    """Whether an amplitude lies within needed_errors standard errors of off; interval: it and its 95 % range.
+    """|a - off| <= needed_errors s,   s = (high - low) / (2 1.96).
 
-    Not on the scale of z, where off is the far end of the prior of an effect that has one sign only.
+    Not on the scale of z, on which off is the far end of the prior of an effect that has one sign only.
+
+    Parameters
+    ----------
+    interval : (float, float, float)
+        a and its 95 % range [its unit].
+    off : float
+        [its unit]
+
+    Returns
+    -------
+    bool
     """
     middle, low, high = interval
     return abs(middle - off) <= constants().needed_errors * (high - low) / (2.0 * NORMAL95)
 
 
 def without_effect(base: Baseline, one: Candidate) -> Baseline | None:
-    """The model calibrated again without one of its effects; None where no flow is found."""
+    """The model calibrated again without one of its effects.
+
+    Parameters
+    ----------
+    base : Baseline
+    one : Candidate
+        As it stands in the case.
+
+    Returns
+    -------
+    Baseline or None
+        Under the errors of the base; None if no flow is found.
+    """
 
     def less(model: Model) -> Model:
         case = model.case

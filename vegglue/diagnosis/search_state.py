@@ -144,7 +144,23 @@ POINTS_AT_IT = 0.1
 def step_found(
     screening: Screening, hypotheses: Sequence[Hypothesis], accepted: int, further: Baseline, p: float
 ) -> Step:
-    """One hypothesis, a listed effect, as a step; further: the model with it; p: of the alarm."""
+    """One hypothesis, a listed effect, as a step, with the rivals that are not negligible.
+
+    Parameters
+    ----------
+    screening : Screening
+    hypotheses : sequence of Hypothesis
+    accepted : int
+        Which of them.
+    further : Baseline
+        The model with it.
+    p : float
+        Of the alarm [-].
+
+    Returns
+    -------
+    Step
+    """
     chance = chances_of(hypotheses)
     found, groups = groups_of_rivals(screening, hypotheses)
     base, least = screening.base, constants().rival_share * chance.max()
@@ -202,7 +218,21 @@ def followed_further(step: Step, followed: Sequence[str], chance: Array) -> Step
 def place_followed_further(
     place: LocalAnomaly, followed: Sequence[Hypothesis], taken: int, evidence: Array
 ) -> LocalAnomaly:
-    """The place, which was taken, with its odds against the others that have been followed; evidence (k,): ln [-]."""
+    """The place, which was taken, with its tempered odds against the others that have been followed.
+
+    Parameters
+    ----------
+    place : LocalAnomaly
+    followed : sequence of Hypothesis
+    taken : int
+        Which of them the place is.
+    evidence : ndarray (k,)
+        ln, of each followed [-].
+
+    Returns
+    -------
+    LocalAnomaly
+    """
     odds = {
         _rival_name(one): tempered_odds(float(evidence[taken]), float(of_one))
         for one, of_one in zip(followed, evidence, strict=True)
@@ -217,7 +247,20 @@ def _rival_name(one: Hypothesis) -> str:
 
 
 def undecided_of(hypotheses: Sequence[Hypothesis], followed: Sequence[str], chance: Array) -> Undecided:
-    """All hypotheses, none of them surely it, once some have been followed further, see `shared_anew`."""
+    """All hypotheses, none of them surely it, once some have been followed further.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+    followed : sequence of str
+        Names.
+    chance : ndarray (k,)
+        Of each followed, were it one of them [-]; together they keep the chance that they had.
+
+    Returns
+    -------
+    Undecided
+    """
     told = dict(zip([one.name for one in hypotheses], map(float, chances_of(hypotheses)), strict=True))
     told = shared_anew(told, followed, chance)
     return Undecided(tuple(hypotheses), tuple(told[one.name] for one in hypotheses))
@@ -240,7 +283,21 @@ def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
 
 
 def anomaly_found(screening: Screening, hypotheses: Sequence[Hypothesis], which: int, refit: Refit) -> LocalAnomaly:
-    """One hypothesis, something at a place, as a anomaly."""
+    """One hypothesis, something at a place, as a local anomaly.
+
+    Parameters
+    ----------
+    screening : Screening
+    hypotheses : sequence of Hypothesis
+    which : int
+    refit : Refit
+        Of that hypothesis.
+
+    Returns
+    -------
+    LocalAnomaly
+        With the experiments that have more than POINTS_AT_IT of its squared fingerprint, and odds against all else.
+    """
     best = hypotheses[which]
     places = next(one for one in screening.fingerprints.places if one.term == best.kind)
     kind = kind_named(screening.kinds, best.kind)
@@ -271,8 +328,20 @@ def anomaly_found(screening: Screening, hypotheses: Sequence[Hypothesis], which:
 
 
 def instrument_found(screening: Screening, best: Hypothesis, one: Instrument) -> FaultyInstrument:
-    """The best hypothesis, an instrument, with its offset: s^2 o' C^-1 r / (1 + s^2 o' C^-1 o), o 1 in its readings; of
-    a surveyed line that of the model without its level.
+    """s^2 o' C^-1 r / (1 + s^2 o' C^-1 o): an instrument with its offset, o 1 in its readings.
+
+    Parameters
+    ----------
+    screening : Screening
+    best : Hypothesis
+        Of a surveyed line the offset is that of the model without its level.
+    one : Instrument
+        Of that hypothesis.
+
+    Returns
+    -------
+    FaultyInstrument
+        With the factor of a probe if that explains its readings strong_odds times better than an offset, else NaN.
     """
     noise = screening.base.noise
     kind = kind_named(screening.kinds, best.kind)
@@ -327,12 +396,27 @@ def with_rivals_again(
     effects: Mapping[str, CandidateEffect],
     watch: Watch,
 ) -> tuple[Baseline, tuple[Step, ...], dict[str, CandidateEffect]]:
-    """The model with the best rival of every step, at the values of its shapes that it competed with, the steps with
-    the chances as they are now, and the effects with the amplitudes of their refits.
+    """The model with the best rival of every step, each compared again without it in the model.
 
-    steps: of effects that were accepted before what was last: an effect, something at a place, an instrument; flagged:
-    readings excluded, indices among the used stations. A step stays as it is if no flow is found without its effect, or
-    with any.
+    A step stays as it is if no flow is found without its effect, or with any.
+
+    Parameters
+    ----------
+    base : Baseline
+    steps : sequence of Step
+        Of effects that were accepted before what was last: an effect, something at a place, an instrument.
+    flagged : tuple of int
+        Readings that are excluded, indices among the used stations.
+    effects : mapping of CandidateEffect
+        By name.
+    watch : callable
+        Is called with each step.
+
+    Returns
+    -------
+    Baseline, tuple of Step, dict of CandidateEffect
+        The model with the rivals at the values of their shapes that they competed with, the steps with their chances as
+        they are now, and the effects with the amplitudes of their refits.
     """
     kept, known = list[Step](), dict(effects)
     for step in steps:

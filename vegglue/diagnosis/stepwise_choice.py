@@ -281,8 +281,19 @@ def found_additions(case: Case, found: Diagnosis) -> list[Addition]:
 
 
 def tried_additions(case: Case, found: Diagnosis) -> list[Addition]:
-    """What was found, and after each effect the place that is likelier than it: errors at what is held out decide, and
-    where they are the same, what is known.
+    """What was found, and after each effect the place that is likelier than it.
+
+    Held-out errors decide between both, and if they are the same, what is known is kept.
+
+    Parameters
+    ----------
+    case : Case
+    found : Diagnosis
+
+    Returns
+    -------
+    list of (Candidate, dict of float)
+        Each with values of its shapes [unit of each]; places are spread over where they may lie.
     """
     likelier = _likelier_places(found)
     tried: list[Addition] = []
@@ -293,9 +304,18 @@ def tried_additions(case: Case, found: Diagnosis) -> list[Addition]:
 
 
 def choice_among(case: Case, found: Diagnosis, base_with: Callable[[Names], Baseline | None]) -> Choice:
-    """Which of what is tried a model keeps, see above; no place that acts mostly away from the measurements.
+    """Which of what is tried a model keeps, see `chosen`; no place that acts mostly away from the measurements.
 
-    base_with: the calibrated model with some of what is tried, by name; None where it finds no flow.
+    Parameters
+    ----------
+    case : Case
+    found : Diagnosis
+    base_with : callable
+        Names of some of what is tried -> the calibrated model with these, None if no flow is found.
+
+    Returns
+    -------
+    Choice
     """
     scores: dict[Names, ModelScore | None] = {}
 
@@ -343,7 +363,18 @@ def _likelier_places(found: Diagnosis) -> dict[str, LocalAnomaly]:
 
 
 def values_tried(case: Case, found: Diagnosis) -> dict[str, float]:
-    """`values_found`, and the sizes of the likelier places."""
+    """`values_found`, and the sizes of the likelier places.
+
+    Parameters
+    ----------
+    case : Case
+    found : Diagnosis
+
+    Returns
+    -------
+    dict of float
+        By parameter [its unit].
+    """
     likelier = _likelier_places(found).values()
     return values_found(case, found) | {candidate_at(case, one).parameter: one.amplitude for one in likelier}
 

@@ -91,7 +91,18 @@ class VerdictInputs:
 
 
 def make_verdict(inputs: VerdictInputs) -> Verdict:
-    """The verdict on what was found, with what remains and what else should be known."""
+    """The verdict on what was found, with what remains and what else should be known.
+
+    Data come first, then doubt, laws, fields, places, effects and silence, which has to be earned as a name has.
+
+    Parameters
+    ----------
+    inputs : VerdictInputs
+
+    Returns
+    -------
+    Verdict
+    """
     testable = sum(one.detectability.testable for one in inputs.candidates)
     plain = Verdict(
         kind="cannot-tell",
