@@ -66,6 +66,13 @@ def test_an_oddity_is_a_remark(tmp_path, old, new, remark, expected):
     assert len(found_in(found, remark, **expected)) == 1, found
 
 
+def test_a_boundary_without_cells_is_one_remark_of_all_experiments(tmp_path):
+    two = SOUND.replace("level: 1.0}", "level: 1.0}\n  high: {discharge: 3.0, level: 1.1}")
+    for old, kind in (("outlet: {}", OutletWithoutCells), ("{side: west}", InflowWithoutCells)):
+        new = old.replace("{", "{range: [4.01, 4.02], ").replace(", }", "}")
+        assert len(found_in(odd(tmp_path, two.replace(old, new)), kind)) == 1
+
+
 @pytest.mark.parametrize("measured", [True, False])
 def test_an_outlet_below_the_bed_is_one_remark_of_every_command(tmp_path, measured):
     """It left simulate without a flow, whether or not anything was measured in the experiment."""

@@ -206,13 +206,15 @@ def remarks_on_boundaries(case: Case, site: Site) -> Iterator[object]:
         if abs(turning) * site.grid.y.size * site.grid.dy > LEAST_TURN:
             yield GridEndInBend(upstream, 1.0 / abs(float(turning)))
     dry, open_ = dry_outlets(case, site), centres_within(case.outlet.range, site.grid.y)
+    if not open_.any():
+        yield OutletWithoutCells()
+    cells = {inflow: inflow_cells(side, site.grid) for inflow, side in case.inflows.items()}
+    yield from (InflowWithoutCells(inflow) for inflow, some in cells.items() if not some.size)
     for name, experiment in case.experiments.items():
-        depth = expected_depth(case, in_experiment(site, name), experiment)
-        if not open_.any():
-            yield OutletWithoutCells()
-        elif name in dry:
+        if name in dry:
             continue
-        else:  # Fr = Q / (A sqrt(g A / B))
+        depth = expected_depth(case, in_experiment(site, name), experiment)
+        if open_.any():  # Fr = Q / (A sqrt(g A / B))
             wet = np.maximum(depth[-1, open_], 0.0)
             area, top = float(wet.sum()) * site.grid.dy, float((wet > 0).sum()) * site.grid.dy
             froude = _discharge(case, experiment) / (area * float(np.sqrt(GRAVITY * area / top)))
@@ -222,10 +224,7 @@ def remarks_on_boundaries(case: Case, site: Site) -> Iterator[object]:
             yield WaterOnSideEdges(name)
         for inflow, side in case.inflows.items():
             edge = {"west": depth[0], "south": depth[:, 0], "north": depth[:, -1]}[side.side]
-            cells = inflow_cells(side, site.grid)
-            if not cells.size:
-                yield InflowWithoutCells(inflow)
-            elif not (edge[cells] > 0).any():
+            if cells[inflow].size and not (edge[cells[inflow]] > 0).any():
                 yield InflowAboveWater(inflow, name)
 
 
