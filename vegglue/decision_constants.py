@@ -60,6 +60,9 @@ class DecisionConstants:
         6.6, "-", DERIVED, "rise of twice the log-likelihood above which stated errors are too small: 99 % point of "
         "chi2 with one degree of freedom",
     )  # fmt: skip
+    uncorrelated_chance: float = _constant(
+        0.5, "-", CHOSEN, "prior probability that the errors of neighbours are not correlated: the data alone decide"
+    )
     # Plausible sizes of what may be missing or off.
     spot_drag: float = _constant(
         1.0, "-", CHOSEN, "drag at a place over that of a cylinder of C_D = 1 as long as the shortest spot, 1/(2 l); "
@@ -87,6 +90,17 @@ class DecisionConstants:
     effect_sizes: float = _constant(
         1.0, "-", CHOSEN, "plausible sizes of listed effects over those of the library, of which some are relations of "
         "the literature and most are chosen: `vegglue effects NAME`",
+    )  # fmt: skip
+    extent_log_sd: float = _constant(
+        0.7, "-", CHOSEN, "standard deviation of ln length and ln width of plants that are not on the map, around the "
+        "medians of the patches on it, and of ln width of spots; before any patch was fitted",
+    )  # fmt: skip
+    patch_turn: float = _constant(
+        15.0, "deg", CHOSEN, "standard deviation of the inclination of such plants; before any patch was fitted"
+    )
+    mapped_share: float = _constant(
+        0.5, "-", CHOSEN, "share of such plants on those of the map above which a side of a patch lies off instead; "
+        "before any patch was fitted",
     )  # fmt: skip
     # Odds and chances.
     missing_odds: float = _constant(
@@ -128,9 +142,24 @@ class DecisionConstants:
     false_alarm_rate: float = _constant(0.05, "-", CHOSEN, "rate at which errors alone sound the first alarm: usual")
     later_alarm_share: float = _constant(0.2, "-", CHOSEN, "rate of later alarms over that of the first")
     law_alarm_rate: float = _constant(0.01, "-", CHOSEN, "rate at which errors alone sound the alarm of laws")
+    product_alarm_rate: float = _constant(
+        0.01, "-", CHOSEN, "rate at which errors alone sound the alarm of products of laws, on top of that of laws"
+    )
     effect_alarm_rate: float = _constant(
         0.04, "-", CHOSEN, "rate at which errors alone reach the score that counts as detectable"
     )
+    detected_chance: float = _constant(
+        0.95, "-", CHOSEN, "chance with which an effect of the smallest detectable size is detected: 19 of 20", True
+    )
+    significance: float = _constant(
+        0.01, "-", CHOSEN, "chance that errors alone make any effect look as strong, below which one that was not "
+        "accepted is significant: the rate of the alarm beside what was accepted",
+    )  # fmt: skip
+    hopeless_search: float = _constant(
+        4.0, "-", CHOSEN, "fall of the objective that a search still needs, over the one that its next step promises, "
+        "beyond which it is given up; after plants that are tried on river-c, f and g: up to 2.1 where plants are "
+        "missing on the map, 4 to 11 after two to six steps where they are not",
+    )  # fmt: skip
     # The verdict.
     instrument_errors: float = _constant(
         4.5, "standard errors", CHOSEN, "offset of an instrument that is a verdict; after seven false alarms of 3.1 to "
@@ -148,6 +177,23 @@ class DecisionConstants:
     held_out_ratio: float = _constant(
         1.3, "-", CHOSEN, "held-out errors over expected ones above which the model disagrees with the data"
     )
+    held_out_alarm_rate: float = _constant(
+        0.05, "-", CHOSEN, "rate at which errors alone exceed the ratio of held-out errors that a model may have: usual"
+    )
+    between_share: float = _constant(
+        0.95, "-", CHOSEN, "share of the cases in which errors between the sections are below the reported bound", True
+    )
+    neighbours_within: float = _constant(
+        1.5, "spacings", CHOSEN, "distance of two excluded readings of a section within which they are neighbours, "
+        "which fall together as a misfit of the model does: neighbours are about one apart, others two",
+    )  # fmt: skip
+    few_sections: float = _constant(
+        4.0, "sections", CHOSEN, "up to which a name is tried without each of them: of more, one hardly decides"
+    )
+    model_error_evidence: float = _constant(
+        3.3, "-", DERIVED, "rise of the log-likelihood above which the model needs more error of its own than it is "
+        "allowed: half of the 99 % point of chi2 with one degree of freedom",
+    )  # fmt: skip
     absurd_misfit: float = _constant(
         4.0, "-", CHOSEN, "chi2 over its degrees of freedom above which no name is believed: twice all errors allowed"
     )
@@ -174,6 +220,9 @@ class DecisionConstants:
     largest_correlation: float = _constant(
         0.8, "-", CHOSEN, "correlation of errors above which they, not the model, explain the misfit", True
     )
+    testable_sizes: float = _constant(
+        2.0, "-", CHOSEN, "sizes over plausible ones within which an effect must be detectable to be testable"
+    )
     testable_share: float = _constant(
         0.25, "-", CHOSEN, "share of effects that must be testable before nothing is found missing"
     )
@@ -181,6 +230,10 @@ class DecisionConstants:
     poor_fit_chance: float = _constant(
         1e-3, "-", CHOSEN, "chance of the last misfit under errors alone below which something is still missing"
     )
+    clear_fall: float = _constant(
+        2.0, "standard errors", CHOSEN, "reduction of held-out mean square errors above which `extend` takes it for "
+        "clear: 19 times of 20 it is no chance",
+    )  # fmt: skip
     needed_errors: float = _constant(
         2.0, "standard errors", CHOSEN, "distance of an amplitude from off below which an earlier effect is dropped"
     )

@@ -11,9 +11,10 @@ import scipy.optimize
 import scipy.stats
 
 from vegglue.arrays import Array
-from vegglue.calibration.fit import HOPELESS, MOST_STEPS, NEGLIGIBLE_DECREASE, STALLED_STEPS, fit, objective
+from vegglue.calibration.fit import MOST_STEPS, NEGLIGIBLE_DECREASE, STALLED_STEPS, fit, objective
 from vegglue.calibration.noise import noise_of
 from vegglue.case.parameter_space import FURTHEST
+from vegglue.decision_constants import constants
 from vegglue.engine.interface import Point, Wanted
 
 MEASURED = pd.DataFrame({"experiment": "a", "kind": "level", "section": "", "x": 0.0, "y": 0.0,
@@ -82,7 +83,7 @@ def test_a_search_that_promises_too_little_is_not_followed(worth: float, followe
 
 @pytest.mark.parametrize(("steps_away", "followed"), [(0.9, True), (1.1, False)])
 def test_a_search_far_from_the_evidence_that_is_needed_is_given_up(steps_away: float, followed: bool) -> None:
-    """In times HOPELESS of what the first step promises, which goes all the way in this linear model."""
+    """In times hopeless_search of what the first step promises, which goes all the way in this linear model."""
 
     def linear(z: Array) -> Point:
         slope = np.array([[0.01, 0.0], [0.0, 0.01], [0.0, 0.0]])
@@ -90,7 +91,7 @@ def test_a_search_far_from_the_evidence_that_is_needed_is_given_up(steps_away: f
 
     start, white = linear(np.array([1.0, 0.0])), NOISE.whiten(linear(np.zeros(2)).slope)
     before, determinant = objective(NOISE, start), np.linalg.slogdet(white.T @ white + np.eye(2))[1]
-    needed = -0.5 * (before - steps_away * HOPELESS * before + determinant)
+    needed = -0.5 * (before - steps_away * constants().hopeless_search * before + determinant)
     assert (fit(model_of(linear), NOISE, start, needed=needed).point is not start) == followed
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.comparison import By
 from vegglue.diagnosis.stepwise_choice import (
-    CLEAR,
     WAYS,
     AmplitudeNearOff,
     Choice,
@@ -126,7 +126,7 @@ def test_in_doubt_errors_must_fall_clearly() -> None:
     assert choice(models, A, spread=1.3).stages == (PARENT, A)
     unclear = choice(models, A, clearly=True, spread=1.3)
     assert unclear.stages == (PARENT,)
-    assert unclear.refused["a"] == FallNotClear("sections", CLEAR)
+    assert unclear.refused["a"] == FallNotClear("sections", constants().clear_fall)
     assert choice(models, A, clearly=True).stages == (PARENT, A)
 
 

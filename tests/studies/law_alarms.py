@@ -23,7 +23,6 @@ from vegglue.calibration.noise import noise_of
 from vegglue.calibration.residual_screening import screen
 from vegglue.calibration.score_test import alarm_p
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.law_search import PRODUCT_ALARMS
 from vegglue.engine.interface import Point, linearise
 from vegglue.parallel import at_most
 
@@ -131,8 +130,9 @@ def main() -> None:
             p, likelier = np.vstack(
                 [product_alarms_drawn(place, given.draws, given.whole) for place in range(PLACES)]
             ).T
-        sounded = p < PRODUCT_ALARMS
-        _tell(f"alarm of products, at {PRODUCT_ALARMS:.0%}", int(np.sum(sounded)), p.size)
+        rate = constants().product_alarm_rate
+        sounded = p < rate
+        _tell(f"alarm of products, at {rate:.0%}", int(np.sum(sounded)), p.size)
         _tell("products likelier than all else, too", int(np.sum(sounded & (likelier > 0.0))), p.size)
         return
     with at_most(1):

@@ -23,6 +23,7 @@ from scipy.special import chdtrc
 from vegglue.arrays import Array
 from vegglue.calibration.noise import Noise
 from vegglue.case.parameter_space import FURTHEST, theta_at
+from vegglue.decision_constants import constants
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.normal_range import NORMAL95
 
@@ -35,10 +36,6 @@ NEGLIGIBLE_DECREASE = 0.02
 STALLED_STEPS, STALLED_DECREASE = 4, 0.2
 # Steps of one search at most. Chosen, not measured: each is a run of the model.
 MOST_STEPS = 14
-# Fall of the objective that is still needed, over the one that the next step promises, beyond which a search is given
-# up [-]. Chosen after plants that are tried on river-c, f and g: up to 2.1 where plants are missing on the map, 4 to 11
-# after two to six steps where they are not.
-HOPELESS = 4.0
 # Longest step in any z [standard deviations of the prior]. Chosen, not measured: longer ones leave the range in which
 # the slopes hold and are taken back, shorter ones are many.
 LONGEST_FIT_STEP = 1.5
@@ -69,7 +66,7 @@ def fit(
 
     The longest step shrinks where one is taken back. The search ends if the predicted decrease is below
     NEGLIGIBLE_DECREASE, if STALLED_STEPS bring less than STALLED_DECREASE, after `steps`, if slopes promise no
-    objective below `enough`, or if `needed` is more than HOPELESS steps away.
+    objective below `enough`, or if `needed` is more than hopeless_search steps away.
 
     Parameters
     ----------
@@ -109,7 +106,7 @@ def fit(
         stalled = len(objectives) > STALLED_STEPS and objectives[-1 - STALLED_STEPS] - before < STALLED_DECREASE
         # The least objective by the slopes here is F - b' H^-1 b, and its fall to the evidence that is needed
         # F + ln|H| + 2 ln p(y).
-        hopeless = before + np.linalg.slogdet(matrix)[1] + 2.0 * needed > HOPELESS * predicted
+        hopeless = before + np.linalg.slogdet(matrix)[1] + 2.0 * needed > constants().hopeless_search * predicted
         if predicted < NEGLIGIBLE_DECREASE or stalled or hopeless:
             break
         if before - right @ np.linalg.solve(matrix, right) > enough:

@@ -35,9 +35,8 @@ UNKNOWN_ERROR = 1e3
 START_CORRELATIONS, START_SIZES = (0.03, 0.2, 0.4, 0.6, 0.8), (0.01, 0.1, 1.0, 10.0)
 # rho is searched below this [-]: a covariance of rho = 1 has no inverse.
 LARGEST_RHO = 0.98
-# Values of rho [-] of which the posterior probability is computed, and the prior probability of rho = 0: the data alone
-# decide between some correlation and none. Chosen, not measured: closer levels only cost time.
-LEVEL_STEP, UNCORRELATED_CHANCE = 0.05, 0.5
+# Values of rho [-] of which the posterior probability is computed. Chosen, not measured: closer levels only cost time.
+LEVEL_STEP = 0.05
 CORRELATION_LEVELS = LEVEL_STEP * np.arange(1, 20)
 
 
@@ -338,8 +337,9 @@ def estimate_noise(noise: Noise, residual: Array, gram: Array) -> Noise:
     best, none = (free, free_without) if rejected or free.scale < 1.0 else (stated, stated_without)
     at_levels = [deviance(float(rho), best.scale, best.log_size) for rho in CORRELATION_LEVELS]
     costs = np.array([none.deviance, *at_levels])
-    share = (1.0 - UNCORRELATED_CHANCE) / CORRELATION_LEVELS.size
-    chance = np.array([UNCORRELATED_CHANCE, *[share] * CORRELATION_LEVELS.size]) * np.exp(-0.5 * (costs - costs.min()))
+    uncorrelated = constants().uncorrelated_chance
+    share = (1.0 - uncorrelated) / CORRELATION_LEVELS.size
+    chance = np.array([uncorrelated, *[share] * CORRELATION_LEVELS.size]) * np.exp(-0.5 * (costs - costs.min()))
     chance = chance / chance.sum()
     # The median; each level stands for what is nearest.
     edges, below = [0.5 * LEVEL_STEP, *(CORRELATION_LEVELS + 0.5 * LEVEL_STEP)], np.cumsum(chance)

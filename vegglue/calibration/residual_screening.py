@@ -55,10 +55,6 @@ FREE_SIZE = 1e4
 LONGEST_FREE = 3e6
 # Groups of kinds that are as likely before the data [-]: listed effects, places, instruments, fields (`field_scan`).
 GROUPS = 4
-# Chance with which an effect of the smallest size is detected [-].
-DETECTED = 0.95
-# Standard deviations of its prior within which an effect must be detectable to be testable, and within its support.
-TESTABLE = 2.0
 # Standard deviations of its prior from which a parameter is off, and conditional screenings at most, of those furthest
 # off: each costs 1.5 s of a core on 9,600 cells. Half a standard deviation was taken back after site 7049 of
 # `drawn_sites`, where a canopy too low by 0.46 of them hid streamlining.
@@ -93,15 +89,16 @@ class Screening:
         return float(self.effects.scores[self.best_column(candidate)])
 
     def smallest_shown(self, column: int) -> float:
-        """|amplitude - off| [its unit] of a fingerprint that is detected with a chance of DETECTED."""
-        needed = float(detected_length(np.array(self.effects.threshold(constants().effect_alarm_rate)), DETECTED))
+        """|amplitude - off| [its unit] of a fingerprint that is detected with detected_chance."""
+        of = constants()
+        needed = float(detected_length(np.array(self.effects.threshold(of.effect_alarm_rate)), of.detected_chance))
         gain = needed / max(float(self.projected.length[column]), 1e-300)
         return self.fingerprints.amplitudes[column].size(gain)
 
     def testable(self, column: int) -> bool:
-        """Whether that is less than TESTABLE plausible sizes, and within the support of the amplitude."""
+        """Whether that is less than testable_sizes plausible ones, and within the support of the amplitude."""
         amplitude = self.fingerprints.amplitudes[column]
-        return self.smallest_shown(column) < min(TESTABLE * amplitude.scale, amplitude.furthest)
+        return self.smallest_shown(column) < min(constants().testable_sizes * amplitude.scale, amplitude.furthest)
 
     @property
     def ranking(self) -> list[int]:

@@ -39,9 +39,6 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.loop_results import HeldOut, InSample, ModelScore, PredictiveScores
 from vegglue.wording.sentences import phrase
 
-# How often errors alone exceed the reported bound; 5 % is usual.
-BY_CHANCE = 0.05
-
 
 @dataclass(frozen=True)
 class HeldOutErrors:
@@ -102,7 +99,7 @@ def held_out_errors(base: Baseline, held_out: Model) -> HeldOutErrors:
     squares = (alike**2).sum(axis=1)
     total = float((own + squares).sum())
     degrees = total**2 / float((own**2 + 2.0 * own * squares).sum() + ((alike.T @ alike) ** 2).sum())
-    by_chance = float(np.sqrt(chdtri(degrees, BY_CHANCE) / degrees))
+    by_chance = float(np.sqrt(chdtri(degrees, constants().held_out_alarm_rate) / degrees))
     return HeldOutErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
 
 
@@ -173,13 +170,12 @@ def errors_elsewhere(where: SearchModel, at_stations: Array, there: Array, point
     return mean, there @ there.T - shared.T @ scipy.linalg.cho_solve(factor, shared)
 
 
-# Share of the cases in which the errors are to be smaller than the reported bound, and draws of them: the 95 % point of
-# 2,000 is known to half a per cent of the share.
-SHARE_BELOW, DRAWN_ERRORS = 0.95, 2000
+# Draws of the errors between sections [-]: the 95 % point of so many is known to half a per cent of the share.
+DRAWN_ERRORS = 2000
 
 
 def largest_error_between(base: Baseline) -> float:
-    """(1 + mean e^2 / s^2)^(1/2) halfway between the sections and beyond the last, in SHARE_BELOW of the cases at most.
+    """(1 + mean e^2 / s^2)^(1/2) halfway between the sections and beyond the last: between_share of its cases.
 
     e is that of `errors_elsewhere`, s^2 the mean square of the errors of data and site. What a survey leaves open of
     the bed, and where patches end, is in its cov and not in M_e: errors of the site that are stated are no room for a
@@ -215,7 +211,7 @@ def largest_error_between(base: Baseline) -> float:
     drawn = random.multivariate_normal(mean, covariance, DRAWN_ERRORS, check_valid="ignore", method="eigh")
     expected = float(np.mean(base.noise.data_error[seen] ** 2)) + float((of_site**2).sum(axis=1).mean())
     squares = (drawn**2).mean(axis=1) / expected
-    return float(np.sqrt(1.0 + np.quantile(squares, SHARE_BELOW)))
+    return float(np.sqrt(1.0 + np.quantile(squares, constants().between_share)))
 
 
 @dataclass(frozen=True)

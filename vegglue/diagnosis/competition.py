@@ -257,11 +257,8 @@ def cannot_be(interval: tuple[float, float], possible: tuple[float, float]) -> b
     return interval[0] > possible[1] or interval[1] < possible[0]
 
 
-# Plants that are not on the map: standard deviations of ln length and ln width around the medians of the patches on it
-# [-], and of the inclination [deg], with its largest; share of the outline that may lie on the plants of the map [-],
-# beyond which a side of a patch lies off. Chosen before any patch was fitted, and not changed since.
-LOG_SIZE, TURNED, LARGEST_TURN, MOST_COVERED = 0.7, 15.0, 60.0, 0.5
-PATCH = "unlisted_patch"
+# Plants that are not on the map, and their largest inclination [deg]: chosen before any patch was fitted.
+PATCH, LARGEST_TURN = "unlisted_patch", 60.0
 # Half length and half width in cells above which a fitted spot is not lost between their centres: its sum over the
 # cells is then right to 2 exp(-pi^2 0.7^2) = 2 %.
 LEAST_EXTENT = 0.7
@@ -317,9 +314,10 @@ def found_extent(
     """
     effect, above_off = spot.candidate.effect, spot.candidate.above_off
     ends = float(places.length.min()), float(places.length.max())
-    spread = 0.5 * np.log(ends[1] / ends[0]) or LOG_SIZE  # in a short reach only the shortest spots fit
+    log_sd = constants().extent_log_sd
+    spread = 0.5 * np.log(ends[1] / ends[0]) or log_sd  # in a short reach only the shortest spots fit
     length = Parameter(distribution="lognormal", median=float(np.sqrt(ends[0] * ends[1])), log_sd=spread, unit="m")
-    width = Parameter(distribution="lognormal", median=float(places.width.min()), log_sd=LOG_SIZE, unit="m")
+    width = Parameter(distribution="lognormal", median=float(places.width.min()), log_sd=log_sd, unit="m")
     trials = []
     for start in (spot.shapes, outline):
         (x, of_x), (y, of_y) = within_places(places.x, start["x"]), within_places(places.y, start["y"])
@@ -405,11 +403,11 @@ def found_patch(
         shapes = {"x": x, "y": y, **half, "angle": 0.0, "height": scales.canopy}
         shapes["proportional"] = float(case.numerics.emergent == "proportional")
         free = {"x": of_x, "y": of_y} | {
-            name: Parameter(distribution="lognormal", median=size, log_sd=LOG_SIZE, unit="m")
+            name: Parameter(distribution="lognormal", median=size, log_sd=constants().extent_log_sd, unit="m")
             for name, size in half.items()
         }
         free["angle"] = Parameter(
-            distribution="normal", mean=0.0, sd=TURNED, low=-LARGEST_TURN, high=LARGEST_TURN, unit="deg"
+            distribution="normal", mean=0.0, sd=constants().patch_turn, low=-LARGEST_TURN, high=LARGEST_TURN, unit="deg"
         )
         candidate = replace(place_candidate(effect, shapes, plausible), fitted=tuple(free.items()))
         at = start_with(candidate, search.point.z, plausible)
@@ -419,7 +417,7 @@ def found_patch(
     def is_spot_or_known(shapes: Mapping[str, float]) -> bool:
         share = rectangle(geometry, **{name: np.array([shapes[name]]) for name in free})[..., 0]
         covered = float((share * search.model.site.cover).sum() / share.sum())
-        return shapes["length"] <= places.length.min() or covered > MOST_COVERED
+        return shapes["length"] <= places.length.min() or covered > constants().mapped_share
 
     if (found := _best_fitted(search, kind, trials, is_spot_or_known)) is None:
         return None

@@ -118,19 +118,12 @@ def misfit_zones(model: Model, noise: Noise, point: Point, excluded: Sequence[in
     return pd.DataFrame(rows)
 
 
-# Chance that errors alone make any effect look as strong, below which one is significant: the rate of the alarm beside
-# what was accepted (`diagnose`), which places, instruments and slack may keep silent all the same.
-SIGNIFICANT = 0.01
 # Effects whose likeness is kept, the strongest of the first screening.
 COMPARED = 12
-# Spacings of a section [-] within which two readings stand side by side: neighbours are about one apart, others two.
-NEIGHBOURS_WITHIN = 1.5
 # Corrections of a surveyed bed that are reported, and beds that are drawn for the error of their places.
 BED_CORRECTIONS, BEDS_DRAWN = 3, 1000
 # Hypotheses that a verdict names if none leads.
 UNDECIDED_NAMED = 3
-# Sections up to which a name is tried without each: of more, one hardly decides. Chosen, not measured.
-FEW_SECTIONS = 4
 # Share of the channel below which velocities come from a small part of it. Chosen, not measured.
 SMALL_PART = 0.5
 # Stages whose effects may change from place to place along the channel; others act at an end, or in what is read.
@@ -305,7 +298,7 @@ def _verdict(
     far, strained = max(own, default=(0.0, ""))
     # Whether two single readings are excluded that stand side by side in one section.
     rows = single_readings(base.noise, found)
-    neighbours = any(0.0 < base.noise.separation[a, b] < NEIGHBOURS_WITHIN for a in rows for b in rows)
+    neighbours = any(0.0 < base.noise.separation[a, b] < constants().neighbours_within for a in rows for b in rows)
     beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
     surroundings: list[Note] = [*mapped_places(model.case, named_places(found.places, undecided))]
     surroundings += measured_stretch(model.case, model.station)
@@ -355,7 +348,7 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
     """The first section without which another listed effect leads the accepted one by same_kind_odds, to first order.
 
     None if there is no such section, if no effect was accepted first or a place beside it, and for more than
-    FEW_SECTIONS; a section counts once for each experiment. Scores and evidence are those of the first screening
+    few_sections; a section counts once for each experiment. Scores and evidence are those of the first screening
     without its rows.
     """
     base, prints = first.base, first.fingerprints
@@ -363,7 +356,7 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
     section_of = used.groupby(["experiment", "section"], sort=False).ngroup().to_numpy()
     sections = np.unique(section_of[velocity_rows(used)])
     names = [one.name for one in prints.candidates]
-    if not found.steps or found.places or not 1 < len(sections) <= FEW_SECTIONS:
+    if not found.steps or found.places or not 1 < len(sections) <= constants().few_sections:
         return None
     step = found.steps[0]
     together = {name for group in step.groups if step.accepted in group for name in group} | set(step.rivals)
@@ -467,7 +460,7 @@ def shear_layers(model: Model, point: Point, places: Sequence[LocalAnomaly]) -> 
 
 
 def significant_effects(last: Screening, found: SearchState, slack: float = 0.0) -> dict[str, float]:
-    """Effects that are significant in the last model and not in it: P(max_j T_j^2 >= (|T| - slack)^2) < SIGNIFICANT.
+    """Effects that are significant in the last model and not in it: P(max_j T_j^2 >= (|T| - slack)^2) < significance.
 
     Parameters
     ----------
@@ -485,7 +478,7 @@ def significant_effects(last: Screening, found: SearchState, slack: float = 0.0)
         one.name: last.effects.p_of(max(abs(last.best_score(j)) - slack, 0.0))
         for j, one in enumerate(last.fingerprints.candidates)
     }
-    return {name: p for name, p in chances.items() if p < SIGNIFICANT and name not in found.effects}
+    return {name: p for name, p in chances.items() if p < constants().significance and name not in found.effects}
 
 
 def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Misfit:

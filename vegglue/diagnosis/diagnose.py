@@ -37,7 +37,7 @@ from vegglue.diagnosis.competition import (
     tempered_probabilities,
     under_larger_errors,
 )
-from vegglue.diagnosis.conclusion import NEIGHBOURS_WITHIN, assemble_diagnosis, single_readings
+from vegglue.diagnosis.conclusion import assemble_diagnosis, single_readings
 from vegglue.diagnosis.refits import calibrated_with, pruned
 from vegglue.diagnosis.search_state import (
     PriorWeight,
@@ -258,7 +258,7 @@ def beside_excluded(base: Baseline, instrument: Instrument, found: SearchState) 
     if instrument.kind != "reading":
         return False
     separation, own = base.noise.separation, instrument.readings[0]
-    return any(0.0 < separation[row, own] < NEIGHBOURS_WITHIN for row in single_readings(base.noise, found))
+    return any(0.0 < separation[row, own] < constants().neighbours_within for row in single_readings(base.noise, found))
 
 
 def branch_with(

@@ -229,8 +229,6 @@ def _written(law: Law, reference: float | None) -> str:
     return law.form.written.format(q=law.quantity.written, r="" if reference is None else signed(reference))
 
 
-# How often errors alone sound the alarm of products [-]: it comes on top of that of laws, as theirs in a diagnosis.
-PRODUCT_ALARMS = 0.01
 # Products that are calibrated. Chosen, not measured: each costs a fit.
 PRODUCTS_REFITTED = 2
 
@@ -252,7 +250,7 @@ def product_beside(
     case = with_effect(search.model.case, refit.candidate, refit.shapes)
     base = Baseline(replace(search.model, case=case), search.noise, refit.fitted, None, None)
     screening = screen_products(base, listed, law, refit.shapes.get("reference"))
-    if screening is None or screening.p > PRODUCT_ALARMS or screening.kind.total < screening.others:
+    if screening is None or screening.p > constants().product_alarm_rate or screening.kind.total < screening.others:
         return None
     evidence, full = screening.kind.log_evidence, screening.full.search
     of_each = [np.flatnonzero(screening.law_of == j) for j in range(len(screening.products))]

@@ -14,6 +14,7 @@ import numpy as np
 from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import Candidate
 from vegglue.case.schema import Case
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, spread_over_its_error
 from vegglue.diagnosis.comparison import ActsElsewhere, By, acts_elsewhere, held_out_rmse, improvement, model_score
 from vegglue.diagnosis.refits import is_near_off
@@ -21,8 +22,6 @@ from vegglue.results.causes import LocalAnomaly
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.loop_results import ModelScore
 
-# Fall of the held-out squares, over its standard error, from which it is clear: 19 times of 20 it is no chance.
-CLEAR = 2.0
 WAYS: tuple[By, ...] = ("sections", "experiments")
 
 
@@ -130,7 +129,7 @@ class Choice:
 def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = False) -> Choice:
     """Each is tried in the order named, those that do not help by themselves then together; what the last model does
     not need is dropped again, and what is vaguer has to be clearly better than what is known. clearly: errors must fall
-    by CLEAR standard errors.
+    by clear_fall standard errors.
     """
     order = [one.name for one in named]
 
@@ -166,7 +165,7 @@ def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = Fals
         if without is None or last is None:
             continue
         gains = _gains(without, last, _not_judging([one]))
-        if not any(gain > CLEAR * error for gain, error in gains.values()):
+        if not any(gain > constants().clear_fall * error for gain, error in gains.values()):
             unclear[one.name] = UnclearFall(tuple((by, *gain) for by, gain in gains.items()))
     earlier = [stage for stage in stages if set(stage) < set(kept)]
     return Choice((*earlier, kept), refused, unclear)
@@ -213,7 +212,8 @@ def _known_of(
         judging = _not_judging([each for each in named if each.name in (known, one.name)])
         if with_known is None or why_not_kept(without, with_known, False, judging):
             continue
-        if not all(gain > CLEAR * error for gain, error in _gains(with_known, vaguer, judging).values()):
+        clear = constants().clear_fall
+        if not all(gain > clear * error for gain, error in _gains(with_known, vaguer, judging).values()):
             others = {name: why for name, why in refused.items() if name != known}
             kept, refused = both, {**others, one.name: KnownInstead(known)}
     return kept, refused
@@ -238,11 +238,11 @@ def why_not_kept(
         return NothingToHoldOut(bool(after.held_out.velocity.any()))
     together = sum(gain for gain, _ in gains.values())
     for by, (gain, error) in gains.items():
-        if gain < 0.0 and not (together > 0.0 and gain >= -CLEAR * error):
+        if gain < 0.0 and not (together > 0.0 and gain >= -constants().clear_fall * error):
             was, now = (held_out_rmse(one, by, not_judging.get(by, ())) for one in (before, after))
             return HeldOutErrorsRose(by, was, now)
-        if clearly and not gain > CLEAR * error:
-            return FallNotClear(by, CLEAR)
+        if clearly and not gain > constants().clear_fall * error:
+            return FallNotClear(by, constants().clear_fall)
     if not any(gain > 0.0 for gain, _ in gains.values()):
         return HeldOutErrorsDidNotFall()
     # Held-out errors are those of a linear step: where the misfit with everything seen rises, it led astray.

@@ -15,9 +15,6 @@ from vegglue.effects.identity import EffectIdentity
 TERMS_AT_PLACES = ("drag", "bed", "inflow", "viscosity")
 # Units of smooth fields, by their term.
 UNIT_OF_FIELD = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
-# ln of the likelihood ratio beyond which the model needs more error of its own than it is allowed: 1 % of chi2 with one
-# degree of freedom.
-NEEDS_MORE = 3.3
 
 
 @dataclass(frozen=True)
@@ -204,7 +201,7 @@ class ModelErrorUsed:
     @property
     def asks_for_more(self) -> bool:
         """Whether more than is allowed is needed, beyond doubt: two readings may need nine times as much."""
-        return self.needed > 1.0 and self.log_ratio > NEEDS_MORE
+        return self.needed > 1.0 and self.log_ratio > constants().model_error_evidence
 
 
 # |cosine| [-] above which an effect is reported to resemble one of a parameter: that change then mimics two thirds of

@@ -9,9 +9,9 @@ import numpy as np
 from vegglue.calibration.baseline import Baseline, baseline, for_prediction
 from vegglue.calibration.candidates import Candidate
 from vegglue.calibration.detection import detected_length
-from vegglue.calibration.residual_screening import DETECTED
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
+from vegglue.decision_constants import constants
 from vegglue.diagnosis.child_config import candidate_at, candidate_named, with_additions
 from vegglue.diagnosis.comparison import excluded_by
 from vegglue.diagnosis.next_measurement import Explanation, MeasurementWorth, worth_of_measurements
@@ -114,7 +114,7 @@ def next_measurement(
 
 def _detected_length(found: Diagnosis) -> float:
     """Length of a trace that passes the alarm over all effects 19 times of 20 [standard errors]."""
-    return float(detected_length(np.array(found.first_screening.threshold), DETECTED))
+    return float(detected_length(np.array(found.first_screening.threshold), constants().detected_chance))
 
 
 def with_places(base: Baseline, found: Diagnosis) -> Baseline:
