@@ -69,7 +69,7 @@ def test_a_fingerprint_is_the_response_to_the_effect_there(
         assert np.linalg.norm(found) == pytest.approx(np.linalg.norm(exact), rel=0.05), length
 
 
-@pytest.mark.parametrize("term", EFFECT_AT_PLACE)
+@pytest.mark.parametrize("term", SPOT_LENGTHS)
 def test_spots_lie_in_the_water_and_reach_all_of_it(
     flowing: tuple[Model, Point], places: dict[Term, Places], term: Term
 ) -> None:
@@ -88,6 +88,19 @@ def test_spots_lie_in_the_water_and_reach_all_of_it(
         (grid.x[i][:, None] - one.x[short]) / one.length[short], (grid.y[j][:, None] - one.y[short]) / one.width[short]
     )
     assert away.min(axis=1).max() < 1.1, "no place in deep water is further than a half length from a spot"
+
+
+def test_barriers_stand_between_stations_and_are_even_across_the_channel(
+    flowing: tuple[Model, Point], places: dict[Term, Places]
+) -> None:
+    model, barriers = flowing[0], places["barrier"]
+    measured = model.station["x"][model.station["used"]]
+    assert measured.min() < barriers.x.min() < barriers.x.max() < measured.max()
+    assert barriers.x.size > 10
+    assert (np.diff(barriers.x) <= 1.1 * barriers.length[0]).all(), "no gap is longer than a half length"
+    (width,) = np.unique(barriers.width)
+    away = model.site.grid.y - barriers.y[0]
+    assert np.exp(-((away / width) ** 2)).min() > 0.98
 
 
 @pytest.mark.parametrize("end", [1.0, 31.0])
@@ -111,7 +124,9 @@ def test_a_plausible_rise_of_the_bed_is_a_share_of_the_depth() -> None:
 
 def test_what_lies_on_a_bare_bed_only_holds_the_water_back(flowing: tuple[Model, Point]) -> None:
     """Where no plants stand there is no drag to lose: nothing pushes. Among plants it may go either way."""
-    drag, bed, *_ = places_of(*flowing, 1.5)
+    of_term = {one.term: one for one in places_of(*flowing, 1.5)}
+    drag, bed, barrier = (of_term[term] for term in ("drag", "bed", "barrier"))
+    assert barrier.only_sign.all()
     assert set(np.unique(drag.only_sign)) == {0, 1}
     assert drag.only_sign[drag.bare].all()
     assert not drag.only_sign[~drag.bare].any()

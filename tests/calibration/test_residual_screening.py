@@ -104,7 +104,7 @@ def test_every_kind_is_as_likely_before() -> None:
     assert set(prior) == {"effect", *EFFECT_AT_PLACE, "reading", "position", "probe"}
     assert prior["effect"] == pytest.approx(0.25)
     assert sum(prior[term] for term in EFFECT_AT_PLACE) == pytest.approx(0.25)
-    assert {round(prior[term], 9) for term in EFFECT_AT_PLACE} == {0.0625}
+    assert {round(prior[term], 9) for term in EFFECT_AT_PLACE} == {round(0.25 / len(EFFECT_AT_PLACE), 9)}
     assert sum(prior[name] for name in ("reading", "position", "probe")) == pytest.approx(0.25)
 
 

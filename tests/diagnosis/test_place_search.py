@@ -29,25 +29,39 @@ from vegglue.diagnosis.competition import (
 )
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.diagnosis.search_state import rivals_in, undecided_of
+from vegglue.effects.definition import Effect
 from vegglue.effects.library import library
 from vegglue.engine.interface import flow_at_centres, linearise
 from vegglue.progress import silent
 
 # Between the spots, which stand 0.5 m and 0.45 m apart: drag below zero pushes, as a jet does.
-OBJECT = library()["unlisted_object"]
+OBJECT, BARRIER = library()["unlisted_object"], library()["unlisted_barrier"]
 
 
-def measured_with(place: dict[str, float], drag: float) -> Screening:
+def measured_with(place: dict[str, float], size: float, effect: Effect = OBJECT) -> Screening:
     """A screening of the coarse twin, measured without errors where something lies."""
     model, point = coarse_twin()
-    candidate = place_candidate(OBJECT, place, 1.0)
+    candidate = place_candidate(effect, place, 1.0)
     case = with_effect(CASE, candidate, place)
-    there = np.append(point.z, z_of(case.parameters[candidate.parameter], drag))
+    there = np.append(point.z, z_of(case.parameters[candidate.parameter], size))
     truth = linearise(replace(model, case=case), there, point)
     assert truth is not None
     model = replace(model, station=model.station.assign(value=truth.prediction))
     noise = noise_of(model.station)
     return screen(Baseline(model, noise, fit(model, noise, point), None, None))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("loss", [1.0, 3.0])  # a sill, a row of logs
+def test_an_obstacle_across_the_channel_is_found_as_that(loss: float) -> None:
+    """Hidden between two barriers of the screening, and half as long as these are."""
+    screening = measured_with({"x": 17.3, "y": 0.0, "length": 0.6, "width": 30.0}, loss, BARRIER)
+    best = max(hypotheses_of(screening, silent), key=lambda one: one.log_evidence)
+    assert best.kind == "barrier"
+    assert isinstance(best.what, Refit)
+    assert abs(best.what.shapes["x"] - 17.3) < 1.0
+    low, high = best.what.interval95
+    assert low < loss < high
 
 
 @pytest.mark.slow

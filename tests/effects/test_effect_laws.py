@@ -231,6 +231,9 @@ ROWS = {
         {"drag": 2.0, **SPOT, "angle": 90.0, "height": 0.4, "proportional": 0.0},
         {"rate": 0.1 + WITHIN * ((1.04**-0.5 + log(2.0) / 0.41) ** -2 - (0.04**-0.5 + log(2.0) / 0.41) ** -2) / 0.8},
     ),
+    "unlisted_barrier": (
+        cells(on=NEAR), {"loss": 2.0, **SPOT}, {"rate": 0.1 + 2.0 * exp(-5.0) / (2.0 * sqrt(pi) * SPOT["length"])}
+    ),
     "unlisted_bed": (NEAR, {"rise": 0.2, **SPOT}, {"bed": 0.2 * exp(-5.0)}),
     "unlisted_inflow": (NEAR, {"discharge": 0.2, **SPOT}, {"inflow": 0.2 * exp(-5.0) / (pi * 0.3 * 0.5)}),
     "unlisted_viscosity": (cells(on=NEAR), {"viscosity": 0.02, **SPOT}, {"viscosity": 0.02 * exp(-5.0)}),

@@ -421,7 +421,7 @@ SETS = (
         f"psu-efd/LWD_flow_resistance @ 95ed9506: {JAM}, results_for_all_cases.xlsx",
         jam(stated=False),
         "drag of a jam at x = 10.16 m over the whole width, C_d 50 to 60 over 0.2 m (authors' calibration)",
-        ("drag at a place", "bed_stretch"),
+        ("barrier at a place", "drag at a place", "bed_stretch"),
     ),
     MeasuredSet(
         "D2 jam over a flume, stated as a patch",

@@ -1,14 +1,19 @@
 """Gradually varied flow: backwater curves against the integrated equation, and channels of exact depth."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from channels import GRAVITY, centres, discharge, make_problem, order, shown, sloping, solved
+from channels import GRAVITY, centres, discharge, even_geometry, make_problem, order, shown, sloping, solved
 from scipy.integrate import solve_ivp
 
 from vegglue.effects import bed_laws
+from vegglue.effects.active_effect import ActiveEffect
+from vegglue.effects.library import library
+from vegglue.flow.newton import newton
 from vegglue.flow.problem import LEVEL
+from vegglue.flow.starts import backwater
 
 FLOW, MANNING, SLOPE, REACH = 2.0, 0.03, 0.001, 2000.0
 NORMAL = (MANNING * FLOW / np.sqrt(SLOPE)) ** 0.6
@@ -57,6 +62,57 @@ def test_backwater_curves(curve, share, worst):
     assert largest[1] < worst
     assert order(largest) > 0.8
     assert errors[1][:50].max() < 5e-5
+
+
+@pytest.mark.parametrize("scale", [0.05, 1.0, 5.0])
+def test_a_barrier_takes_the_head_that_its_coefficient_states(scale: float) -> None:
+    """dh/dx = (S_0 - S_f - k u^2/g) / (1 - Fr^2) from the outlet upstream, in 7 cm, 1.5 m and 7 m of water.
+
+    Of its energy the flow loses K u^2/2g beside friction, with the mean of u^2 over the barrier.
+    """
+    reach, loss, normal = 200.0 * scale, 4.0, NORMAL * scale
+    flow, manning = FLOW * scale**1.5, MANNING * scale ** (1.0 / 6.0)  # the same Froude number and slope
+    middle = 0.5 * reach
+
+    def share(x: np.ndarray) -> np.ndarray:
+        """Of the loss, per length [1/m]."""
+        return np.exp(-(((x - middle) / normal) ** 2)) / (np.sqrt(np.pi) * normal)
+
+    def slope_of_depth(x, h):
+        lost = manning**2 * flow**2 / h ** (10.0 / 3.0) + loss * share(x) * (flow / h) ** 2 / (2.0 * GRAVITY)
+        return (SLOPE - lost) / (1.0 - flow**2 / (GRAVITY * h**3))
+
+    exact = solve_ivp(
+        slope_of_depth, (reach, 0.0), [normal], rtol=1e-10, atol=1e-12, dense_output=True, max_step=0.1 * normal
+    )
+    errors, off = [], []
+    for cells in (200, 400, 800):
+        bed, x, cell = sloping(reach, cells, 2, SLOPE), centres(reach, cells), (reach / cells, scale)
+        level = normal - SLOPE * reach
+        problem = make_problem(
+            bed, cell, 2.0 * scale * flow, level, (bed_laws.MANNING, manning), film=1e-5 * scale,
+            geometry=even_geometry(bed, np.zeros(bed.shape), cell),
+        )  # fmt: skip
+        place = {"x": middle, "y": 0.0, "length": normal, "width": 14.0 * scale}
+        state = backwater(problem)
+        for part in (0.1, 0.4, 1.0):
+            values = {name: np.array([value]) for name, value in {"loss": part * loss, **place}.items()}
+            barrier = ActiveEffect(library()["unlisted_barrier"], values)
+            solution = newton(replace(problem, effects=(barrier,)), state, 1e-10)
+            assert solution.converged[0]
+            state = solution.state
+        depth = state[:, LEVEL, 0, 0] - bed[:, 0]
+        errors.append(float(np.abs(depth - exact.sol(x)[0]).max()))
+        u = flow / depth
+        energy, friction = bed[:, 0] + depth + u**2 / (2.0 * GRAVITY), manning**2 * flow**2 / depth ** (10.0 / 3.0)
+        head = loss * float(share(x) @ u**2) * cell[0] / (2.0 * GRAVITY)
+        near, far = cells // 8, cells - cells // 8
+        lost = energy[near] - energy[far] - float(np.trapezoid(friction[near : far + 1], dx=cell[0]))
+        print(f"{scale}, {cells}: head {head:.4g}, lost {lost:.4g}, depth off by {errors[-1]:.2g}")
+        off.append(abs(lost / head - 1.0))
+    assert errors[1] < 0.01 * head
+    assert max(off) < 0.005
+    assert order(errors) > 0.8
 
 
 def hill(x):

@@ -207,6 +207,12 @@ VERDICTS: dict[str, Diagnosis] = {
         an_anomaly(term="inflow", amplitude=0.05, interval95=(0.03, 0.07), unit="m3/s", x=12.0),
     )),
     "a place and an effect": brook(kind="none-of-these", places=(an_anomaly(),)),
+    "an obstacle across the channel": brook(kind="none-of-these", effects=(), places=(
+        an_anomaly(
+            term="barrier", effect="unlisted_barrier", amplitude=52.8, interval95=(45.5, 60.2), unit="-", x_error=0.4,
+            odds={"drag": 2.6e5, "gauge": 0.03},
+        ),
+    )),
     "plants that are not on the map": brook(kind="none-of-these", effects=(), places=(a_patch(),)),
     "a field": brook(kind="none-of-these", effects=(), field=EVERY_KIND.field),
     "a law": brook(kind="none-of-these", effects=(), laws=candidate_laws_of("law_bank_speed_step")),

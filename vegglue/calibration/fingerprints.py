@@ -3,12 +3,14 @@ the water, of drag, of bed level, of inflow or of viscosity.
 
     S(x_0, y_0) = sum_cells  d prediction / d term  exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2)
 
-A place has one fingerprint for all experiments: what lies there stays where it is. A surveyed line that is too high
-leaves -R w, w how the bed of each cell rises with its level, and R how predictions answer to the bed of each.
+A place has one fingerprint for all experiments: what lies there stays where it is. A barrier has a place along the
+channel alone, between the first and the last station: beyond them it is a level at the outlet, or nothing. A surveyed
+line that is too high leaves -R w, w how the bed of each cell rises with its level, and R how predictions answer to the
+bed of each.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 
@@ -19,8 +21,11 @@ from vegglue.arrays import Array, Mask
 from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Candidate, candidates_of, cause_of
 from vegglue.calibration.model_error import (
+    EFFECT_AT_PLACE,
+    TERM_OF,
     CellResponses,
     GaussianBasis,
+    Unlisted,
     cell_responses,
     excluded_terms,
     gaussian_basis,
@@ -28,6 +33,7 @@ from vegglue.calibration.model_error import (
     responses_to_basis,
 )
 from vegglue.case.bed_error import SurveyedLines, surveyed_lines
+from vegglue.case.case_effects import effect_named
 from vegglue.case.channel_geometry import site_scales
 from vegglue.case.grid import cell_stretch
 from vegglue.case.gridded_site import in_experiment
@@ -35,6 +41,7 @@ from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
 from vegglue.effects.definition import Amplitude
 from vegglue.effects.scales import SPOT_WIDTH
+from vegglue.effects.unlisted import BARRIER_LENGTH, BARRIER_WIDTH
 from vegglue.engine.interface import Cause, Model, Point, flow_at_centres, responses
 from vegglue.errors import InputError
 from vegglue.flow.local_changes import Term
@@ -42,8 +49,8 @@ from vegglue.flow.problem_setup import share_under_water
 from vegglue.parallel import in_threads
 
 # Half lengths of a spot over its half width [-]: an object, a bar, and a stretch of bank, as in open-m, after which the
-# longest was added. Smaller ones separate places more closely, and are more tests.
-SPOT_LENGTHS: Mapping[Term, tuple[float, ...]] = {
+# longest was added. Smaller ones separate places more closely, and are more tests. A barrier's is that of its effect.
+SPOT_LENGTHS: Mapping[Unlisted, tuple[float, ...]] = {
     "drag": (1.0, 4.0, 12.0),
     "bed": (1.0, 4.0, 12.0),
     "inflow": (1.0, 4.0, 12.0),
@@ -65,12 +72,12 @@ WITHOUT_PLANTS = 0.02
 
 @dataclass(frozen=True)
 class Places:
-    """Spots of one term: middles x, y, half lengths and half widths (spot,) [m]; plausible: size of one [unit of the
-    effect that stands for it]; fingerprints (station, spot) [unit of a station per that of the effect]; bare (spot,):
-    whether no plants stand there.
+    """Spots of one term, or barriers: middles x, y, half lengths and half widths (spot,) [m]; plausible: size of one
+    [unit of the effect that stands for it]; fingerprints (station, spot) [unit of a station per that of the effect];
+    bare (spot,): whether no plants stand there.
     """
 
-    term: Term
+    term: Unlisted
     x: Array
     y: Array
     length: Array
@@ -81,18 +88,22 @@ class Places:
 
     @property
     def only_sign(self) -> NDArray[np.int_]:
-        """The only sign that the size of each spot may have, 0 for both (spot,): a bare bed has no drag to lose."""
+        """The only sign that the size of each spot may have, 0 for both (spot,): a bare bed has no drag to lose, and a
+        barrier no head to give.
+        """
+        if self.term == "barrier":
+            return np.ones(self.x.size, dtype=int)
         one_sided = self.term == "drag" and self.bare.size == self.x.size
         return self.bare.astype(int) if one_sided else np.zeros(self.x.size, dtype=int)
 
     @property
     def name(self) -> str:
         """What all of them are called together, `drag at a place`, in messages and among what was tried."""
-        return f"{self.term} at a place"
+        return "an obstacle across the channel" if self.term == "barrier" else f"{self.term} at a place"
 
     def shapes(self, spot: int) -> dict[str, float]:
-        """The shapes of the effect at one of them, rounded to a centimetre, or to a tenth of its half width."""
-        digits = digits_of_place(float(self.width[spot]))
+        """The shapes of the effect at one of them, rounded to a centimetre, or to a tenth of its smaller half size."""
+        digits = digits_of_place(float(min(self.length[spot], self.width[spot])))
         return {name: round(float(getattr(self, name)[spot]), digits) for name in ("x", "y", "length", "width")}
 
 
@@ -131,19 +142,19 @@ def consecutive_columns(sizes: Sequence[int]) -> list[np.ndarray]:
     return [np.arange(*ends) for ends in pairwise(accumulate(sizes, initial=0))]
 
 
-def digits_of_place(width: float) -> int:
-    """Decimals of coordinates: a centimetre, or a tenth of the half width.
+def digits_of_place(half: float) -> int:
+    """Decimals of coordinates: a centimetre, or a tenth of what is smaller, half length or half width.
 
     Parameters
     ----------
-    width : float
-        Half width of what lies there [m].
+    half : float
+        Half length or half width of what lies there, the smaller one [m].
 
     Returns
     -------
     int
     """
-    return max(2, 1 - math.floor(math.log10(width)))
+    return max(2, 1 - math.floor(math.log10(half)))
 
 
 def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
@@ -175,7 +186,7 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
         raise InputError(f"The effect `{every[column][0].name}` gives values that are not finite; correct it.")
     lines = surveyed_lines(model.case, model.site.grid)
     of_bed: tuple[Term, ...] = ("bed",) if lines.lines else ()
-    cells = cell_responses(model, point, tuple(dict.fromkeys([*terms_at_places(model.case), *of_bed])))
+    cells = cell_responses(model, point, tuple(dict.fromkeys([*terms_of(terms_at_places(model.case)), *of_bed])))
     of_lines = np.zeros((len(model.station), 0))
     if lines.lines:
         of_lines = -(cells.of["bed"].reshape(len(model.station), -1) @ lines.weights)
@@ -194,10 +205,15 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
     )
 
 
-def terms_at_places(case: Case) -> list[Term]:
-    """Terms that something at a place may change."""
+def terms_at_places(case: Case) -> list[Unlisted]:
+    """What something at a place may be."""
     excluded = excluded_terms(case)
-    return [term for term in SPOT_LENGTHS if term not in excluded]
+    return [term for term in EFFECT_AT_PLACE if term not in excluded]
+
+
+def terms_of(unlisted: Iterable[Unlisted]) -> tuple[Term, ...]:
+    """The terms of the equations that these change, each once."""
+    return tuple(dict.fromkeys(TERM_OF[EFFECT_AT_PLACE[one]] for one in unlisted))
 
 
 def places_of(model: Model, point: Point, half_width: float, cells: CellResponses | None = None) -> tuple[Places, ...]:
@@ -219,21 +235,32 @@ def places_of(model: Model, point: Point, half_width: float, cells: CellResponse
     """
     width, grid = SPOT_WIDTH * half_width, model.site.grid
     rasters = {
-        term: [gaussian_basis(grid, length * width, width, SPOT_CELLS) for length in SPOT_LENGTHS[term]]
+        term: [barriers(model)]
+        if term == "barrier"
+        else [gaussian_basis(grid, length * width, width, SPOT_CELLS) for length in SPOT_LENGTHS[term]]
         for term in terms_at_places(model.case)
     }
-    cells = cells or cell_responses(model, point, tuple(rasters))
+    cells = cells or cell_responses(model, point, terms_of(rasters))
     return _places_over(model, point, rasters, cells, beside_ends=False)
 
 
-def places_around(model: Model, point: Point, term: Term, place: Mapping[str, float], share: float) -> Places:
+def barriers(model: Model) -> GaussianBasis:
+    """Spots even across the channel, as long as their effect states and as far apart."""
+    grid = model.site.grid
+    length = max(BARRIER_LENGTH * site_scales(model.case, model.site).depth, SPOT_CELLS * grid.dx)
+    x = np.linspace(grid.x[0], grid.x[-1], max(round((grid.x[-1] - grid.x[0]) / length), 1) + 1)
+    middle, half = 0.5 * (grid.y[0] + grid.y[-1]), 0.5 * grid.y.size * grid.dy
+    return gaussian_basis_at(grid, x, np.array([middle]), length, BARRIER_WIDTH * half)
+
+
+def places_around(model: Model, point: Point, term: Unlisted, place: Mapping[str, float], share: float) -> Places:
     """Spots of one term and size around a place, STEPS_AROUND on either side.
 
     Parameters
     ----------
     model : Model
     point : Point
-    term : Term
+    term : Unlisted
     place : mapping of float
         x, y, length and width [m].
     share : float
@@ -246,15 +273,15 @@ def places_around(model: Model, point: Point, term: Term, place: Mapping[str, fl
     """
     length, width = place["length"], place["width"]
     steps = share * np.arange(-STEPS_AROUND, STEPS_AROUND + 1, dtype=float)
-    x, y = place["x"] + steps * length, place["y"] + steps * width
+    x, y = place["x"] + steps * length, place["y"] + (0.0 * steps[:1] if term == "barrier" else steps * width)
     around = {term: [gaussian_basis_at(model.site.grid, x, y, length, width)]}
-    return _places_over(model, point, around, cell_responses(model, point, (term,)))[0]
+    return _places_over(model, point, around, cell_responses(model, point, terms_of([term])))[0]
 
 
 def _places_over(
     model: Model,
     point: Point,
-    rasters: Mapping[Term, Sequence[GaussianBasis]],
+    rasters: Mapping[Unlisted, Sequence[GaussianBasis]],
     cells: CellResponses,
     beside_ends: bool = True,
 ) -> tuple[Places, ...]:
@@ -268,13 +295,16 @@ def _places_over(
             cells.of["inflow"][rows] *= water[experiment]
     depth = np.stack([flow_at_centres(model, point, name).depth for name in point.flows])
     wet = depth > least_depth(model)
+    measured = model.station.loc[model.station["used"], "x"]
 
-    def places_of_term(term: Term, spots: Sequence[GaussianBasis]) -> Places:
+    def places_of_term(term: Unlisted, spots: Sequence[GaussianBasis]) -> Places:
         # Water that enters does so where there is water at all times.
         seen = wet.all(axis=0) if term == "inflow" else wet.any(axis=0)
         parts, bare, cover = [], [], model.site.cover
         for over in spots:
-            answers = responses_to_basis(cells, term, over)
+            answers = responses_to_basis(cells, TERM_OF[EFFECT_AT_PLACE[term]], over)
+            if term == "barrier":
+                answers = answers / (2.0 * np.sqrt(np.pi) * over.length)
             if term == "inflow":
                 # Over the area [m2] on which the water enters (station, k, j), that of the experiment of the station.
                 cell = grid.dx * grid.dy
@@ -284,12 +314,15 @@ def _places_over(
                     area[rows] = np.maximum(cell * (over.along @ covered @ over.across.T), 0.1 * cell)
                 answers = answers / area
             share = over.along @ seen @ over.across.T
-            within = share > LEAST_SHARE * over.along.sum(axis=1)[:, None] * over.across.sum(axis=1)[None]
+            least = 0.0 if term == "barrier" else LEAST_SHARE  # a valley may be dry beside its channel
+            within = share > least * over.along.sum(axis=1)[:, None] * over.across.sum(axis=1)[None]
             # With the middle in the grid, to a cell, as places are rounded.
             along = (over.x >= grid.x[0] - grid.dx) & (over.x <= grid.x[-1] + grid.dx)
             if not beside_ends:
                 kept = max(over.length, FROM_ENDS * grid.dx)
                 along &= (over.x >= grid.x[0] + kept) & (over.x <= grid.x[-1] - kept)
+            if term == "barrier":
+                along &= (over.x > measured.min()) & (over.x < measured.max())
             across = (over.y >= grid.y[0] - grid.dy) & (over.y <= grid.y[-1] + grid.dy)
             a, b = np.nonzero(within & (along[:, None] & across))
             size = np.full((2, a.size), [[over.length], [over.width]])
@@ -316,10 +349,11 @@ def least_depth(model: Model) -> float:
     return LEAST_DEPTH * site_scales(model.case, model.site).depth
 
 
-def plausible_size(case: Case, term: Term) -> float:
-    """Of the effect that stands for a term at a place, in its unit: a multiple of a scale of the site."""
+def plausible_size(case: Case, term: Unlisted) -> float:
+    """Of the effect that stands for it at a place, in its unit: a multiple of a scale of the site."""
     of, scales = constants(), site_scales(case)
     return {
+        "barrier": of.effect_sizes * effect_named(case, EFFECT_AT_PLACE["barrier"]).amplitude.scale,
         "drag": of.spot_drag * scales.of("object"),
         "bed": of.spot_rise * scales.mean_depth,
         "inflow": of.spot_inflow * scales.discharge,

@@ -30,7 +30,7 @@ checked against it); the fields are a definition of this project, and which erro
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,14 +51,19 @@ from vegglue.flow.local_changes import Term
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.parallel import in_threads
 
-# The effect of the library that is a spot of a term.
-EFFECT_AT_PLACE: dict[Term, str] = {
+# What may be at a place: a term of the equations, or a barrier, drag that is even across the channel.
+Unlisted = Literal["drag", "barrier", "bed", "inflow", "viscosity"]
+# The effect of the library that is a spot of it, and the term that a spot changes.
+EFFECT_AT_PLACE: dict[Unlisted, str] = {
     "drag": "unlisted_object",
+    "barrier": "unlisted_barrier",
     "bed": "unlisted_bed",
     "inflow": "unlisted_inflow",
     "viscosity": "unlisted_viscosity",
 }
-TERM_OF: dict[str, Term] = {effect: term for term, effect in EFFECT_AT_PLACE.items()}
+TERM_OF: dict[str, Term] = {
+    effect: "drag" if unlisted == "barrier" else unlisted for unlisted, effect in EFFECT_AT_PLACE.items()
+}
 # Radius of a basis function over the half width of the floor [-]: friction differs from one stone, tuft or stem count
 # to the next, a survey from one line of points to the next. Chosen, not measured.
 FRICTION_RADIUS, BED_RADIUS = 0.3, 0.5
@@ -82,8 +87,8 @@ class CellResponses:
     of: dict[Term, NDArray[np.float32]]
 
 
-def excluded_terms(case: Case) -> set[Term]:
-    """Terms that no place and no field may change: the case excludes their effect, or walls keep water out."""
+def excluded_terms(case: Case) -> set[Unlisted]:
+    """What no place may change, and no field: the case excludes its effect, or walls keep water out."""
     excluded = {term for term, name in EFFECT_AT_PLACE.items() if name in (case.exclude or ())}
     return excluded if case.friction.walls is None else excluded | {"inflow"}
 
@@ -305,6 +310,8 @@ def _columns_of_shape(model: Model, point: Point, cells: CellResponses, key: str
     across = ((basis.y - place["y"]) / (place["width"] + basis.width)) ** 2
     near = along[:, None] + across[None] < AROUND**2
     whole = size if term == "inflow" else size * float(spot.areas(grid)[0, 0])
+    if effect.name == EFFECT_AT_PLACE["barrier"]:
+        whole /= 2.0 * np.sqrt(np.pi) * place["length"]
     in_each = constants().shape_error * whole / np.sqrt(max(int(near.sum()), 1))
     own, others = responses_to_basis(cells, term, spot)[:, 0, 0], responses_to_basis(cells, term, basis)[:, near]
     acts = np.ones(len(own)) if entry.experiments is None else model.station["experiment"].isin(entry.experiments)

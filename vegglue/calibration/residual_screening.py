@@ -29,6 +29,7 @@ from vegglue.calibration.candidates import (
 from vegglue.calibration.detection import detected_length
 from vegglue.calibration.fingerprints import Fingerprints, fingerprints_of
 from vegglue.calibration.fit import at_point, objective
+from vegglue.calibration.model_error import Unlisted
 from vegglue.calibration.noise import Noise, draw_whitened_errors, estimate_noise
 from vegglue.calibration.score_test import (
     Family,
@@ -43,7 +44,6 @@ from vegglue.case.case_effects import parameters_of_effects
 from vegglue.case.channel_geometry import half_width
 from vegglue.decision_constants import constants
 from vegglue.engine.interface import Point, linearise, responses
-from vegglue.flow.local_changes import Term
 from vegglue.parallel import in_threads
 
 # Size [standard errors] given to the fingerprint with the best score when the noise is estimated again. So large that
@@ -219,7 +219,9 @@ def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) 
     return kind_of_hypotheses("effect", projected, plausible, prior, fingerprints.only_sign)
 
 
-def kinds_of_places(fingerprints: Fingerprints, in_places: Mapping[Term, score_test.Projected]) -> list[HypothesisKind]:
+def kinds_of_places(
+    fingerprints: Fingerprints, in_places: Mapping[Unlisted, score_test.Projected]
+) -> list[HypothesisKind]:
     """A kind for each term: all its spots are as likely before, and all terms."""
     kinds = []
     for one in fingerprints.places:

@@ -92,7 +92,8 @@ def spread_over_its_error(anomaly: LocalAnomaly) -> LocalAnomaly:
 
         l' = (l^2 + 2 e_x^2)^(1/2),   w' = (w^2 + 2 e_y^2)^(1/2),   a' = a l w / (l' w')
 
-    A spot exp(-(x / l)^2) whose middle errs by a normal e_x has this as its mean. What enters stays as much as it is.
+    A spot exp(-(x / l)^2) whose middle errs by a normal e_x has this as its mean. What enters stays as much as it is,
+    and so does the head that a barrier takes.
 
     Parameters
     ----------
@@ -105,10 +106,10 @@ def spread_over_its_error(anomaly: LocalAnomaly) -> LocalAnomaly:
         Its interval and plausible size changed with a.
     """
     length, width = (
-        round(float(np.hypot(half, 2.0**0.5 * error)), digits_of_place(anomaly.width))
+        round(float(np.hypot(half, 2.0**0.5 * error)), digits_of_place(min(anomaly.length, anomaly.width)))
         for half, error in ((anomaly.length, anomaly.x_spread), (anomaly.width, anomaly.y_spread))
     )
-    share = 1.0 if anomaly.term == "inflow" else anomaly.length * anomaly.width / (length * width)
+    share = 1.0 if anomaly.term in ("inflow", "barrier") else anomaly.length * anomaly.width / (length * width)
     low, high = anomaly.interval95
     return replace(
         anomaly,

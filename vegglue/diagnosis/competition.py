@@ -54,7 +54,7 @@ from vegglue.calibration.baseline import SearchModel
 from vegglue.calibration.candidates import Instrument, InstrumentKind, place_candidate, start_with, with_effect
 from vegglue.calibration.fingerprints import Places, digits_of_place, places_around
 from vegglue.calibration.fit import chance_of_misfit, chi2, interval95
-from vegglue.calibration.model_error import EFFECT_AT_PLACE
+from vegglue.calibration.model_error import EFFECT_AT_PLACE, Unlisted
 from vegglue.calibration.residual_screening import Screening, conditional_screenings, refit_start
 from vegglue.calibration.score_test import HypothesisKind, expected_gain, kind_named, log_factors, prior_shrinkage
 from vegglue.case.case_effects import effect_named, effect_of, value_of
@@ -187,7 +187,7 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
         best = int(np.argmax(window.log_factor))
         if window.log_factor[best] < moved.log_factor + LEAST_RISE:
             break
-        digits = digits_of_place(moved.shapes["width"])
+        digits = digits_of_place(min(moved.shapes["length"], moved.shapes["width"]))
         x, y = round(float(window.x[best]), digits), round(float(window.y[best]), digits)
         shapes = {**moved.shapes, "x": x, "y": y}
         candidate = place_candidate(moved.candidate.effect, shapes, places.plausible, moved.candidate.above_off)
@@ -219,7 +219,7 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
     return FoundPlace(moved, total, tuple(errors), tuple(spread))
 
 
-def possible_change(model: Model, point: Point, term: Term, x: float, y: float) -> tuple[float, float]:
+def possible_change(model: Model, point: Point, term: Unlisted | Term, x: float, y: float) -> tuple[float, float]:
     """The range in which a term can change at a place.
 
     A bed by the depth there, or by the mean depth if that is more; water that enters by all that flows; viscosity and
@@ -229,7 +229,7 @@ def possible_change(model: Model, point: Point, term: Term, x: float, y: float) 
     ----------
     model : Model
     point : Point
-    term : Term
+    term : Unlisted or Term
     x, y : float
         [m]
 
@@ -613,9 +613,9 @@ def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypoth
 
 
 def with_extent(screening: Screening, one: Hypothesis, outline: Mapping[str, float]) -> Hypothesis:
-    """A spot with its extent fitted, where that has more evidence and can be; all else as it is."""
+    """A spot with its extent fitted, where that has more evidence and can be; all else, a barrier too, as it is."""
     places = next((places for places in screening.fingerprints.places if places.term == one.kind), None)
-    if places is None or not isinstance(one.what, Refit):
+    if places is None or places.term == "barrier" or not isinstance(one.what, Refit):
         return one
     search = screening.search
     there = found_extent(search, places, kind_named(screening.kinds, one.kind), one.what, outline, one.log_evidence)

@@ -184,7 +184,7 @@ def assemble_diagnosis(
     strongest = first.ranking[:COMPARED]
     columns = [first.best_column(j) for j in strongest]
     # Scores of the term of the first place that was found, else of drag, before anything was accepted.
-    term = found.places[0].term if found.places else "drag"
+    term = found.places[0].term if found.places and found.places[0].term != "barrier" else "drag"
     spots = next(one for one in first.fingerprints.places if one.term == term)
     return Diagnosis(
         name=before.model.case.name,
@@ -535,7 +535,7 @@ def _field(
     gained = found.gained(log_evidence(first.base), log_evidence(last.base)) if found.accepted else 0.0
     undecided = found.undecided.hypotheses if found.undecided else ()
     gained = max([gained, *(one.log_evidence for one in undecided)])
-    told_as_place = {"friction" if place.term == "drag" else place.term for place in found.places}
+    told_as_place = {"friction" if place.term in ("drag", "barrier") else place.term for place in found.places}
     for best in fields:
         if not field_goes_first(best.log_factor, gained) or best.term in told_as_place:
             break

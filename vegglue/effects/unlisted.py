@@ -1,7 +1,8 @@
 """Something of no named kind at one place: what a diagnosis tries where no effect of the library fits.
 
 All but one are a spot exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) in one term of the equations; plants that are not on
-the map fill a rectangle. Parameters are (m,); unit and meaning of each stand in EFFECTS.
+the map fill a rectangle. A barrier is a spot so wide that it is even across the channel. Parameters are (m,); unit and
+meaning of each stand in EFFECTS.
 """
 
 import numpy as np
@@ -54,6 +55,12 @@ def unlisted_patch(cells: Cells, drag: Array, height: Array, proportional: Array
     return {"rate": cells.rate + rectangle(cells.geometry, **outline) * (planted - bare)}
 
 
+def unlisted_barrier(cells: Cells, loss: Array, **place: Array) -> dict[str, Array]:
+    """k -> k + K / (2 pi^(1/2) l) spot [1/m], w far beyond the banks: along x the head falls by K u^2 / 2g in all."""
+    over = 2.0 * np.sqrt(np.pi) * place["length"]
+    return {"rate": cells.rate + loss / over * spot(cells.geometry, **place)}
+
+
 def unlisted_bed(geometry: ChannelGeometry, rise: Array, **place: Array) -> dict[str, Array]:
     """z_b -> z_b + dz spot [m]."""
     return {"bed": rise * spot(geometry, **place)}
@@ -76,6 +83,17 @@ PLACE = (
     Shape("y", "m", "where across it", 0.0, -1e5, 1e5),
     Shape("length", "m", "its half length l", SPOT_WIDTH, 0.006, 1e4, of="half_width"),
     Shape("width", "m", "its half width w", SPOT_WIDTH, 0.006, 1e4, of="half_width"),
+)
+# Half length of a barrier over the depth, and half width over that of the grid [-]: within 2 % even across it.
+BARRIER_LENGTH, BARRIER_WIDTH = 1.0, 7.0
+BARRIER = (
+    *PLACE[:2],
+    Shape("length", "m", "half length l over which the head falls", BARRIER_LENGTH, 0.006, 1e4, of="depth"),
+    Shape("width", "m", "half width w, far beyond the banks", BARRIER_WIDTH, 0.006, 1e6, of="half_width"),
+)
+OPENINGS = (
+    "Borda and Carnot: K = (r - 1)^2, water that passes openings r times as fast as u; r = 5 if a third of the section "
+    "is open and contracts to 0.6"
 )
 SPOT = "exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2)"
 
@@ -117,6 +135,15 @@ EFFECTS = (
         unlisted_patch,
         Amplitude("drag", "-", "drag phi of the plants", 3.0, 0.0, 100.0),
         OUTLINE,
+    ),
+    _at_place(
+        "unlisted_barrier",
+        "resistance",
+        "An obstacle lies across the whole channel",
+        f"k -> k + K/(2 pi^(1/2) l) {SPOT}, w far beyond the banks: a loss of head of K u^2/2g",
+        unlisted_barrier,
+        Amplitude("loss", "-", "loss coefficient K, by the velocity there", 16.0, 0.0, 1000.0, basis=OPENINGS),
+        BARRIER,
     ),
     _at_place(
         "unlisted_bed",

@@ -11,8 +11,8 @@ from vegglue.arrays import Array
 from vegglue.decision_constants import constants
 from vegglue.effects.identity import EffectIdentity
 
-# Terms of the equations that something at a place may change.
-TERMS_AT_PLACES = ("drag", "bed", "inflow", "viscosity")
+# Terms of the equations that something at a place may change, and an obstacle across the channel.
+TERMS_AT_PLACES = ("drag", "barrier", "bed", "inflow", "viscosity")
 # Units of smooth fields, by their term.
 UNIT_OF_FIELD = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/s"}
 
@@ -42,7 +42,7 @@ class LocalAnomaly:
     y: float
     length: float
     width: float
-    # term, effect: the term, and the effect that stands for the place in the library
+    # term, effect: the term, or barrier, and the effect that stands for the place in the library
     term: str
     effect: str
     # amplitude, interval95, unit: size with its 95 % interval
@@ -81,7 +81,7 @@ class LocalAnomaly:
 class PlaceMap:
     """Scores of a spot of one term everywhere, in the model as it was."""
 
-    term: str  # of the first place that was found, else drag
+    term: str  # of the first place that was found, drag without any and for an obstacle across the channel
     # x, y: middles of spots (spot,) [m]; those of one length stand together, in the order of x
     x: Array
     y: Array
