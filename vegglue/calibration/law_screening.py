@@ -95,7 +95,7 @@ _Water = tuple[list[Cells], list[Cells]]
 
 
 def _water_of(model: Model, point: Point) -> _Water:
-    flows = {name: centre_cells(model, point, name) for name in model.case.experiments}
+    flows = {name: _centre_cells(model, point, name) for name in model.case.experiments}
     return list(flows.values()), [at_sections(model, cells, name) for name, cells in flows.items()]
 
 
@@ -150,7 +150,7 @@ def _change_of(law: Law, seen: tuple[float, float], reference: float | None) -> 
     return float(np.ptp(law.form.of(np.linspace(*seen, VALUES_SEEN), 1.0 if reference is None else reference)))
 
 
-def centre_cells(model: Model, point: Point, experiment: str) -> Cells:
+def _centre_cells(model: Model, point: Point, experiment: str) -> Cells:
     """The flow at cell centres of one experiment, with friction and viscosity of 1."""
     flow = flow_at_centres(model, point, experiment)
     geometry = channel_geometry(model.case, model.site, experiment)
@@ -200,7 +200,7 @@ class LawTraces:
 def law_traces(model: Model, point: Point) -> LawTraces:
     """Of a model at a point."""
     responses = cell_responses(model, relinearised(model, point), tuple(dict.fromkeys(RELATIVE_TERM.values())))
-    flows = tuple((rows, centre_cells(model, point, experiment)) for experiment, rows in model.rows.items())
+    flows = tuple((rows, _centre_cells(model, point, experiment)) for experiment, rows in model.rows.items())
     return LawTraces(responses, flows)
 
 
@@ -242,7 +242,7 @@ def laws_beyond_their_range(model: Model, point: Point) -> Iterator[LawBeyondRan
         shapes = {shape.name: np.array(shape.default) for shape in effect.shapes}
         strength = {effect.amplitude.name: np.array(effect.amplitude.scale)}
         for experiment in (one for one in model.case.experiments if only is None or one in only):
-            everywhere = centre_cells(model, point, experiment)
+            everywhere = _centre_cells(model, point, experiment)
             found = []
             for cells in (at_sections(model, everywhere, experiment), everywhere):
                 # Of a flux the part along x shows where it acts.
@@ -307,7 +307,7 @@ class LawScreening:
                 cosine = {other: float(row[self.of_listed + self.columns[other]].max()) for other in laws}
                 nearest = max(laws, key=lambda other: cosine[other])
                 near[self.laws[nearest].candidate.name] = cosine[nearest]
-        return most_alike(near)
+        return _most_alike(near)
 
     @property
     def of_listed(self) -> int:
@@ -465,10 +465,10 @@ class ProductScreening:
             for one, some in zip(found.candidates, found.columns, strict=True)
             if some.max(initial=0) < cosine.size
         }
-        return most_alike(near)
+        return _most_alike(near)
 
 
-def most_alike(near: Mapping[str, float]) -> tuple[str, ...]:
+def _most_alike(near: Mapping[str, float]) -> tuple[str, ...]:
     """Names that the data cannot separate from one, the most alike first; near: |cosine| with each [-]."""
     ranked = sorted(near, key=lambda name: -near[name])
     return tuple(name for name in ranked if near[name] > constants().alike_cosine)

@@ -195,7 +195,7 @@ def candidate_laws(
     def chances_of_laws() -> Array:
         return chances_in_set(np.append(of_laws, against))[: of_laws.size]
 
-    if may_be_laws(float(chances_of_laws().sum())):
+    if _may_be_laws(float(chances_of_laws().sum())):
         alone = [] if found.places else found.effects
         calibrated, kept, own = refitted(screening, alone, found.log_prior, max(against))
         against = [own] if found.accepted else against
@@ -227,7 +227,7 @@ def candidate_laws(
     if found.steps and suspected.clear:
         beside = beside_last()
         suspected = replace(suspected, needed=beside is not None and beside.p < constants().law_alarm_rate)
-    return suspected if not found.steps or may_be_laws(suspected.chance) else None
+    return suspected if not found.steps or _may_be_laws(suspected.chance) else None
 
 
 def same_as_accepted(screening: LawScreening, accepted: Sequence[str]) -> NDArray[np.bool_]:
@@ -240,6 +240,6 @@ def same_as_accepted(screening: LawScreening, accepted: Sequence[str]) -> NDArra
     return np.asarray(cosine.max(axis=0) > constants().alike_cosine)
 
 
-def may_be_laws(chance: float) -> bool:
+def _may_be_laws(chance: float) -> bool:
     """Whether all else together is less than strong_odds times as likely as laws of this probability [-]."""
     return constants().strong_odds * chance >= 1.0 - chance

@@ -279,7 +279,7 @@ def drag_of_patches(search: SearchModel, height: float) -> dict[str, float]:
     return {name: float(of / cells) for name, of, cells in zip(names, *sums, strict=True) if cells > 0.0 < of}
 
 
-def within_places(values: Array, start: float) -> tuple[float, Parameter]:
+def _within_places(values: Array, start: float) -> tuple[float, Parameter]:
     """A coordinate to start from, off the ends of all places, and its prior, uniform over them [m]."""
     low, high = float(values.min()), float(values.max())
     margin = 0.01 * (high - low)
@@ -320,7 +320,7 @@ def found_extent(
     width = Parameter(distribution="lognormal", median=float(places.width.min()), log_sd=log_sd, unit="m")
     trials = []
     for start in (spot.shapes, outline):
-        (x, of_x), (y, of_y) = within_places(places.x, start["x"]), within_places(places.y, start["y"])
+        (x, of_x), (y, of_y) = _within_places(places.x, start["x"]), _within_places(places.y, start["y"])
         shapes = {"x": x, "y": y, "length": start["length"], "width": start["width"]}
         candidate = place_candidate(effect, shapes, places.plausible, above_off)
         candidate = replace(candidate, fitted=(("x", of_x), ("y", of_y), ("length", length), ("width", width)))
@@ -398,7 +398,7 @@ def found_patch(
 
     trials = []
     for start in starts:
-        (x, of_x), (y, of_y) = within_places(places.x, start[0]), within_places(places.y, start[1])
+        (x, of_x), (y, of_y) = _within_places(places.x, start[0]), _within_places(places.y, start[1])
         half = {"length": 0.5 * scales.patch_length, "width": 0.5 * scales.patch_width}
         shapes = {"x": x, "y": y, **half, "angle": 0.0, "height": scales.canopy}
         shapes["proportional"] = float(case.numerics.emergent == "proportional")

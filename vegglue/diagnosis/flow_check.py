@@ -265,7 +265,7 @@ def remarks_on_discharges(case: Case, site: Site, observations: Observations) ->
     """Sections whose velocities clearly carry another discharge than stated; none of an experiment whose velocities or
     levels run the wrong way, as that is why.
     """
-    off, excused = mismatched_discharges(case, site, observations.table), misdirected(case, observations)
+    off, excused = mismatched_discharges(case, site, observations.table), _misdirected(case, observations)
     yield from discharge_mismatches([one for one in off if one.experiment not in excused])
 
 
@@ -274,7 +274,7 @@ def remarks_on_measured_discharges(case: Case, site: Site, observations: Observa
     which the same water flows; none of an experiment whose velocities run the wrong way, or beside values that no flow
     can have.
     """
-    table, excused = observations.table, misdirected(case, observations)
+    table, excused = observations.table, _misdirected(case, observations)
     rows = table[table["used"] & (table["kind"] == THROUGH_SECTION) & ~table["experiment"].isin(list(excused))]
     if rows.empty or implausible_values(case, site, table):
         return
@@ -376,7 +376,7 @@ def remarks_on_directions(case: Case, observations: Observations) -> Iterator[ob
         yield LevelsRiseDownstream(tuple(by), tuple(by.values()), first, last)
 
 
-def misdirected(case: Case, observations: Observations) -> tuple[str, ...]:
+def _misdirected(case: Case, observations: Observations) -> tuple[str, ...]:
     """Experiments with an odd direction, whose sections do not show what they carry."""
     upstream = [name for name, rows in _by_experiment(case, observations).items() if _median(rows) < 0.0]
     return (*exchanged_components(case, observations), *rising_levels(case, observations), *upstream)
@@ -457,7 +457,7 @@ class ProbeTurned:
     sections: int
 
 
-def to_one_side(angles: Array, errors: float, share: float) -> bool:
+def _to_one_side(angles: Array, errors: float, share: float) -> bool:
     """Whether FEWEST_CROSSED angles [degrees] or more have a mean beyond LEAST_ANGLE and so many of its standard errors
     [-], and a share of them [-] its sign.
     """
@@ -482,7 +482,7 @@ def remarks_on_turned_probes(observations: Observations) -> Iterator[ProbeTurned
     for y, rows in both.dropna(subset="off").groupby(both["y"].round(3)):
         off = rows["off"].to_numpy(float)
         # Both neighbours of a turned probe look turned by half of it the other way.
-        if rows["section"].nunique() > 1 and to_one_side(off, SURE_OF_A_PROBE, 1.0):
+        if rows["section"].nunique() > 1 and _to_one_side(off, SURE_OF_A_PROBE, 1.0):
             mean = float(off.mean())
             yield ProbeTurned(float(y), "left" if mean > 0.0 else "right", abs(mean), len(off))
 
@@ -491,7 +491,7 @@ def remarks_on_turned_velocities(case: Case, observations: Observations) -> Iter
     """Experiments whose velocities are turned to one side at nearly all sections, by more than chance makes; none with
     odd directions besides.
     """
-    odd = misdirected(case, observations)
+    odd = _misdirected(case, observations)
     angles: dict[str, pd.Series[float]] = {}  # atan(sum v / sum u) to the left [degrees], by section with enough places
     for name, rows in _by_experiment(case, observations).items():
         if name not in odd:
@@ -504,7 +504,7 @@ def remarks_on_turned_velocities(case: Case, observations: Observations) -> Iter
             v, u = (wide[(f"value_{part}", "sum")].to_numpy(float) for part in ("across", "along"))
             angles[name] = pd.Series(np.degrees(np.arctan2(v, u)), index=wide.index)
     sure = SURE_OF_AN_ANGLE, MOST_ON_ONE_SIDE
-    turned = {name: one for name, one in angles.items() if to_one_side(one.to_numpy(), *sure)}
+    turned = {name: one for name, one in angles.items() if _to_one_side(one.to_numpy(), *sure)}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         ones = {name: one for name, one in turned.items() if sign * one.mean() > 0.0}
         sections = {section for one in ones.values() for section in one.index}

@@ -269,7 +269,7 @@ def product_beside(
     if chance < 0.5:
         return None
     one = screening.products[screening.law_of[column]]
-    found = law_found(one, best, chance, total, screening.alike(column))
+    found = _law_found(one, best, chance, total, screening.alike(column))
     theta = theta_at(full.model.case, best.fitted.point.z[:-1])
     return ProductFound(found, best, float(theta[refit.candidate.parameter][0]))
 
@@ -333,7 +333,7 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
     for one, p in pairs:
         if isinstance(one.what, Refit) and one.kind == "law":
             law = tried[one.name]
-            held.append(law_found(law, one.what, float(p), one.log_evidence, screening.alike(one.column, law.law)))
+            held.append(_law_found(law, one.what, float(p), one.log_evidence, screening.alike(one.column, law.law)))
     found = Discovery(
         p=screening.p,
         tried=len(screening.laws),
@@ -421,7 +421,7 @@ def laws_beside_accepted(
     return *refitted_laws(screening, known, watch), known
 
 
-def law_found(tried: LawInCase, refit: Refit, chance: float, log_evidence: float, alike: tuple[str, ...]) -> LawFound:
+def _law_found(tried: LawInCase, refit: Refit, chance: float, log_evidence: float, alike: tuple[str, ...]) -> LawFound:
     """A law or a product as its refit has left it."""
     return LawFound(
         law=tried.law,

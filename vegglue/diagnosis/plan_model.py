@@ -106,7 +106,7 @@ class PlanModel:
         return self.draws[0].model
 
 
-def water_across(model: Model, experiment: str, x: float) -> tuple[Array, Array]:
+def _water_across(model: Model, experiment: str, x: float) -> tuple[Array, Array]:
     """y of the cells and the expected depth there [m] of one experiment at x."""
     site = in_experiment(model.site, experiment)
     depth = expected_depth(model.case, site, model.case.experiments[experiment])
@@ -119,7 +119,7 @@ def verticals_at(
     """y of the verticals of a transect [m] that are under water: at multiples of the spacing from the middle of the
     channel, or from the first end of `within`, so that they are the same in all experiments.
     """
-    y, depth = water_across(model, experiment, x)
+    y, depth = _water_across(model, experiment, x)
     low, high = (float(y[0]), float(y[-1])) if within is None else within
     start = low if within is not None else 0.5 * (low + high)
     steps = np.arange(np.ceil((low - start) / spacing - 1e-9), np.floor((high - start) / spacing + 1e-9) + 1.0)
@@ -178,12 +178,12 @@ def _piece(
             hours = costs.transect + len(places) * costs.vertical
             return PlannedPiece(Work.TRANSECT, experiment, one.x, places, hours, new, again) if places else None
         case PlannedPoint():
-            y, depth = water_across(model, experiment, one.x)
+            y, depth = _water_across(model, experiment, one.x)
             deep = float(np.interp(one.y, y, depth)) >= LEAST_PLANNED_DEPTH
             point = PlannedPiece(Work.POINT, experiment, one.x, (one.y,), costs.vertical, new, again)
             return point if deep else None
         case PlannedGauge():
-            y, depth = water_across(model, experiment, one.x)
+            y, depth = _water_across(model, experiment, one.x)
             wet = y[depth >= LEAST_PLANNED_DEPTH]
             if one.y is None and not wet.size:
                 return None
@@ -272,7 +272,7 @@ def _usual_spacing(model: Model, planned: Planned, velocity: pd.DataFrame) -> fl
             return float(np.median(steps))
     experiments = list(model.case.experiments)
     grid = model.site.grid
-    y, depth = water_across(model, experiments[len(experiments) // 2], float(grid.x[grid.x.size // 2]))
+    y, depth = _water_across(model, experiments[len(experiments) // 2], float(grid.x[grid.x.size // 2]))
     wet = y[depth >= LEAST_PLANNED_DEPTH]
     width = float(np.ptp(wet)) if wet.size > 1 else float(np.ptp(y))
     return float(f"{width / VERTICALS_ACROSS:.1g}")
@@ -409,7 +409,7 @@ def _plan_model(
     coarsest = in_own_flows(coarser(search) or search)
     places_of_prior = places_of_draws(len(model.names))
     middle, around = places_of_prior[0], places_of_prior[1:]
-    usual = [(one, usual_shapes(one)) for one in candidates]
+    usual = [(one, _usual_shapes(one)) for one in candidates]
 
     def draws(of: Model, points: Sequence[Point]) -> list[PlanDraw]:
         of_each = responses_at(of, points, _causes(of, usual)) if points else ()
@@ -459,7 +459,7 @@ def _plan_model(
     )
 
 
-def usual_shapes(candidate: Candidate) -> dict[str, float]:
+def _usual_shapes(candidate: Candidate) -> dict[str, float]:
     """The middle one of its settings."""
     settings = candidate.settings()
     return settings[len(settings) // 2]
@@ -529,7 +529,7 @@ def _at_plausible_size(model: Model, point: Point, candidates: Sequence[Candidat
     found = np.full((len(model.station), len(candidates), 2), np.nan)
 
     def change(j: int, one: Candidate) -> None:
-        amplitude, cause = one.amplitude, cause_of(model.case, one, usual_shapes(one))
+        amplitude, cause = one.amplitude, cause_of(model.case, one, _usual_shapes(one))
         sizes = amplitude.off + min(amplitude.scale, amplitude.furthest) * np.array([1.0, -1.0])
         prior = cause.case.parameters[cause.parameter]
         possible = np.flatnonzero((amplitude.low <= sizes) & (sizes <= amplitude.high))
@@ -625,7 +625,7 @@ def with_chosen(wide: PlanModel, chosen: Sequence[int]) -> PlanModel:
 
     def with_new(draw: PlanDraw) -> PlanDraw:
         model = replace(draw.model, station=station)
-        causes = _causes(model, [(one, usual_shapes(one)) for one in new])
+        causes = _causes(model, [(one, _usual_shapes(one)) for one in new])
         values = _with_rows(responses(model, draw.point, causes), count)
         return replace(draw, model=model, values=np.hstack([draw.values[:, kept], values]))
 

@@ -162,7 +162,7 @@ def step_found(
     Step
     """
     chance = chances_of(hypotheses)
-    found, groups = groups_of_rivals(screening, hypotheses)
+    found, groups = _groups_of_rivals(screening, hypotheses)
     base, least = screening.base, constants().rival_share * chance.max()
     # Of other kinds what is not negligible against the best.
     others = {
@@ -189,7 +189,7 @@ def step_found(
     return with_chances(step, step.accepted, found | others | {step.accepted: float(chance[accepted])})
 
 
-def groups_of_rivals(
+def _groups_of_rivals(
     screening: Screening, hypotheses: Sequence[Hypothesis]
 ) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
     """`rivals_among` the listed effects of the hypotheses."""
@@ -201,7 +201,7 @@ def groups_of_rivals(
     return rivals_among(names, chance[listed], cosine)
 
 
-def shared_anew(told: Mapping[str, float], followed: Sequence[str], chance: Array) -> dict[str, float]:
+def _shared_anew(told: Mapping[str, float], followed: Sequence[str], chance: Array) -> dict[str, float]:
     """Chances by name, once some have been followed further: the chances that they have together are shared anew.
 
     chance (k,): of each that was followed, were it one of them.
@@ -211,8 +211,8 @@ def shared_anew(told: Mapping[str, float], followed: Sequence[str], chance: Arra
 
 
 def followed_further(step: Step, followed: Sequence[str], chance: Array) -> Step:
-    """The step once some hypotheses have been followed further, see `shared_anew`; the accepted one is among them."""
-    return with_chances(step, step.accepted, shared_anew(step.chance | step.others, followed, chance))
+    """The step once some hypotheses have been followed further, see `_shared_anew`; the accepted one is among them."""
+    return with_chances(step, step.accepted, _shared_anew(step.chance | step.others, followed, chance))
 
 
 def place_followed_further(
@@ -262,7 +262,7 @@ def undecided_of(hypotheses: Sequence[Hypothesis], followed: Sequence[str], chan
     Undecided
     """
     told = dict(zip([one.name for one in hypotheses], map(float, chances_of(hypotheses)), strict=True))
-    told = shared_anew(told, followed, chance)
+    told = _shared_anew(told, followed, chance)
     return Undecided(tuple(hypotheses), tuple(told[one.name] for one in hypotheses))
 
 
@@ -449,7 +449,7 @@ def with_rivals_again(
 def leading_refit(screening: Screening, hypotheses: Sequence[Hypothesis]) -> int:
     """The listed effect that leads those of the trace of the most likely one, which come in this order."""
     first = next(one.name for one in hypotheses if one.kind == "effect")
-    _, groups = groups_of_rivals(screening, hypotheses)
+    _, groups = _groups_of_rivals(screening, hypotheses)
     group = next((one for one in groups if first in one), (first,))
     alike = [j for j, one in enumerate(hypotheses) if one.kind == "effect" and one.name in group]
     return alike[int(np.argmax(evidence_under_larger_errors(screening, [hypotheses[j] for j in alike])))]

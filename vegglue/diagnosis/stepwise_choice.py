@@ -189,7 +189,7 @@ def _needed_of(
             continue
         if without is not parent and any(gain < 0.0 for gain, _ in _gains(parent, without, judging).values()):
             continue
-        if is_off(named[name], last):
+        if is_near_off(last.values[named[name].parameter], named[name].off):
             return _needed_of(named, fewer, {**refused, name: AmplitudeNearOff()}, score_with)
         if not any(gain > 0.0 for gain, _ in _gains(without, last, judging).values()):
             return _needed_of(named, fewer, {**refused, name: NotNeeded()}, score_with)
@@ -217,11 +217,6 @@ def _known_of(
             others = {name: why for name, why in refused.items() if name != known}
             kept, refused = both, {**others, one.name: KnownInstead(known)}
     return kept, refused
-
-
-def is_off(one: Nominee, score: ModelScore) -> bool:
-    """Whether the amplitude lies within needed_errors standard errors of the value that does nothing."""
-    return is_near_off(score.values[one.parameter], one.off)
 
 
 def why_not_kept(

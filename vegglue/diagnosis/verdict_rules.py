@@ -221,14 +221,14 @@ def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt
         return replace(found, reasons=(doubt,))
     if laws.likelier:
         return replace(found, kind="none-of-these")
-    if inputs.instruments and all(map(is_clear, inputs.instruments)):
+    if inputs.instruments and all(map(_is_clear, inputs.instruments)):
         return replace(found, kind="instrument", instruments=inputs.instruments)
     return found
 
 
 def _silent(inputs: VerdictInputs, plain: Verdict) -> Verdict:
     """Nothing is missing, or an instrument is off, if silence is earned."""
-    clear = tuple(filter(is_clear, inputs.instruments))
+    clear = tuple(filter(_is_clear, inputs.instruments))
     all_clear = bool(clear) and len(clear) == len(inputs.instruments) and not inputs.neighbours
     named = inputs.instruments if all_clear else ()
     if inputs.misfit.p < constants().poor_fit_chance:
@@ -261,7 +261,7 @@ def _unearned(inputs: VerdictInputs) -> Reason | None:
     return None
 
 
-def is_clear(instrument: FaultyInstrument) -> bool:
+def _is_clear(instrument: FaultyInstrument) -> bool:
     """Whether an instrument is off by instrument_errors of its standard errors."""
     low, high = instrument.interval95
     return bool(abs(instrument.offset) > constants().instrument_errors * (high - low) / (2.0 * NORMAL95))
@@ -316,7 +316,7 @@ def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
     if errors.scale > 1 and not any(isinstance(one, verdict.ErrorsStillLarger) for one in found.remaining):
         yield verdict.StatedErrorsTooSmall(errors.scale)
     others = [one for one in inputs.instruments if one not in found.instruments]
-    yield from (verdict.InstrumentExcluded(one, is_clear(one), constants().instrument_errors) for one in others)
+    yield from (verdict.InstrumentExcluded(one, _is_clear(one), constants().instrument_errors) for one in others)
     elsewhere, alike = {*hidden, *accepted}, dict[str, list[CandidateEffect]]()
     blind = [one for one in inputs.candidates if not one.detectability.testable]
     unnamed = [one for one in blind if one.name not in {*elsewhere, *inputs.significant_effects}]

@@ -245,7 +245,7 @@ def _solve_all(
         if len(parts) < len(case.experiments):
             yield index, None
         else:
-            yield index, rows_of_chunk(case, observations, [parts[one] for one in case.experiments])
+            yield index, _rows_of_chunk(case, observations, [parts[one] for one in case.experiments])
             del ended[index]
 
 
@@ -269,7 +269,7 @@ def solve_chunk(
     if not given.
     """
     solve = partial(solve_in_experiment, case, site, observations, start_from)
-    return rows_of_chunk(case, observations, [solve(experiment, sample) for experiment in case.experiments])
+    return _rows_of_chunk(case, observations, [solve(experiment, sample) for experiment in case.experiments])
 
 
 def solve_in_experiment(
@@ -280,7 +280,7 @@ def solve_in_experiment(
     experiment: str,
     sample: PriorSample,
 ) -> Rows:
-    """What `rows_of_chunk` takes of one experiment: predictions (member, station of the experiment), section flows
+    """What `_rows_of_chunk` takes of one experiment: predictions (member, station of the experiment), section flows
     (member, section), fields (member, quantity, x, y), and the rest as it is stored.
     """
     began = time.perf_counter()
@@ -307,7 +307,7 @@ def solve_in_experiment(
     return rows | {"seconds": np.full(members, (time.perf_counter() - began) / members)}
 
 
-def rows_of_chunk(case: Case, observations: Observations, parts: list[Rows]) -> Rows:
+def _rows_of_chunk(case: Case, observations: Observations, parts: list[Rows]) -> Rows:
     """The rows of a chunk, of those of each experiment; a member that failed in one has no predictions."""
     rows = {
         "prediction": np.full((len(parts[0]["status"]), len(observations.table)), np.nan),

@@ -369,7 +369,7 @@ def parameter_of(posterior: Posterior, name: str, symbols: Mapping[str, str] | N
     return NamedParameter(name, (symbols or {}).get(name, name), posterior.sample.unit[name])
 
 
-def sizes_of(errors: Mapping[str, float]) -> Sizes:
+def _sizes_of(errors: Mapping[str, float]) -> Sizes:
     """Errors by kind of measurement."""
     return tuple((kind_of(name), float(value)) for name, value in errors.items())
 
@@ -395,7 +395,7 @@ def measurement_error(posterior: Posterior, kind: str) -> float:
 def sample_statements(posterior: Posterior, symbols: Mapping[str, str] | None = None) -> Iterator[object]:
     """How the members were made and weighed, and under which errors."""
     settings, sample, refined = posterior.settings, posterior.sample, posterior.refinement
-    sizes = sizes_of(posterior.fit.sigma)
+    sizes = _sizes_of(posterior.fit.sigma)
     if refined is None:
         yield EnsembleWeighed(
             sample.members, sample.failed, settings.likelihood, posterior.fit.used, len(posterior.station), sizes,
@@ -417,7 +417,7 @@ def sample_statements(posterior: Posterior, symbols: Mapping[str, str] | None = 
         yield ErrorsEstimated(sizes, tuple(kind_of(name) for name in sizes_as_stated(posterior.station)))
     else:
         stated = {kind: measurement_error(posterior, kind) for kind in posterior.fit.sigma}
-        yield ErrorsStated(sizes_of(stated), model.grid_error, sizes)
+        yield ErrorsStated(_sizes_of(stated), model.grid_error, sizes)
         if model.scale > 1.0:
             yield ErrorsScaled(model.scale)
     if model.correlation != 0.0:
@@ -523,7 +523,7 @@ def fit_statements(posterior: Posterior) -> Iterator[object]:
     fit, station = posterior.fit, posterior.station
     value, band = station["value"].to_numpy(float), posterior.predicted.total_band
     outside = ((value < band[0]) | (value > band[-1])) & station["used"].to_numpy()
-    yield MedianFit(sizes_of(fit.rmse), int(outside.sum()), fit.used)
+    yield MedianFit(_sizes_of(fit.rmse), int(outside.sum()), fit.used)
     if excluded := int((station["reason"] == Unused.EXCLUDED).sum()):
         yield ReadingsExcluded(excluded, len(station))
     if math.isfinite(fit.chi2) and posterior.refinement is None:
