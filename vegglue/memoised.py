@@ -13,7 +13,18 @@ Found = TypeVar("Found")
 
 
 def memoised(most: int) -> Callable[[Callable[Arguments, Found]], Callable[Arguments, Found]]:
-    """A decorator that keeps the `most` newest results, none of them None, by the values of all arguments."""
+    """A decorator that keeps the newest results of a function by the values of all arguments.
+
+    Parameters
+    ----------
+    most : int
+        Results that are kept, none of which may be None.
+
+    Returns
+    -------
+    callable
+        Of the function. A key is made of the numbers of arrays, the fields of values, and the text of all else.
+    """
 
     def of(compute: Callable[Arguments, Found]) -> Callable[Arguments, Found]:
         known = dict[bytes, Found]()

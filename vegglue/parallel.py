@@ -102,9 +102,21 @@ def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs
 def parallel_map(
     work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], finished: Callable[[int], None] = silent
 ) -> list[Any]:
-    """Compute work(*task) for every task, in their order, by the backend if there is one, else by threads.
+    """Compute work(*task) for every task, by the backend if there is one, else by threads.
 
-    Tasks that a task starts in its turn stay on its machine. finished: receives the number of tasks that are done.
+    Tasks that a task starts in its turn stay on its machine.
+
+    Parameters
+    ----------
+    work : callable
+    tasks : iterable of tuple
+    finished : callable
+        Is called with the number of tasks that are done.
+
+    Returns
+    -------
+    list
+        Results in the order of the tasks.
     """
     backend, waiting = _BACKEND.get(), list(tasks)
     if backend is None:
@@ -118,7 +130,18 @@ def parallel_map(
 
 @contextmanager
 def at_most(jobs: int) -> Iterator[None]:
-    """Limit the number of threads at once within; -1 for one on every core. Raises InputError for others below 1."""
+    """Limit the number of threads at once within.
+
+    Parameters
+    ----------
+    jobs : int
+        -1 for one on every core.
+
+    Raises
+    ------
+    InputError
+        For 0, and below -1.
+    """
     cores = cores_of(jobs)
     spare, allowed = _SPARE.set(Semaphore(cores - 1)), _CORES.set(cores)
     try:
@@ -143,10 +166,23 @@ def memory_of_machine() -> float:
 def in_threads(
     work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], finished: Callable[[int], None] = silent
 ) -> list[Any]:
-    """Compute work(*task) for every task, in their order, by threads: for compiled work on large shared values.
+    """Compute work(*task) for every task by threads: for compiled work on large shared values.
 
     Tasks are taken one by one, by this thread and by as many others as `at_most` allows while some wait; tasks that
-    start tasks of their own share these threads. finished: receives the number of tasks that are done.
+    start tasks of their own share these threads.
+
+    Parameters
+    ----------
+    work : callable
+        What it raises ends all tasks, and is raised here.
+    tasks : iterable of tuple
+    finished : callable
+        Is called with the number of tasks that are done.
+
+    Returns
+    -------
+    list
+        Results in the order of the tasks.
     """
     spare = _SPARE.get()
     if spare is None:
@@ -190,9 +226,17 @@ def in_threads(
 
 
 def submit(work: Callable[..., Any], *task: Any) -> Callable[[], Any]:
-    """Start work(*task) in a thread that `at_most` can spare; calling what is returned waits for the result.
+    """Start work(*task) in a thread that `at_most` can spare, else do it when the result is needed.
 
-    Without a spare thread the work is done when the result is needed.
+    Parameters
+    ----------
+    work : callable
+    *task : object
+
+    Returns
+    -------
+    callable
+        Waits for the result and returns it, or raises what the work raised.
     """
     spare = _SPARE.get()
     if spare is None or not spare.acquire(blocking=False):

@@ -21,9 +21,21 @@ LOCKED_BYTE = 1 << 40  # [bytes] from the beginning: beyond what is written, as 
 
 
 def lock(handle: int, shared: bool = False) -> None:
-    """Lock an open file until it is closed or its process ends; shared: others may hold such a lock, too.
+    """Lock an open file until it is closed or its process ends.
 
-    Raises BlockingIOError if another process holds the lock, and OSError if the file system has none.
+    Parameters
+    ----------
+    handle : int
+        Its descriptor.
+    shared : bool
+        Whether others may hold such a lock, too.
+
+    Raises
+    ------
+    BlockingIOError
+        If another process holds the lock.
+    OSError
+        If the file system has none.
     """
     try:
         import fcntl
@@ -78,7 +90,19 @@ def folder_within(folder: Path, name: str) -> Path:
 
 
 def write_file(path: Path, content: bytes, advice: str) -> None:
-    """Write a file whole or not at all. Errors: StorageError, which ends with the advice."""
+    """Write a file whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    content : bytes
+    advice : str
+        End of the sentence if it fails.
+
+    Raises
+    ------
+    StorageError
+    """
     with failed_writes_told(path, advice), whole_file(path) as file:
         file.write(content)
 
