@@ -252,12 +252,14 @@ def _plausible(
     noise: Noise, fingerprints: Fingerprints, instruments: Mapping[InstrumentKind, tuple[Instrument, ...]]
 ) -> Array:
     """Changes of predictions at used stations by all that could be missing or off, each of plausible size (n, c);
-    spots of spots_in_noise of theirs.
+    spots of spots_in_noise of theirs. Spots of drag side by side are a barrier: a hundred of these besides would leave
+    next to no misfit for errors.
     """
     sizes = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     parts = [noise.used(fingerprints.values) * sizes]
     of_spots = constants().spots_in_noise
-    parts += [noise.used(one.fingerprints) * (of_spots * one.plausible) for one in fingerprints.places]
+    spots = [one for one in fingerprints.places if one.term != "barrier"]
+    parts += [noise.used(one.fingerprints) * (of_spots * one.plausible) for one in spots]
     for name in ("position", "probe", "gauge"):
         columns = offset_columns(instruments[name], noise.rows.size)
         parts.append(columns * (plausible_offset(name) * float(np.median(noise.error))))
