@@ -30,7 +30,7 @@ MOST_APART, MOST_LEVEL_APART, MOST_AREA_APART = 0.15, 0.05, 0.15
 SHALLOW = 0.1
 
 
-def their_flows(model: Model) -> dict[str, TheirFlow]:
+def _their_flows(model: Model) -> dict[str, TheirFlow]:
     """The flow of the finished run in each experiment of a model. Raises InputError."""
     result = model.case.finished_result
     assert result is not None
@@ -55,7 +55,7 @@ def their_predictions(station: pd.DataFrame, flows: dict[str, TheirFlow], grid: 
     return found
 
 
-def their_place(model: Model) -> Array:
+def _their_place(model: Model) -> Array:
     """z_0 (q,) of the model without effects: the parameters of the finished run, 0 where it states none."""
     result = model.case.finished_result
     assert result is not None
@@ -88,7 +88,7 @@ def compared_flows(model: Model) -> ComparedFlows:
     InputError
         If a station in use lies where their flow is dry, or the built-in engine finds no flow.
     """
-    bare, z, flows = without_effects(model), their_place(model), their_flows(model)
+    bare, z, flows = without_effects(model), _their_place(model), _their_flows(model)
     own = linearise(bare, z)
     if own is None:
         raise InputError(

@@ -43,7 +43,7 @@ def collect(blocks, far, base, rates, colours, step):
 
 
 @compiled_exactly
-def put(into, values):
+def _put(into, values):
     """into = values, entry by entry: to assign arrays takes seconds to compile, for the words of its error."""
     for r in range(values.shape[0]):
         for c in range(values.shape[1]):
@@ -51,8 +51,8 @@ def put(into, values):
 
 
 @compiled_exactly
-def take_away(of, values):
-    """of -= values, entry by entry, as `put`."""
+def _take_away(of, values):
+    """of -= values, entry by entry, as `_put`."""
     for r in range(values.shape[0]):
         for c in range(values.shape[1]):
             of[r, c] -= values[r, c]
@@ -70,10 +70,10 @@ def factor(blocks, far):
                     for c in range(n):
                         blocks[i, 0, r, c] -= weight * blocks[i - 2, 2, r, c]
         if i > 0:
-            take_away(blocks[i, 1], np.dot(blocks[i, 0], blocks[i - 1, 2]))
-        put(blocks[i, 1], np.linalg.inv(blocks[i, 1]))
+            _take_away(blocks[i, 1], np.dot(blocks[i, 0], blocks[i - 1, 2]))
+        _put(blocks[i, 1], np.linalg.inv(blocks[i, 1]))
         if i < nx - 1:
-            put(blocks[i, 2], np.dot(blocks[i, 1], blocks[i, 2]))
+            _put(blocks[i, 2], np.dot(blocks[i, 1], blocks[i, 2]))
 
 
 @compiled_exactly
@@ -89,12 +89,12 @@ def solve(blocks, far, right):
                     part[r, k] -= far[i, r] * right[i - 2, r, k]
         if i > 0:
             np.dot(blocks[i, 0], right[i - 1], product)
-            take_away(part, product)
+            _take_away(part, product)
         np.dot(blocks[i, 1], part, product)
-        put(part, product)
+        _put(part, product)
     for i in range(nx - 2, -1, -1):
         np.dot(blocks[i, 2], right[i + 1], product)
-        take_away(right[i], product)
+        _take_away(right[i], product)
 
 
 @compiled_exactly
@@ -104,15 +104,15 @@ def solve_transposed(blocks, far, right):
     product = np.empty_like(right[0])
     for i in range(1, nx):
         np.dot(blocks[i - 1, 2].T, right[i - 1], product)
-        take_away(right[i], product)
+        _take_away(right[i], product)
     for i in range(nx - 1, -1, -1):
         part = right[i]
         if i < nx - 1:
             np.dot(blocks[i + 1, 0].T, right[i + 1], product)
-            take_away(part, product)
+            _take_away(part, product)
         if i < nx - 2:
             for r in range(n):
                 for k in range(m):
                     part[r, k] -= far[i + 2, r] * right[i + 2, r, k]
         np.dot(blocks[i, 1].T, part, product)
-        put(part, product)
+        _put(part, product)

@@ -119,7 +119,7 @@ class _Slots:
 
     def narrow(self) -> None:
         """Slots at work, and idle ones up to a width that is computed well."""
-        keep = np.argsort(~self.running, kind="stable")[: fitting_width(int(self.running.sum()))]
+        keep = np.argsort(~self.running, kind="stable")[: _fitting_width(int(self.running.sum()))]
         self.member, self.age = self.member[keep], self.age[keep]
         self.best, self.last, self.before = self.best[keep], self.last[keep], self.before[keep]
         self.running = self.running[keep]
@@ -139,7 +139,7 @@ def is_near_enough(size: Array, last: Array, before: Array, tolerance: float) ->
     return np.asarray(size * rate / (1.0 - rate) < tolerance)
 
 
-def fitting_width(members: int) -> int:
+def _fitting_width(members: int) -> int:
     """Slots [-] for so many members: the next multiple of SIDE_BY_SIDE, or as many if they are few."""
     return members if members <= SIDE_BY_SIDE // 2 else -(-members // SIDE_BY_SIDE) * SIDE_BY_SIDE
 
@@ -180,7 +180,7 @@ def stream(
     if not queue.size:
         return
     first, waiting, left = queue[:width], queue[width:], 0
-    count = fitting_width(first.size)  # idle slots behind, up to a width that is computed well
+    count = _fitting_width(first.size)  # idle slots behind, up to a width that is computed well
     slot = np.minimum(np.arange(count), first.size - 1)
     start = starts_of(first)[..., slot]
     part = take(problem, first[slot])
@@ -213,7 +213,7 @@ def stream(
         if waiting.size and (free.size >= ENTER or not working):
             free, entering, waiting = free[: waiting.size], waiting[: free.size], waiting[free.size :]
             slots.enter(free, entering, starts_of(entering))
-        elif not waiting.size and fitting_width(working) < slots.running.size:
+        elif not waiting.size and _fitting_width(working) < slots.running.size:
             slots.narrow()
 
 

@@ -34,7 +34,7 @@ class Bend(NamedTuple):
 
 
 @compiled_inside
-def at_cell(bend: Bend | None, column: int, rows: float) -> float:
+def _at_cell(bend: Bend | None, column: int, rows: float) -> float:
     """J [-] in a column of cells, so many rows north of the south edge; 1 on a straight grid."""
     if bend is None:
         return 1.0
@@ -42,7 +42,7 @@ def at_cell(bend: Bend | None, column: int, rows: float) -> float:
 
 
 @compiled_inside
-def at_face(bend: Bend | None, face: int, rows: float) -> float:
+def _at_face(bend: Bend | None, face: int, rows: float) -> float:
     """J [-] at the west-east faces, so many rows north of the south edge; 1 on a straight grid."""
     if bend is None:
         return 1.0
@@ -50,7 +50,7 @@ def at_face(bend: Bend | None, face: int, rows: float) -> float:
 
 
 @compiled_inside
-def columns_of(bend: Bend | None, first: int, stop: int) -> Bend | None:
+def _columns_of(bend: Bend | None, first: int, stop: int) -> Bend | None:
     """The bend of the columns first .. stop - 1."""
     if bend is None:
         return None
@@ -62,7 +62,7 @@ THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
 
 
 @compiled_inside
-def upwind(flux: float, far_left: float, left: float, right: float, far_right: float) -> float:
+def _upwind(flux: float, far_left: float, left: float, right: float, far_right: float) -> float:
     """Third-order upwind-biased value between `left` and `right` (kappa = 1/3; van Leer 1985)."""
     from_left = left + (right - left) * THIRD + (left - far_left) * SIXTH
     from_right = right + (left - right) * THIRD + (right - far_right) * SIXTH
@@ -70,33 +70,33 @@ def upwind(flux: float, far_left: float, left: float, right: float, far_right: f
 
 
 @compiled_inside
-def upwind_downstream(flux: float, far_left: float, left: float, right: float) -> float:
+def _upwind_downstream(flux: float, far_left: float, left: float, right: float) -> float:
     """The same where the flux runs downstream; first order against it, so that the Jacobian's blocks stay narrow."""
     return left + (right - left) * THIRD + (left - far_left) * SIXTH if flux > 0.0 else right
 
 
 @compiled_inside
-def flat(values):
+def _flat(values):
     """Rows and members of (n, rows, m) as one axis."""
     n, rows, m = values.shape
     return values.reshape((n, rows * m))
 
 
 @compiled_inside
-def end_of_rows(bend, first, size, m):
+def _end_of_rows(bend, first, size, m):
     """Where in a column what lies along one row, and is as long, ends: at its end, where the grid is straight."""
     return size if bend is None else first + m
 
 
 @compiled_inside
-def straight_on(out, last, before_it):
+def _straight_on(out, last, before_it):
     """Values (rows m,) one cell beyond the last: second order where a further neighbour is missing."""
     for t in range(out.size):
         out[t] = 2.0 * last[t] - before_it[t]
 
 
 @compiled_inside
-def beyond_outlet(out, last, before_it, carrier):
+def _beyond_outlet(out, last, before_it, carrier):
     """Values (rows m,) one cell beyond the outlet: straight on where water leaves; where it enters, as in the last.
 
     Straight on, water that enters would be carried from upstream, and whatever disturbs it would grow by |c| / dx.
@@ -106,14 +106,14 @@ def beyond_outlet(out, last, before_it, carrier):
 
 
 @compiled_inside
-def carrying(out, flux, depth, other_flux, other_depth):
+def _carrying(out, flux, depth, other_flux, other_depth):
     """Velocity [m/s] that carries momentum between two faces: their fluxes over their depths."""
     for t in range(out.size):
         out[t] = (flux[t] + other_flux[t]) / (depth[t] + other_depth[t])
 
 
 @compiled_inside
-def shear_at_corners(out, m, f, u, v, viscosity, corner, per_x, per_y, bend):
+def _shear_at_corners(out, m, f, u, v, viscosity, corner, per_x, per_y, bend):
     """h nu (du/dy + dv/dx) [m3/s2] at the corners ((ny + 1) m,) of west-east faces f; none at walls and ends."""
     nx, n = viscosity.shape
     a, b = max(f - 1, 0), min(f, nx - 1)
@@ -122,8 +122,8 @@ def shear_at_corners(out, m, f, u, v, viscosity, corner, per_x, per_y, bend):
     u_n, u_s, v_e, v_w, depth, found = u[f, m:], u[f, :-m], v[b, m:-m], v[a, m:-m], corner[f, m:-m], out[m:-m]
     stop = 0
     while stop < found.size:
-        first, stop = stop, end_of_rows(bend, stop, found.size, m)
-        stretch = at_face(bend, f, first // m + 1)
+        first, stop = stop, _end_of_rows(bend, stop, found.size, m)
+        stretch = _at_face(bend, f, first // m + 1)
         for t in range(first, stop):
             nu = 0.25 * (nu_a[t] + nu_b[t] + nu_c[t] + nu_d[t])
             turn = (u_n[t] - u_s[t]) * per_y + (v_e[t] - v_w[t]) * (per_x / stretch)
@@ -133,7 +133,7 @@ def shear_at_corners(out, m, f, u, v, viscosity, corner, per_x, per_y, bend):
 
 
 @compiled_inside
-def strain_along(out, m, f, u, v, viscosity, cell, per_x, bend):
+def _strain_along(out, m, f, u, v, viscosity, cell, per_x, bend):
     """2 h nu du/dx [m3/s2] of the cells (ny m,) of column f; none beyond the outlet."""
     if f == cell.shape[0]:
         out[:] = 0.0
@@ -141,8 +141,8 @@ def strain_along(out, m, f, u, v, viscosity, cell, per_x, bend):
     nu, h, u_e, u_w, v_s, v_n = viscosity[f], cell[f], u[f + 1], u[f], v[f, :-m], v[f, m:]
     stop = 0
     while stop < out.size:
-        first, stop = stop, end_of_rows(bend, stop, out.size, m)
-        stretch = at_cell(bend, f, first // m + 0.5)
+        first, stop = stop, _end_of_rows(bend, stop, out.size, m)
+        stretch = _at_cell(bend, f, first // m + 0.5)
         for t in range(first, stop):
             out[t] = 2.0 * (nu[t] * h[t] * (u_e[t] - u_w[t])) * (per_x / stretch)
             if bend is not None:
@@ -151,33 +151,33 @@ def strain_along(out, m, f, u, v, viscosity, cell, per_x, bend):
 
 
 @compiled_inside
-def beside_x(out, bend, f, m, per_x):
+def _beside_x(out, bend, f, m, per_x):
     """1 / (J dx) [1/m] of west-east face f, and (J / that J)^2 at its south and its north end [-], into (3, ny m)."""
     for j in range(out.shape[1] // m):
-        stretch = at_face(bend, f, j + 0.5)
-        lift_s, lift_n = at_face(bend, f, j) / stretch, at_face(bend, f, j + 1) / stretch
+        stretch = _at_face(bend, f, j + 0.5)
+        lift_s, lift_n = _at_face(bend, f, j) / stretch, _at_face(bend, f, j + 1) / stretch
         for t in range(j * m, j * m + m):
             out[0, t], out[1, t], out[2, t] = per_x / stretch, lift_s * lift_s, lift_n * lift_n
 
 
 @compiled_inside
-def beside_y(out, bend, i, m, per_x):
-    """The fluxes of `south_of` for the rows 1 .. ny - 1 of column i, into (3, (ny - 1) m)."""
+def _beside_y(out, bend, i, m, per_x):
+    """The fluxes of `_south_of` for the rows 1 .. ny - 1 of column i, into (3, (ny - 1) m)."""
     for j in range(out.shape[1] // m):
-        per_length, lift_s, lift_n = south_of(bend, i, j + 1, per_x)
+        per_length, lift_s, lift_n = _south_of(bend, i, j + 1, per_x)
         for t in range(j * m, j * m + m):
             out[0, t], out[1, t], out[2, t] = per_length, lift_s, lift_n
 
 
 @compiled_inside
-def south_of(bend, i, j, per_x):
+def _south_of(bend, i, j, per_x):
     """1 / (J dx) [1/m] of the south face of a cell, and J / that J in the cells south and north of it [-]."""
-    stretch = at_cell(bend, i, j)
-    return per_x / stretch, at_cell(bend, i, j - 0.5) / stretch, at_cell(bend, i, j + 0.5) / stretch
+    stretch = _at_cell(bend, i, j)
+    return per_x / stretch, _at_cell(bend, i, j - 0.5) / stretch, _at_cell(bend, i, j + 0.5) / stretch
 
 
 @compiled_inside
-def with_rows_beyond(out, row, m):
+def _with_rows_beyond(out, row, m):
     """Values (rows m,) with the first and the last row twice more at their ends, into out ((rows + 4) m,)."""
     n = row.size
     for t in range(n):
@@ -187,13 +187,13 @@ def with_rows_beyond(out, row, m):
 
 
 @compiled_inside
-def rows_around(wide, m):
+def _rows_around(wide, m):
     """Of such a column what stands two rows and one south of each row, there, and one and two rows north."""
     return wide[: -4 * m], wide[m : -3 * m], wide[2 * m : -2 * m], wide[3 * m : -m], wide[4 * m :]
 
 
 @compiled_inside
-def level_drop(out, f, level, outlet_level):
+def _level_drop(out, f, level, outlet_level):
     """Rise of the level [m] over the east face f of cells (ny m,), from the last ones twice that to the outlet."""
     m = outlet_level.size
     for t in range(out.size):
@@ -222,7 +222,7 @@ def _neighbours_of_u(far, near, east, f, u, carrier, flux, face, cell):
     """
     nx, n = cell.shape
     if f == nx:
-        beyond_outlet(east, u[nx], u[nx - 1], carrier)
+        _beyond_outlet(east, u[nx], u[nx - 1], carrier)
     if f == 1:
         for t in range(n):
             # At a waterline no water is as fast as the flux over the depth of a cell far thinner than its face.
@@ -230,7 +230,7 @@ def _neighbours_of_u(far, near, east, f, u, carrier, flux, face, cell):
             near[t] = (flux[0, t] + flux[1, t]) / thick - u[1, t]
     west = u[f - 1] if f > 1 else near
     if f <= 2:
-        straight_on(far, west, u[f])
+        _straight_on(far, west, u[f])
     return u[f - 2] if f > 2 else far, west, u[f + 1] if f < nx else east
 
 
@@ -249,17 +249,17 @@ def _neighbours_of_v(far, near, east, m, i, v, carrier):
     """
     last = v.shape[0] - 1
     if i == last:
-        beyond_outlet(east[m:-m], v[i, m:-m], v[max(i - 1, 0), m:-m], carrier)
+        _beyond_outlet(east[m:-m], v[i, m:-m], v[max(i - 1, 0), m:-m], carrier)
     if i == 0:
         _turned(near, v[0])
-        straight_on(far, near, v[0])
+        _straight_on(far, near, v[0])
     if i == 1:
         _turned(far, v[0])
     return v[i - 2] if i > 1 else far, v[i - 1] if i > 0 else near, v[i + 1] if i < last else east
 
 
 @compiled_inside
-def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy, bend):
+def _momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy, bend):
     """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes."""
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
@@ -267,24 +267,24 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
     west, east, before, behind, drop = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     side, shear, wide = np.empty(n + m), np.empty(n + m), np.empty(n + 4 * m)
     ends, lengths = np.empty((3, n)), np.empty((3, n))
-    beside_x(lengths, bend, first + 1, m, per_x)
-    carrying(east, flux_x[first], face_x[first], flux_x[first + 1], face_x[first + 1])
-    strain_along(behind, m, first, u, v, viscosity, cell, per_x, bend)
+    _beside_x(lengths, bend, first + 1, m, per_x)
+    _carrying(east, flux_x[first], face_x[first], flux_x[first + 1], face_x[first + 1])
+    _strain_along(behind, m, first, u, v, viscosity, cell, per_x, bend)
     for f in range(first + 1, stop + 1):
         a, b, f2 = f - 1, min(f, nx - 1), min(f + 1, nx)
         west, east, before, behind = east, west, behind, before
-        carrying(east, flux_x[f], face_x[f], flux_x[f2], face_x[f2])
+        _carrying(east, flux_x[f], face_x[f], flux_x[f2], face_x[f2])
         of_u = _neighbours_of_u(ends[0], ends[1], ends[2], f, u, east, flux_x, face_x, cell)
-        strain_along(behind, m, f, u, v, viscosity, cell, per_x, bend)
-        carrying(side, flux_y[a], face_y[a], flux_y[b], face_y[b])
-        shear_at_corners(shear, m, f, u, v, viscosity, corner, per_x, per_y, bend)
-        level_drop(drop, f, level, outlet_level)
-        with_rows_beyond(wide, u[f], m)
+        _strain_along(behind, m, f, u, v, viscosity, cell, per_x, bend)
+        _carrying(side, flux_y[a], face_y[a], flux_y[b], face_y[b])
+        _shear_at_corners(shear, m, f, u, v, viscosity, corner, per_x, per_y, bend)
+        _level_drop(drop, f, level, outlet_level)
+        _with_rows_beyond(wide, u[f], m)
         if bend is not None:
-            beside_x(lengths, bend, f, m, per_x)
+            _beside_x(lengths, bend, f, m, per_x)
         _u_of_column(
             out[offset + a - first, 2],
-            (*rows_around(wide, m), *of_u),
+            (*_rows_around(wide, m), *of_u),
             (west, east, side[:-m], side[m:]),
             (v[a, :-m], v[a, m:], v[b, :-m], v[b, m:]),
             (before, behind, shear[:-m], shear[m:], per_y),
@@ -303,7 +303,7 @@ def momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outl
 
 @compiled_inside
 def _u_of_column(out, of_u, carriers, of_v, stresses, column, lengths, bend, f, dx):
-    """`momentum_x` of one column; all are (ny m,) but per_y and half_per_film."""
+    """`_momentum_x` of one column; all are (ny m,) but per_y and half_per_film."""
     u_ss, u_s1, u_here, u_n1, u_nn, u_ww, u_w1, u_e1 = of_u
     c_west, c_east, c_south, c_north = carriers
     v_1, v_2, v_3, v_4 = of_v
@@ -313,10 +313,10 @@ def _u_of_column(out, of_u, carriers, of_v, stresses, column, lengths, bend, f, 
     for t in range(out.size):
         here = u_here[t]
         c_w, c_e, c_s, c_n = c_west[t], c_east[t], c_south[t], c_north[t]
-        u_w = upwind_downstream(c_w, u_ww[t], u_w1[t], here)
-        u_e = upwind_downstream(c_e, u_w1[t], here, u_e1[t])
-        u_s = upwind(c_s, u_ss[t], u_s1[t], here, u_n1[t])
-        u_n = upwind(c_n, u_s1[t], here, u_n1[t], u_nn[t])
+        u_w = _upwind_downstream(c_w, u_ww[t], u_w1[t], here)
+        u_e = _upwind_downstream(c_e, u_w1[t], here, u_e1[t])
+        u_s = _upwind(c_s, u_ss[t], u_s1[t], here, u_n1[t])
+        u_n = _upwind(c_n, u_s1[t], here, u_n1[t], u_nn[t])
         carried = (c_e * (u_e - here) - c_w * (u_w - here)) * per_length[t] + (
             c_n * (u_n - here) - c_s * (u_s - here)
         ) * per_y
@@ -332,7 +332,7 @@ def _u_of_column(out, of_u, carriers, of_v, stresses, column, lengths, bend, f, 
 
 
 @compiled_inside
-def momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, film, dx, dy, bend):
+def _momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, film, dx, dy, bend):
     """Rate R_v [m/s2] on the south faces of columns first .. stop - 1, into out[offset ..]; rows 1 .. ny - 1 only."""
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
@@ -340,23 +340,23 @@ def momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, f
     west, east, side, strain = np.empty(n - m), np.empty(n - m), np.empty(n), np.zeros(n)
     before, behind, wide = np.empty(n + m), np.empty(n + m), np.empty(n + 5 * m)
     ends, lengths = np.empty((3, n + m)), np.empty((3, n - m))
-    beside_y(lengths, bend, first, m, per_x)
-    carrying(east, flux_x[first, :-m], face_x[first, :-m], flux_x[first, m:], face_x[first, m:])
-    shear_at_corners(behind, m, first, u, v, viscosity, corner, per_x, per_y, bend)
+    _beside_y(lengths, bend, first, m, per_x)
+    _carrying(east, flux_x[first, :-m], face_x[first, :-m], flux_x[first, m:], face_x[first, m:])
+    _shear_at_corners(behind, m, first, u, v, viscosity, corner, per_x, per_y, bend)
     for i in range(first, stop):
         f = i + 1
         west, east, before, behind = east, west, behind, before
-        carrying(east, flux_x[f, :-m], face_x[f, :-m], flux_x[f, m:], face_x[f, m:])
+        _carrying(east, flux_x[f, :-m], face_x[f, :-m], flux_x[f, m:], face_x[f, m:])
         v1, v2, v3 = _neighbours_of_v(ends[0], ends[1], ends[2], m, i, v, east)
-        shear_at_corners(behind, m, f, u, v, viscosity, corner, per_x, per_y, bend)
-        carrying(side, flux_y[i, :-m], face_y[i, :-m], flux_y[i, m:], face_y[i, m:])
-        with_rows_beyond(wide, v[i], m)
+        _shear_at_corners(behind, m, f, u, v, viscosity, corner, per_x, per_y, bend)
+        _carrying(side, flux_y[i, :-m], face_y[i, :-m], flux_y[i, m:], face_y[i, m:])
+        _with_rows_beyond(wide, v[i], m)
         if bend is not None:
-            strain_along(strain, m, i, u, v, viscosity, cell, per_x, bend)
-            beside_y(lengths, bend, i, m, per_x)
+            _strain_along(strain, m, i, u, v, viscosity, cell, per_x, bend)
+            _beside_y(lengths, bend, i, m, per_x)
         _v_of_column(
             out[offset + i - first, 1, m:],
-            (*rows_around(wide[m:-m], m), v1[m:-m], v2[m:-m], v3[m:-m]),
+            (*_rows_around(wide[m:-m], m), v1[m:-m], v2[m:-m], v3[m:-m]),
             (west, east, side[:-m], side[m:]),
             (u[i, m:], u[f, m:], u[i, :-m], u[f, :-m]),
             (before[m:-m], behind[m:-m], strain[:-m], strain[m:], viscosity[i, :-m], viscosity[i, m:], per_y),
@@ -371,7 +371,7 @@ def momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, f
 
 @compiled_inside
 def _v_of_column(out, of_v, carriers, of_u, stresses, column, levels, lengths, bend, i, dx):
-    """`momentum_y` of one column; all are ((ny - 1) m,) but per_y and half_per_film."""
+    """`_momentum_y` of one column; all are ((ny - 1) m,) but per_y and half_per_film."""
     v_ss, v_s1, v_here, v_n1, v_nn, v_ww, v_w1, v_e1 = of_v
     c_west, c_east, c_south, c_north = carriers
     u_1, u_2, u_3, u_4 = of_u
@@ -382,10 +382,10 @@ def _v_of_column(out, of_v, carriers, of_u, stresses, column, levels, lengths, b
     for t in range(out.size):
         here = v_here[t]
         c_s, c_n, c_w, c_e = c_south[t], c_north[t], c_west[t], c_east[t]
-        v_s = upwind(c_s, v_ss[t], v_s1[t], here, v_n1[t])
-        v_n = upwind(c_n, v_s1[t], here, v_n1[t], v_nn[t])
-        v_w = upwind_downstream(c_w, v_ww[t], v_w1[t], here)
-        v_e = upwind_downstream(c_e, v_w1[t], here, v_e1[t])
+        v_s = _upwind(c_s, v_ss[t], v_s1[t], here, v_n1[t])
+        v_n = _upwind(c_n, v_s1[t], here, v_n1[t], v_nn[t])
+        v_w = _upwind_downstream(c_w, v_ww[t], v_w1[t], here)
+        v_e = _upwind_downstream(c_e, v_w1[t], here, v_e1[t])
         carried = (c_e * (v_e - here) - c_w * (v_w - here)) * per_length[t] + (
             c_n * (v_n - here) - c_s * (v_s - here)
         ) * per_y
@@ -405,17 +405,17 @@ def _v_of_column(out, of_v, carriers, of_u, stresses, column, levels, lengths, b
 
 
 @compiled
-def continuity(out, offset, first, stop, m, flux_x, flux_y, dx, dy, bend):
+def _continuity(out, offset, first, stop, m, flux_x, flux_y, dx, dy, bend):
     """Rate R_level = d(hu)/dx + d(hv)/dy [m/s] of columns first .. stop - 1, into out[offset ..]."""
     per_x, per_y = 1.0 / dx, 1.0 / dy
     for i in range(first, stop):
         west, east, south, north = flux_x[i], flux_x[i + 1], flux_y[i, :-m], flux_y[i, m:]
         found, end = out[offset + i - first, 0], 0
         while end < found.size:
-            begin, end = end, end_of_rows(bend, end, found.size, m)
+            begin, end = end, _end_of_rows(bend, end, found.size, m)
             j = begin // m
-            stretch = at_cell(bend, i, j + 0.5)
-            lift_s, lift_n = at_cell(bend, i, j) / stretch, at_cell(bend, i, j + 1) / stretch
+            stretch = _at_cell(bend, i, j + 0.5)
+            lift_s, lift_n = _at_cell(bend, i, j) / stretch, _at_cell(bend, i, j + 1) / stretch
             for t in range(begin, end):
                 along = (east[t] - west[t]) * (per_x / stretch)
                 found[t] = along + (lift_n * north[t] - lift_s * south[t]) * per_y
@@ -433,8 +433,8 @@ def push(out, depth, x, y, xx, xy, yy, film, dx, dy, bend):
     along, across = _pushed_at_centres(depth, x, y, xx, xy, dx, dy, bend)
     for i in range(nx):
         for j in range(ny):
-            _, lift_s, lift_n = south_of(bend, i, j, 1.0)
-            length = dx * at_face(bend, i + 1, j + 0.5)
+            _, lift_s, lift_n = _south_of(bend, i, j, 1.0)
+            length = dx * _at_face(bend, i + 1, j + 0.5)
             for k in range(m):
                 here = depth[i, j, k]
                 if i + 1 < nx:
@@ -461,8 +461,8 @@ def _pushed_at_centres(depth, x, y, xx, xy, dx, dy, bend):
     for i in range(nx):
         before, after = max(i - 1, 0), min(i + 1, nx - 1)
         for j in range(ny):
-            stretch = at_cell(bend, i, j + 0.5)
-            lift_s, lift_n = at_cell(bend, i, j - 0.5) / stretch, at_cell(bend, i, j + 1.5) / stretch
+            stretch = _at_cell(bend, i, j + 0.5)
+            lift_s, lift_n = _at_cell(bend, i, j - 0.5) / stretch, _at_cell(bend, i, j + 1.5) / stretch
             lift_s, lift_n = lift_s * lift_s, lift_n * lift_n
             for k in range(m):
                 if x.size:
@@ -524,20 +524,20 @@ def rates(
 ):
     """R(state), (nx, 3, ny, m), strip by strip so that what lies between fits the cache."""
     nx, _, ny, m = state.shape
-    out, friction, mixing = np.empty((nx, 3, ny * m)), flat(drag), flat(viscosity)
+    out, friction, mixing = np.empty((nx, 3, ny * m)), _flat(drag), _flat(viscosity)
     for first in range(0, nx, STRIP):
         stop = min(first + STRIP, nx)
         a, b = max(first - HALO, 0), min(stop + HALO, nx)
         level = state[a:b, 0].copy()
         cell, face_x, face_y, corner = depths(level, bed[a:b], rise[a:b], half_range[a:b], film, smallest, outlet_level)
         u, v = velocities(state, a, b, cell, west, south, north)
-        flux_x, flux_y, flow = flat(face_x * u), flat(face_y * v), (flat(level), flat(u), flat(v))
-        wet = (flat(cell), flat(face_x), flat(face_y), flat(corner), flux_x, flux_y)
-        lo, hi, here, law = first - a, stop - a, columns_of(bend, a, b), (friction[a:b], mixing[a:b])
-        continuity(out, first, lo, hi, m, flux_x, flux_y, dx, dy, here)
-        momentum_y(out, first, lo, hi, m, *flow, wet, *law, film, dx, dy, here)
-        momentum_x(out, first, lo, hi, *flow, wet, *law, outlet, outlet_level, film, dx, dy, here)
-        for i in range(first, stop):  # not by slices: to assign arrays takes seconds to compile, see `put`
+        flux_x, flux_y, flow = _flat(face_x * u), _flat(face_y * v), (_flat(level), _flat(u), _flat(v))
+        wet = (_flat(cell), _flat(face_x), _flat(face_y), _flat(corner), flux_x, flux_y)
+        lo, hi, here, law = first - a, stop - a, _columns_of(bend, a, b), (friction[a:b], mixing[a:b])
+        _continuity(out, first, lo, hi, m, flux_x, flux_y, dx, dy, here)
+        _momentum_y(out, first, lo, hi, m, *flow, wet, *law, film, dx, dy, here)
+        _momentum_x(out, first, lo, hi, *flow, wet, *law, outlet, outlet_level, film, dx, dy, here)
+        for i in range(first, stop):  # not by slices: to assign arrays takes seconds to compile, see `block_elimination`
             for k in range(m):
                 out[i, 1, k] = state[i, 1, 0, k]
     return out.reshape((nx, 3, ny, m))

@@ -21,7 +21,7 @@ from vegglue.flow.problem import LEVEL, Problem, stretch_of_cells
 
 
 @compiled_exactly
-def sweep_x(change, face_x, stored, weight, outlet, time_step, theta, dx):
+def _sweep_x(change, face_x, stored, weight, outlet, time_step, theta, dx):
     """Thomas sweeps along x in place: level and u of `change`; weight (nx, ny, m) of the east face of each cell."""
     nx, _, ny, m = change.shape
     upper, right = np.empty((nx, m)), np.empty((nx, m))
@@ -58,7 +58,7 @@ def sweep_x(change, face_x, stored, weight, outlet, time_step, theta, dx):
 
 
 @compiled_exactly
-def sweep_y(change, face_y, stored, weight, time_step, theta, dy):
+def _sweep_y(change, face_y, stored, weight, time_step, theta, dy):
     """Thomas sweeps along y in place: level and v of `change`; weight (nx, ny, m) of the south face of each cell."""
     nx, _, ny, m = change.shape
     upper, right = np.empty((ny, m)), np.empty((ny, m))
@@ -126,8 +126,8 @@ def advance(problem: Problem, state: Array, time_step: float, theta: float) -> A
         along[:, row] += 2.0 * rate * np.sqrt(now.u[1:, row] ** 2 + REST_SPEED**2)
     across[:, 1:] = np.maximum(cell[:, 1:], cell[:, :-1])
     change = -residual_of(problem, state, now.cell, side_fluxes(problem, now.cell), closed)
-    sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, length)
-    sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
+    _sweep_x(change, now.face_x, wet, 1.0 / time_step + along, outlet, time_step, theta, length)
+    _sweep_y(change, now.face_y, wet, 1.0 / time_step + across, time_step, theta, problem.dy)
     return change
 
 

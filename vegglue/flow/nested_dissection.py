@@ -151,7 +151,7 @@ def collect_stencil(values, far, base, rates, colours, step):
 
 
 @compiled_exactly
-def compact(values, far):
+def _compact(values, far):
     """M (nx, ny, 3, 3, 3, 3) of A, see `collect_stencil`: entries of second cells are put down to first ones."""
     nx, ny = values.shape[0], values.shape[1]
     found = np.zeros((nx, ny, 3, 3, 3, 3), np.float32)
@@ -169,7 +169,7 @@ def compact(values, far):
 
 
 @compiled_exactly
-def times(product, values, far, x, place, transposed):
+def _times(product, values, far, x, place, transposed):
     """product -= A x, or A' x; x (3 cell, n), cells in the order of elimination, in which each has its place."""
     nx, ny, n = values.shape[0], values.shape[1], x.shape[1]
     for i in range(nx):
@@ -244,7 +244,7 @@ def _add_front(d, u, low, c, to, part):
 
 
 @compiled_exactly
-def factor_parts(near, own_start, own, around_start, around, above, child_start, children, starts, memory):
+def _factor_parts(near, own_start, own, around_start, around, above, child_start, children, starts, memory):
     """D^-1, L and G of all parts, into the memory of each (starts (3, part + 1): where each begins in memory)."""
     inverse, lower, upper = memory
     place = np.full(near.shape[0] * near.shape[1], -1)
@@ -282,7 +282,7 @@ def factor_parts(near, own_start, own, around_start, around, above, child_start,
 
 
 @compiled_exactly
-def solve_parts(right, own_start, around_start, beside, starts, memory, transposed):
+def _solve_parts(right, own_start, around_start, beside, starts, memory, transposed):
     """M x = right, or M' x = right, in place; right (3 cell, n) or (3 cell,), cells in the order of elimination.
 
     beside: places of the cells around each part in that order.
@@ -358,7 +358,7 @@ class SparseFactors:
             some, step = work[:, : len(at) * left.size].reshape(2, len(at), left.size)
             np.take(found, left, 1, some, "clip")
             np.take(rows, left, 1, step, "clip")
-            times(step, self.values, self.far, some, place, transposed)
+            _times(step, self.values, self.far, some, place, transposed)
             self._by_parts(memory, step, transposed)
             some += step
             found[:, left] = some
@@ -372,7 +372,7 @@ class SparseFactors:
         nx, ny = self.values.shape[:2]
         x = np.random.default_rng(0).uniform(-1.0, 1.0, (3 * nx * ny, 1)).astype(np.float32)[_rows_in_order(nx, ny)]
         back = np.zeros_like(x)
-        times(back, self.values, self.far, x, dissection(nx, ny).place, False)
+        _times(back, self.values, self.far, x, dissection(nx, ny).place, False)
         self._by_parts(self._memory(), back, False)
         return float(np.abs(x + back).max()) <= 1.0
 
@@ -380,7 +380,7 @@ class SparseFactors:
         """M x = right, or M' x = right, in place; right (3 cell, n), cells in the order of elimination."""
         parts = dissection(*self.values.shape[:2])
         one = right[:, 0] if right.shape[1] == 1 else right  # products with one vector need no packing
-        solve_parts(one, parts.own_start, parts.around_start, parts.beside, parts.memory_start, memory, transposed)
+        _solve_parts(one, parts.own_start, parts.around_start, parts.beside, parts.memory_start, memory, transposed)
 
     def _memory(self) -> tuple[Single, ...]:
         """The factors, made again to the same bits if need be; those used longest ago make room before."""
@@ -442,8 +442,8 @@ def _factors_of(values: Single, far: Single, by_blocks: bool) -> tuple[Single, .
         return blocks
     parts = dissection(nx, ny)
     inverse, lower, upper = (np.empty(start[-1], np.float32) for start in parts.memory_start)
-    factor_parts(
-        compact(values, far), parts.own_start, parts.own, parts.around_start, parts.around, parts.above,
+    _factor_parts(
+        _compact(values, far), parts.own_start, parts.own, parts.around_start, parts.around, parts.above,
         parts.child_start, parts.children, parts.memory_start, (inverse, lower, upper),
     )  # fmt: skip
     return inverse, lower, upper

@@ -103,7 +103,7 @@ def _under_effects(case: Case, site: Site, experiment: str, theta: Theta) -> dic
     position = np.zeros((len(cells), longest, 1))
     for inflow, some in enumerate(cells):
         position[inflow, : some.size, 0] = (np.arange(some.size) + 0.5) / some.size * 2.0 - 1.0
-    values = boundary_values(
+    values = _boundary_values(
         effects,
         BoundaryValues(
             discharge=np.array([value_of(setting.discharge[name], theta, members) for name in case.inflows]),
@@ -154,7 +154,7 @@ def _under_effects(case: Case, site: Site, experiment: str, theta: Theta) -> dic
     }
 
 
-def boundary_values(effects: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
+def _boundary_values(effects: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
     """What enters and leaves after the effects of the stage boundary."""
     neutral = {name: getattr(boundary, name) for name in REPLACED["boundary"]}
     return BoundaryValues(**applied(effects, "boundary", boundary, neutral), position=boundary.position)

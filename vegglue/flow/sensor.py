@@ -72,7 +72,7 @@ class Reader:
     weights: OfStations  # d reading / d state (nx, 3, ny, station) of the first member
 
 
-def bilinear(field: Array, grid: Grid, x: Array, y: Array) -> Array:
+def _bilinear(field: Array, grid: Grid, x: Array, y: Array) -> Array:
     """field (nx, ny, m) at points, (points, m); beyond the outermost centres the value of the outermost."""
     i, along = between(x, grid.x[0], grid.dx, grid.x.size)
     j, beside = between(y, grid.y[0], grid.dy, grid.y.size)
@@ -109,14 +109,14 @@ def _no_weights(flow: GriddedFlow, stations: int) -> Array:
     return np.zeros((*flow.state.shape[:3], stations))
 
 
-def level_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def _level_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     weights = _no_weights(flow, x.size)
     for column, row, share in _surrounding_centres(flow.grid, x, y):
         weights[column, LEVEL, row, np.arange(x.size)] += share
     return weights
 
 
-def u_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def _u_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     """The face in the west, at which the inflow sets u, counts as given."""
     weights = _no_weights(flow, x.size)
     for column, row, share in _surrounding_centres(flow.grid, x, y):
@@ -125,7 +125,7 @@ def u_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     return weights
 
 
-def v_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def _v_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     """The faces on the sides of the grid, at which walls and inflows set v, count as given."""
     weights, last = _no_weights(flow, x.size), flow.grid.y.size - 1
     for column, row, share in _surrounding_centres(flow.grid, x, y):
@@ -137,14 +137,14 @@ def v_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
 def _of_field(field: Callable[[GriddedFlow], Array], weights: OfStations) -> Reader:
     """Of what is interpolated between cell centres."""
     return Reader(
-        read=lambda flow, x, y: bilinear(field(flow), flow.grid, x, y),
-        slope_across=lambda flow, x, y: bilinear(across(field(flow), flow.grid.dy), flow.grid, x, y),
+        read=lambda flow, x, y: _bilinear(field(flow), flow.grid, x, y),
+        slope_across=lambda flow, x, y: _bilinear(across(field(flow), flow.grid.dy), flow.grid, x, y),
         weights=weights,
     )
 
 
-ALONG_X = _of_field(lambda flow: flow.u, u_weights)
-ACROSS_X = _of_field(lambda flow: flow.v, v_weights)
+ALONG_X = _of_field(lambda flow: flow.u, _u_weights)
+ACROSS_X = _of_field(lambda flow: flow.v, _v_weights)
 
 
 def _of_speed(of_u: Array, of_v: Array, u: Array, v: Array) -> Array:
@@ -152,17 +152,17 @@ def _of_speed(of_u: Array, of_v: Array, u: Array, v: Array) -> Array:
     return (u * of_u + v * of_v) / np.maximum(np.hypot(u, v), LEAST_SPEED)
 
 
-def speed_slope(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def _speed_slope(flow: GriddedFlow, x: Array, y: Array) -> Array:
     of_u, of_v = (one.slope_across(flow, x, y) for one in (ALONG_X, ACROSS_X))
     return _of_speed(of_u, of_v, ALONG_X.read(flow, x, y), ACROSS_X.read(flow, x, y))
 
 
-def speed_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def _speed_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     u, v = (one.read(flow, x, y)[:, 0] for one in (ALONG_X, ACROSS_X))
-    return _of_speed(u_weights(flow, x, y), v_weights(flow, x, y), u, v)
+    return _of_speed(_u_weights(flow, x, y), _v_weights(flow, x, y), u, v)
 
 
-def discharge_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
+def _discharge_weights(flow: GriddedFlow, x: Array, y: Array) -> Array:
     """dQ/du = h dy and dQ/dz = u dy (dh/dz) / 2 in the cells on both sides of a face, whose depth h is that of the mean
     of level minus bed. In the west the inflow sets Q, at the outlet its level sets h: these are given.
     """
@@ -188,14 +188,14 @@ READERS: Mapping[str, Reader] = {
     "velocity_across": ACROSS_X,
     "speed": Reader(  # of u and v at the point, so that three readings of one probe agree with each other
         read=lambda flow, x, y: np.hypot(ALONG_X.read(flow, x, y), ACROSS_X.read(flow, x, y)),
-        slope_across=speed_slope,
-        weights=speed_weights,
+        slope_across=_speed_slope,
+        weights=_speed_weights,
     ),
-    "level": _of_field(lambda flow: flow.level, level_weights),
+    "level": _of_field(lambda flow: flow.level, _level_weights),
     "discharge": Reader(  # through the face nearest to each x, whatever y is
         read=lambda flow, x, y: flow.discharge[[nearest_face(flow.grid, one) for one in x]],
         slope_across=lambda flow, x, y: np.zeros((x.size, flow.state.shape[3])),
-        weights=discharge_weights,
+        weights=_discharge_weights,
     ),
 }
 
@@ -334,7 +334,7 @@ def _around_stations(flow: GriddedFlow, value: Array, station: pd.DataFrame) -> 
     fields = {"depth": now.cell, "u": flow.u, "rate": closures(problem, flow.state, now.cell).rate}
     fields["canopy_share"] = among
     x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
-    there = {name: bilinear(field, flow.grid, x, y) for name, field in fields.items()}
+    there = {name: _bilinear(field, flow.grid, x, y) for name, field in fields.items()}
     velocity, level = np.zeros((2, len(station), 1))
     component, component_y = np.zeros((2, *value.shape))
     for kind, rows, of_x, of_y in _by_kind(station):
