@@ -18,9 +18,17 @@ ACROSS_PERIOD = 2 * ROWS_REACH + 1
 
 @compiled_exactly
 def collect(blocks, far, base, rates, colours, step):
-    """Spread the changes of the colours' lanes (kind, column, row) over the entries of the Jacobian they belong to.
+    """J = (R(x + e) - R(x)) / e of coloured unknowns, each difference put to the entry it belongs to, in place.
 
-    blocks (nx, 3, n, n): columns i - 1, i, i + 1 of row block i; far (nx, n): the diagonal coupling to i - 2.
+    Parameters
+    ----------
+    blocks, far : (nx, 3, n, n), (nx, n), n = 3 ny
+        Columns i - 1, i, i + 1 of row block i, and the diagonal coupling to i - 2.
+    base, rates : (nx, 3, ny), (nx, 3, ny, slot)
+        R(x), and R where the unknowns of the colour of each slot are disturbed.
+    colours : (slot, 3)
+        Kind, first column and first row of the unknowns of each.
+    step : e [m, m/s]
     """
     nx, _, ny = base.shape
     for i in range(nx):
@@ -60,7 +68,18 @@ def _take_away(of, values):
 
 @compiled_exactly
 def factor(blocks, far):
-    """Eliminate in place: blocks[i] becomes (L_i, D_i^-1, G_i = D_i^-1 U_i); a solution is three products a column."""
+    """D_i = J_ii - L_i G_(i-1), G_i = D_i^-1 U_i: block elimination from upstream, in place.
+
+    Parameters
+    ----------
+    blocks, far : (nx, 3, n, n), (nx, n)
+        See `collect`; blocks[i] becomes (L_i, D_i^-1, G_i): a solution is three products a column.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If a D_i has no inverse.
+    """
     nx, _, n, _ = blocks.shape
     for i in range(nx):
         if i > 1:
@@ -78,7 +97,15 @@ def factor(blocks, far):
 
 @compiled_exactly
 def solve(blocks, far, right):
-    """x with J x = right, in place; right (nx, n, m), m right-hand sides at once."""
+    """x with J x = right, in place.
+
+    Parameters
+    ----------
+    blocks, far
+        As `factor` leaves them.
+    right : (nx, n, m)
+        m right-hand sides at once.
+    """
     nx, n, m = right.shape
     product = np.empty_like(right[0])  # one for all: memory for each took a tenth of the time of few right-hand sides
     for i in range(nx):
@@ -99,7 +126,13 @@ def solve(blocks, far, right):
 
 @compiled_exactly
 def solve_transposed(blocks, far, right):
-    """x with J' x = right, in place: the products of `solve`, transposed and in the opposite order."""
+    """x with J' x = right, in place: the products of `solve`, transposed and in the opposite order.
+
+    Parameters
+    ----------
+    blocks, far, right
+        As `solve`.
+    """
     nx, n, m = right.shape
     product = np.empty_like(right[0])
     for i in range(1, nx):

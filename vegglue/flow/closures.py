@@ -23,8 +23,14 @@ ZERO = np.zeros(1)
 
 @dataclass(frozen=True)
 class Closures:
-    """Friction rate k [1/m] and viscosity nu [m2/s], (nx, ny, m); forces x, y [m/s2] and momentum fluxes xx, xy, yy = h
-    T [m3/s2] by name, as far as there are any.
+    """k, nu, h T and f of a state at cell centres (nx, ny, m).
+
+    Attributes
+    ----------
+    rate, viscosity
+        Friction rate k [1/m] and eddy viscosity nu [m2/s].
+    momentum
+        Forces x, y [m/s2] and momentum fluxes xx, xy, yy = h T [m3/s2] by name, as far as there are any.
     """
 
     rate: Array
@@ -87,14 +93,29 @@ def closures(problem: Problem, state: Array, depth: Array) -> Closures:
 
 
 def bed_drag(problem: Problem, depth: Array, columns: slice = slice(None)) -> Array:
-    """k [1/m] of the laws of the bed at the centres of some columns of cells, see `bed_laws`; depth (nx, ny, m) [m]."""
+    """k [1/m] of the laws of the bed, without plants, see `bed_laws.class_drag`.
+
+    Parameters
+    ----------
+    problem : Problem
+    depth : (columns, ny, m) [m]
+        At the centres of cells.
+    columns : slice
+        Of which columns of the grid.
+    """
     bed, half_range = problem.friction, problem.bed_half_range[columns]
     classes, floor = bed.friction_class[columns], bed.bank_argument_minimum
     return bed_laws.class_drag(depth, half_range, classes, bed.law, bed.coefficient, floor, problem.film)
 
 
 def drag(problem: Problem, depth: Array) -> Array:
-    """k [1/m] of bed and plants at cell centres, so that the force is -k |U| u; depth (nx, ny, m) [m]."""
+    """k (nx, ny, m) [1/m] of bed and plants without effects, so that the force on the water is -k |U| u.
+
+    Parameters
+    ----------
+    problem : Problem
+    depth : (nx, ny, m) [m]
+    """
     rate = bed_drag(problem, depth)
     _add_plant_drag(problem, rate, depth, (problem.plants.phi, problem.plants.canopy_height))
     return rate
@@ -109,11 +130,21 @@ def _add_plant_drag(problem: Problem, rate: Array, depth: Array, values: tuple[A
 
 
 def wall_rates(problem: Problem, depth: Array) -> tuple[tuple[int, Array], ...]:
-    """k_w = sum(r c_w / dy) / sum h over both cells of the east faces of rows beside rough walls: row, (nx, m) [1/m].
+    """k_w = sum(r c_w / dy) / sum h over both cells of the east faces of rows beside rough walls.
 
     A wall that is wet over a height r takes c_w |u| u r dx from the water h dx dy of the cell, so that du/dt = -c_w r/h
     |u| u / dy: along the wall only, which is why it is no part of k. At the sides r = h, on a step h less the depth
     above it. Faded out in the film on dry land like advection.
+
+    Parameters
+    ----------
+    problem : Problem
+    depth : (nx, ny, m) [m]
+
+    Returns
+    -------
+    tuple of (row, (nx, m))
+        k_w [1/m] of each row beside a wall.
     """
     walls = problem.walls
     if not walls.rate.size:
@@ -135,7 +166,13 @@ def wall_rates(problem: Problem, depth: Array) -> tuple[tuple[int, Array], ...]:
 
 
 def bent_plants(problem: Problem, state: Array, depth: Array) -> tuple[Array, Array]:
-    """phi and canopy height (cell, m) of vegetated cells after the effects of the stage plants."""
+    """phi [-] and canopy height [m] (cell, m) of vegetated cells after the effects of the stage plants.
+
+    Parameters
+    ----------
+    problem : Problem
+    state, depth : (nx, 3, ny, m), (nx, ny, m) [m]
+    """
     geometry, stages = problem.geometry, {active.effect.stage for active in problem.effects}
     if geometry is None or "plants" not in stages:
         return problem.plants.phi, problem.plants.canopy_height

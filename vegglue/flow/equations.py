@@ -13,8 +13,16 @@ from vegglue.flow.problem import ALONG, EMPTY, LEVEL, InflowSegment, Problem, ab
 
 @dataclass(frozen=True)
 class Faces:
-    """What a state means on the grid: levels [m], depths [m] at cells, faces, corners; velocities [m/s] on faces, and
-    the flux through those between columns [m2/s].
+    """What a state means on the grid, boundaries included.
+
+    Attributes
+    ----------
+    level, cell
+        Levels and depths of cells (nx, ny, m) [m].
+    face_x, face_y, corner
+        Depths on west-east faces, south-north faces and corners, shapes as `wet_and_dry.depths` [m].
+    u, v, flux_x
+        Velocities [m/s] on both kinds of faces, and h u [m2/s] on the former.
     """
 
     level: Array
@@ -49,7 +57,15 @@ def residual(problem: Problem, state: Array) -> Array:
 def residual_of(
     problem: Problem, state: Array, depth: Array, sides: tuple[Array, Array, Array], closed: Closures
 ) -> Array:
-    """R(state) from its depths (nx, ny, m) [m], fluxes through the sides [m2/s] and closures."""
+    """R(state) as `residual`, of what is known of it already.
+
+    Parameters
+    ----------
+    problem : Problem
+    state, depth : (nx, 3, ny, m), (nx, ny, m) [m]
+    sides, closed
+        See `side_fluxes` and `closures`.
+    """
     boundaries = problem.boundaries
     out = kernels.rates(
         state,
@@ -106,16 +122,33 @@ def all_depths(problem: Problem, level: Array) -> tuple[Array, Array, Array, Arr
 
 
 def storage(problem: Problem, level: Array) -> Array:
-    """dh/dz_s of every cell [-], (nx, ny, m): the share of it that is wet."""
+    """dh/dz_s (nx, ny, m) [-] of every cell: the share of it that is wet.
+
+    Parameters
+    ----------
+    problem : Problem
+    level : (nx, ny, m) [m]
+    """
     above = above_bed(problem, level) - FILM_ON_LAND * problem.film
     half_range = problem.bed_half_range[:, :, None]
     return np.clip(0.5 * (above + half_range) / half_range, 0.0, 1.0)
 
 
 def side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
-    """q = Q w / (sum w * width) [m2/s] into the west (ny, m), south and north (nx, m) side; w = h^(5/3) or 1, times the
-    spread that an effect gives the inflow; widths along a bend are those of its cells. In a hollow whose rim stands r
-    over its bed, w = h^(5/3) min(1, max(h/r - 1, 0)): what stands below the rim flows nowhere.
+    """q = Q w / (sum w * width), w = h^(5/3) or 1, times the spread that an effect gives the inflow.
+
+    Widths along a bend are those of its cells. In a hollow whose rim stands r over its bed, w = h^(5/3) min(1, max(h/r
+    - 1, 0)): what stands below the rim flows nowhere.
+
+    Parameters
+    ----------
+    problem : Problem
+    depth : (nx, ny, m) [m]
+
+    Returns
+    -------
+    west, south, north : (ny, m), (nx, m), (nx, m) [m2/s]
+        Into the sides, positive into the domain.
     """
     (nx, ny), m = problem.shape, problem.members
     fluxes = {"west": np.zeros((ny, m)), "south": np.zeros((nx, m)), "north": np.zeros((nx, m))}
@@ -127,7 +160,13 @@ def side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
 
 
 def side_discharges(problem: Problem, depth: Array) -> Array:
-    """Discharge that enters each column of cells through its south and north side, (nx, m) [m3/s]."""
+    """Discharge (nx, m) [m3/s] that enters each column of cells through its south and north side.
+
+    Parameters
+    ----------
+    problem : Problem
+    depth : (nx, ny, m) [m]
+    """
     entering = np.zeros((problem.shape[0], problem.members))
     for inflow in problem.boundaries.inflows:
         if inflow.side != "west":
@@ -145,7 +184,15 @@ def _inflow_flux(problem: Problem, inflow: InflowSegment, depth: Array) -> Array
 
 
 def inflow_parts(problem: Problem, inflow: InflowSegment, depth: Array) -> Array:
-    """What the discharge of each cell of an inflow is in proportion to, w J (cell, m), of their depths (cell, m)."""
+    """w J (cell, m): what the discharge of each cell of an inflow is in proportion to, see `side_fluxes`.
+
+    Parameters
+    ----------
+    problem : Problem
+    inflow : InflowSegment
+    depth : (cell, m) [m]
+        Of its cells.
+    """
     weight = _inflow_weight(inflow, depth)
     return weight if inflow.side == "west" else weight * _stretch_of(problem, inflow, 0.0)
 

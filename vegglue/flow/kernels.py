@@ -23,8 +23,14 @@ from vegglue.flow.wet_and_dry import afloat, depths
 
 
 class Bend(NamedTuple):
-    """Curvature kappa of the centreline in each column of cells (nx,) and at west-east faces (nx + 1,) [1/m]; n of the
-    south edge of the grid and width of its rows [m]. A tuple, as compiled loops take it.
+    """A grid along a curved centreline. A tuple, as compiled loops take it.
+
+    Attributes
+    ----------
+    at_cells, at_faces
+        Curvature kappa in each column of cells (nx,) and at west-east faces (nx + 1,) [1/m].
+    south, dy
+        n of the south edge of the grid, and width of its rows [m].
     """
 
     at_cells: Array
@@ -423,10 +429,19 @@ def _continuity(out, offset, first, stop, m, flux_x, flux_y, dx, dy, bend):
 
 @compiled
 def push(out, depth, x, y, xx, xy, yy, film, dx, dy, bend):
-    """R_u -= f_x - (1/h) div(h T) on east faces and R_v alike on south faces, h of a face the mean of its cells.
+    """R_u -= f_x - (1/h) div(h T) on east faces and R_v alike on south faces, in place.
 
-    Forces x, y [m/s2] and fluxes xx, xy, yy = h T [m3/s2] at cell centres (nx, ny, m), empty when there are none;
-    nothing is carried through the sides of the grid. Faded out in the film on dry land like advection.
+    h of a face is the mean of its cells. Nothing is carried through the sides of the grid. Faded out in the film on dry
+    land like advection.
+
+    Parameters
+    ----------
+    out, depth : (nx, 3, ny, m) [m/s, m/s2], (nx, ny, m) [m]
+        R and h.
+    x, y, xx, xy, yy : (nx, ny, m) [m/s2, m3/s2], or empty
+        f and h T at cell centres.
+    film, dx, dy : [m]
+    bend : Bend or None
     """
     nx, ny, m = depth.shape
     half_per_film = 0.5 / film
@@ -482,9 +497,18 @@ def _pushed_at_centres(depth, x, y, xx, xy, dx, dy, bend):
 
 @compiled
 def velocities(state, first, stop, cell, west, south, north):
-    """u on faces first .. stop and v on the south and north faces of columns first .. stop - 1, boundaries included.
+    """u and v on the faces of columns first .. stop - 1; on the sides q/h of what enters there.
 
-    west (ny, m), south and north (nx, m): fluxes [m2/s] through the sides, positive into the domain; cell: their depth.
+    Parameters
+    ----------
+    state, cell : (nx, 3, ny, m), (stop - first, ny, m) [m]
+        A state, and depths of these columns.
+    west, south, north : (ny, m), (nx, m), (nx, m) [m2/s]
+        Fluxes q through the sides, positive into the domain.
+
+    Returns
+    -------
+    u, v : (stop - first + 1, ny, m), (stop - first, ny + 1, m) [m/s]
     """
     _, _, ny, m = state.shape
     u, v = np.empty((stop - first + 1, ny, m)), np.empty((stop - first, ny + 1, m))
@@ -522,7 +546,23 @@ def rates(
     dy,
     bend,
 ):
-    """R(state), (nx, 3, ny, m), strip by strip so that what lies between fits the cache."""
+    """R(state), (nx, 3, ny, m) [m/s, m/s2], without rough walls, confluences, lateral inflow and what effects push.
+
+    Strip by strip so that what lies between fits the cache.
+
+    Parameters
+    ----------
+    state, bed, rise, half_range, film, smallest, outlet_level
+        A state (nx, 3, ny, m), and the rest as `wet_and_dry.depths`.
+    drag, viscosity : (nx, ny, m) [1/m, m2/s]
+        k and nu at cell centres.
+    west, south, north
+        As `velocities`.
+    outlet : (ny,)
+        Rows of the east side that are the outlet; R_u is u on the others.
+    dx, dy : [m]
+    bend : Bend or None
+    """
     nx, _, ny, m = state.shape
     out, friction, mixing = np.empty((nx, 3, ny * m)), _flat(drag), _flat(viscosity)
     for first in range(0, nx, STRIP):
@@ -537,7 +577,7 @@ def rates(
         _continuity(out, first, lo, hi, m, flux_x, flux_y, dx, dy, here)
         _momentum_y(out, first, lo, hi, m, *flow, wet, *law, film, dx, dy, here)
         _momentum_x(out, first, lo, hi, *flow, wet, *law, outlet, outlet_level, film, dx, dy, here)
-        for i in range(first, stop):  # not by slices: to assign arrays takes seconds to compile, see `block_elimination`
+        for i in range(first, stop):  # not by slices: to assign arrays takes seconds to compile
             for k in range(m):
                 out[i, 1, k] = state[i, 1, 0, k]
     return out.reshape((nx, 3, ny, m))

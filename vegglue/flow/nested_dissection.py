@@ -128,10 +128,16 @@ def dissection(nx: int, ny: int, leaf: int = LEAF) -> Dissection:
 
 @compiled_exactly
 def collect_stencil(values, far, base, rates, colours, step):
-    """Spread the changes of coloured unknowns over the entries of the Jacobian, as `block_elimination.collect`.
+    """J = (R(x + e) - R(x)) / e of coloured unknowns, each difference put to the entry it belongs to, in place.
 
-    values (nx, ny, 3, 5, 3, 3): dR_e in cell i, j by unknown k in the cell di - 1, dj - 2 further; far (nx, ny, 3): by
-    its own unknown two columns upstream.
+    Parameters
+    ----------
+    values : (nx, ny, 3, 5, 3, 3)
+        dR_e in cell i, j by unknown k in the cell di - 1, dj - 2 further.
+    far : (nx, ny, 3)
+        By its own unknown two columns upstream.
+    base, rates, colours, step
+        As `block_elimination.collect`.
     """
     nx, _, ny = base.shape
     for i in range(nx):
@@ -332,9 +338,14 @@ def _solve_parts(right, own_start, around_start, beside, starts, memory, transpo
 
 @dataclass(frozen=True, eq=False)
 class SparseFactors:
-    """A^-1 of one member by factors of a matrix near it, or of A by blocks; entries of A as in `collect_stencil`.
+    """A^-1 of one member by factors of a matrix near it, or of A by blocks.
 
-    kept: the factors, or nothing if they had to make room.
+    Attributes
+    ----------
+    values, far
+        Entries of A, see `collect_stencil`.
+    kept
+        The factors, or nothing if they had to make room.
     """
 
     values: Single

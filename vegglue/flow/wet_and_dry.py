@@ -8,11 +8,19 @@ from vegglue.effects.physical_constants import FILM_ON_LAND
 
 @compiled_inside
 def wet_depth(above: float, half_range: float, film: float) -> float:
-    """h >= f/10 [m] of water standing `above` a bed that is even between -w and +w around its level, w = half_range.
+    """h = f/10 + mean of max(a - s, 0) over s in (-w, w), a = above - f/10: depth over a bed even between -w and +w.
 
-    h - f/10 is the mean of max(a - s, 0) over s in (-w, w), a = above - f/10: a cell wets from its lowest corner (the
-    idea of Defina 2000, doi:10.1029/2000WR900167), and h has a derivative everywhere. The f/10 that stays on dry land
-    lets the water table run on below it.
+    A cell wets from its lowest corner (the idea of Defina 2000, doi:10.1029/2000WR900167), and h has a derivative
+    everywhere. The f/10 that stays on dry land lets the water table run on below it.
+
+    Parameters
+    ----------
+    above, half_range, film
+        Level over the mean bed, w and f [m].
+
+    Returns
+    -------
+    h >= f/10 [m]
     """
     dry = FILM_ON_LAND * film
     lifted = above - dry
@@ -37,11 +45,24 @@ def afloat(depth: float, half_per_film: float) -> float:
 
 @compiled
 def depths(level, bed, rise, half_range, film, smallest, outlet_level):
-    """Depth [m] at cells, on faces and at corners; on faces and corners that of the mean of level minus bed, at corners
-    that of the point itself, or the smallest of the four cells around it.
+    """h of the level over the bed: of cells, on faces of the mean of both sides, see `wet_depth`, and of corners alone.
 
-    half_range (nx, ny): half the range of the bed within a cell [m]; rise (nx, ny, m): by how much members' beds lie
-    higher [m], or empty.
+    Parameters
+    ----------
+    level, bed, half_range : (nx, ny, m), (nx, ny), (nx, ny) [m]
+        Water and bed levels, and half the range of the bed within a cell.
+    rise : (nx, ny, m) [m]
+        By how much members' beds lie higher, or empty.
+    film : [m]
+    smallest : bool
+        Whether at a corner the smallest of the four cells around it counts, not their mean.
+    outlet_level : (m,) [m]
+        On the east face of the last column; the bed goes on to there as between the last two.
+
+    Returns
+    -------
+    cells, west-east faces, south-north faces, corners
+        (nx, ny, m), (nx + 1, ny, m), (nx, ny + 1, m), (nx + 1, ny + 1, m) [m]
     """
     nx, ny, m = level.shape
     if rise.size:
