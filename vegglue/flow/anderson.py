@@ -80,7 +80,13 @@ def minimise(gram: Array, right: Array) -> Array:
 
 
 class Memory:
-    """The last MEMORY_DEPTH changes of every slot's correction, filled in place; shape (nx, 3, ny, m) of a state."""
+    """x <- x + f - sum_d g_d s_d: the last MEMORY_DEPTH changes of the corrections in each slot, filled in place.
+
+    Parameters
+    ----------
+    shape : (nx, 3, ny, m)
+        Of a state.
+    """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
         self.turns: Single = np.zeros((MEMORY_DEPTH, -(-shape[0] // SPARSE), *shape[1:]), np.float32)

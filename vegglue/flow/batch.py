@@ -51,8 +51,15 @@ SPLINE_MEMBERS = 48
 
 @compiled
 def blend(states: Array, some: NDArray[np.int64], weights: Array, south: int, north: int) -> Array:
-    """sum_n w_bn x_n in the rows south..north-1, (nx, 3, rows, b), x_n the state of member some[n]; states (m, nx, 3,
-    ny), weights (b, n).
+    """sum_n w_bn x_n: states in the rows south .. north - 1, (nx, 3, rows, b).
+
+    Parameters
+    ----------
+    states : (m, nx, 3, ny)
+    some : (n,)
+        Members whose states x_n are.
+    weights : (b, n)
+    south, north : int
     """
     nx, rows, members = states.shape[1], north - south, weights.shape[0]
     blended, column = np.empty((nx, 3, rows, members)), np.empty((members, 3, rows))

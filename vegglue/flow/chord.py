@@ -218,7 +218,18 @@ def stream(
 
 
 def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, most: int = 25) -> ChordSolution:
-    """All members at once from their starts (nx, 3, ny, m), see `stream`; those that stall are left as they are."""
+    """x <- x - M^-1 R(x) of all members at once, see `stream`; those that stall are left as they are.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : (nx, 3, ny, m)
+    shared : Factors
+        M, of a reference member.
+    tolerance : [m, m/s]
+    most : int
+        Steps of each member at most.
+    """
     members = np.arange(problem.members)
     end = ChordSolution(
         np.empty_like(start), np.empty(members.size), members.copy(), np.zeros(members.size, dtype=bool)

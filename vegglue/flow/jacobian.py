@@ -36,8 +36,16 @@ RAISE = 1e-6
 
 @dataclass(frozen=True)
 class Sharing:
-    """How levels act through W, -(dR/d ln Q) (d ln W/dz)': column and row of each cell of the inflow (cell,), slopes d
-    ln W/dz of their levels (cell,) [1/m], and answer dR/d ln Q (nx, 3, ny) [m/s, m/s2].
+    """How levels act through W, -(dR/d ln Q) (d ln W/dz)', of one inflow.
+
+    Attributes
+    ----------
+    column, row
+        Of each of its cells (cell,).
+    slope
+        d ln W/dz of their levels (cell,) [1/m].
+    answer
+        dR/d ln Q (nx, 3, ny) [m/s, m/s2].
     """
 
     column: NDArray[np.int64]
@@ -47,7 +55,14 @@ class Sharing:
 
 
 def sharing_at(problem: Problem, state: Array, inflow: InflowSegment) -> Sharing:
-    """Of one inflow at a state (nx, 3, ny, 1) of one member."""
+    """-(dR/d ln Q) (d ln W/dz)' of one inflow at a state of one member.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, 1)
+    inflow : InflowSegment
+    """
     raised = state.copy()
     raised[:, LEVEL] += RAISE
     before, after = cell_depths(problem, state), cell_depths(problem, raised)
@@ -69,8 +84,14 @@ def cells_of(problem: Problem, inflow: InflowSegment) -> tuple[NDArray[np.int64]
 
 
 def changes_of_whole(problem: Problem, inflow: InflowSegment, before: Array, after: Array) -> Array:
-    """By how much ln W changes through each cell of an inflow, (cell, m), from depths (nx, ny, 1) to (nx, ny, m) [m];
-    to first order.
+    """d ln W through each cell of an inflow, (cell, m), to first order.
+
+    Parameters
+    ----------
+    problem : Problem
+    inflow : InflowSegment
+    before, after : (nx, ny, 1), (nx, ny, m) [m]
+        Depths.
     """
     at = cells_of(problem, inflow)
     parts = inflow_parts(problem, inflow, before[at])
@@ -78,7 +99,15 @@ def changes_of_whole(problem: Problem, inflow: InflowSegment, before: Array, aft
 
 
 def with_kept_shares(problem: Problem, before: Array, after: Array) -> Problem:
-    """A problem at depths `after` (nx, ny, m) [m] with Q W_after / W_before; Q / W is that at `before` (nx, ny, 1)."""
+    """Q -> Q W_after / W_before in inflows that share by depth, so that Q / W stays that of the depths before.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of m members.
+    before, after : (nx, ny, 1), (nx, ny, m) [m]
+        Depths.
+    """
 
     def kept(inflow: InflowSegment) -> InflowSegment:
         at = cells_of(problem, inflow)
@@ -90,7 +119,15 @@ def with_kept_shares(problem: Problem, before: Array, after: Array) -> Problem:
 
 
 def answer_to_discharge(problem: Problem, state: Array, inflow: InflowSegment) -> Array:
-    """dR/d ln Q of one member (nx, 3, ny) [m/s, m/s2], Q the discharge of one of its inflows."""
+    """dR/d ln Q of one member (nx, 3, ny) [m/s, m/s2], by a central difference.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, 1)
+    inflow : InflowSegment
+        Of the problem; Q is its discharge.
+    """
     step = DISCHARGE_STEP * np.array([1.0, -1.0])
     both = take(problem, np.zeros(2, dtype=np.int64))
     inflows = tuple(
@@ -119,8 +156,12 @@ class BlockFactors:
 class SharedFactors:
     """J^-1 = (A - a s')^-1 = A^-1 + A^-1 a (1 - s' A^-1 a)^-1 s' A^-1 with sparse factors of A (Woodbury).
 
-    sparse: None if A has no inverse. a, s: answers to the discharge of inflows shared by depth and slopes of ln W, (nx,
-    3 ny, inflow) each.
+    Attributes
+    ----------
+    sparse
+        None if A has no inverse.
+    answers, slopes
+        a and s, answers to the discharge of inflows shared by depth and slopes of ln W (nx, 3 ny, inflow).
     """
 
     sparse: SparseFactors | None
@@ -231,7 +272,14 @@ def eliminate(columns: Single, far: Single) -> None:
 
 
 def solved(inverse: BlockFactors | SharedFactors, right: Array | Single, transposed: bool = False) -> Single:
-    """J^-1 right, or J'^-1 right, (nx, 3, ny, m)."""
+    """J^-1 right, or J'^-1 right, (nx, 3, ny, m) in single precision.
+
+    Parameters
+    ----------
+    inverse : BlockFactors or SharedFactors
+    right : (nx, 3, ny, m)
+    transposed : bool
+    """
     nx, _, ny, m = right.shape
     with np.errstate(over="ignore"):  # of a member that runs away, known by its correction
         work = right.astype(np.float32).reshape(nx, 3 * ny, m)
@@ -243,6 +291,11 @@ def jacobian(problem: Problem, state: Array) -> BlockJacobian | SparseJacobian:
     """J = dR/dstate of one member by coloured differences; sparse on grids of WIDE_FROM rows or more.
 
     Single precision is enough: the factors only lead to the root; the residual in double precision decides what it is.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, 1)
     """
     nx, _, ny, _ = state.shape
     wide = ny >= WIDE_FROM
@@ -285,6 +338,12 @@ def column_held(column: NDArray[np.int64], block: int) -> NDArray[np.int64]:
 
 
 def factors(problem: Problem, state: Array) -> Factors:
-    """Factors of J at a state (nx, 3, ny, 1) of one member."""
+    """J^-1 of one member, and what chord steps of its neighbours need of its state.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, 1)
+    """
     inverse = jacobian(problem, state).inverse()
     return Factors(inverse, slope_of_friction(problem, state), *thickness(problem, state))

@@ -98,14 +98,30 @@ TRIES = 4
 
 
 def march(problem: Problem, state: Array, time_step: float, steps: int, theta: float = 1.0) -> Array:
-    """The state (nx, 3, ny, m) after `steps` steps of `time_step` [s]; theta 1/2 .. 1 weighs the new gravity terms."""
+    """`steps` steps of the equation of `advance`: the state after them.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, m)
+    time_step : [s]
+    steps : int
+    theta : 1/2 .. 1 [-]
+        Weight of the gravity terms at the end of a step.
+    """
     for _ in range(steps):
         state = state + advance(problem, state, time_step, theta)
     return state
 
 
 def advance(problem: Problem, state: Array, time_step: float, theta: float) -> Array:
-    """(S/dt + theta A_x) (S/dt)^-1 (S/dt + theta A_y) delta = -R: the change of a state over one step."""
+    """(S/dt + theta A_x) (S/dt)^-1 (S/dt + theta A_y) delta = -R: the change (nx, 3, ny, m) of a state over one step.
+
+    Parameters
+    ----------
+    problem, state, time_step, theta
+        As `march`.
+    """
     now = faces(problem, state)
     # Never below a thousandth, so that dry land keeps a water table.
     wet = np.maximum(storage(problem, state[:, LEVEL]), 1e-3)
@@ -155,7 +171,17 @@ def fall_back(step: float | None, span: float | None) -> FallBack:
 
 @dataclass(frozen=True)
 class Marched:
-    """Where a march for the steady state ended: steady or not, steps spent, and in words."""
+    """Where a march for the steady state of one member ended.
+
+    Attributes
+    ----------
+    state
+        (nx, 3, ny, 1), steady if `steady`.
+    steps
+        That were made.
+    sentence
+        Why it is not steady, else empty.
+    """
 
     state: Array
     steady: bool
@@ -164,7 +190,16 @@ class Marched:
 
 
 def march_to_rest(problem: Problem, start: Array, tolerance: float, how: FallBack) -> Marched:
-    """March one member until Newton can finish it; its steady state is judged as any other, by its residual."""
+    """March one member until Newton can finish it; its steady state is judged as any other, by its residual.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : (nx, 3, ny, 1)
+    tolerance : [m, m/s]
+        Largest correction of a steady state.
+    how : FallBack
+    """
     state, per_try = start, max(round(how.span / TRIES / how.step), 1)
     for tried in range(1, TRIES + 1):
         with np.errstate(over="ignore", invalid="ignore"):  # a march that runs away is known by its end

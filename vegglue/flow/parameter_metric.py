@@ -21,7 +21,15 @@ LARGEST_WEIGHT = 1e3
 
 @dataclass(frozen=True)
 class ParameterMetric:
-    """Members: their points in the unit cube and their coordinates (m, d), and the axes A (d, d) of these."""
+    """Where members are, and coordinates in which they lie as far apart as their flows differ.
+
+    Attributes
+    ----------
+    points, coordinates
+        s in the unit cube, and s A (m, d).
+    axes
+        A (d, d).
+    """
 
     points: Array
     axes: Array
@@ -29,14 +37,26 @@ class ParameterMetric:
 
 
 def parameter_metric(points: Array, slopes: Sequence[tuple[Array, ...]]) -> ParameterMetric:
-    """Members at points (m, d), how near they are as the tangents of some flows have it."""
+    """s A, the coordinates of members by the tangents of some flows, see `principal_axes`.
+
+    Parameters
+    ----------
+    points : (m, d)
+    slopes : sequence of d arrays (nx, 3, ny, 1)
+        d state/ds of each flow; the unit cube is left as it is without any.
+    """
     axes = principal_axes(slopes, points.shape[1])
     return ParameterMetric(points, axes, points @ axes)
 
 
 def metric_of_flows(points: Array, states: Array) -> ParameterMetric:
-    """The same by the flows of the members themselves (nx, 3, ny, m), NaN where there is none: their tangents are the
-    slopes of a plane through them, none where they are too few for one.
+    """s A, A from a plane through the flows of the members themselves, whose slopes are their tangents.
+
+    Parameters
+    ----------
+    points : (m, d)
+    states : (nx, 3, ny, m)
+        NaN where there is none; with d known or fewer the unit cube is left as it is.
     """
     known = np.flatnonzero(np.isfinite(states).all(axis=(0, 1, 2)))
     if known.size <= points.shape[1]:
@@ -48,11 +68,21 @@ def metric_of_flows(points: Array, states: Array) -> ParameterMetric:
 
 
 def principal_axes(slopes: Sequence[tuple[Array, ...]], parameters: int) -> Array:
-    """A (d, d), the principal axes of G = sum S'S, S the tangents d state/ds of one flow or more; each as long as the
-    square root of the change along it, the longest one.
+    """A, the principal axes of G = sum S'S, S tangents of flows; each as long as the root of the change along it.
 
-    Along axes as long as the change itself members take more steps. Rounded, so that clusters cut with them
-    are the same on another machine. The unit cube without tangents.
+    The longest is 1. Along axes as long as the change itself members take more steps. Rounded, so that clusters cut
+    with them are the same on another machine. The unit cube without tangents.
+
+    Parameters
+    ----------
+    slopes
+        As `parameter_metric`.
+    parameters : int
+        d.
+
+    Returns
+    -------
+    (d, d)
     """
     gram = np.zeros((parameters, parameters))
     for some in slopes:
@@ -67,8 +97,13 @@ def principal_axes(slopes: Sequence[tuple[Array, ...]], parameters: int) -> Arra
 
 
 def clusters(coordinates: Array, size: int) -> list[np.ndarray]:
-    """Index sets of neighbours, as few and as even as `size` allows, cut across the longest side; each next to the
-    last.
+    """Index sets of neighbours, few and even, cut across the longest side; each next to the last.
+
+    Parameters
+    ----------
+    coordinates : (m, d)
+    size : int
+        Members of one at most.
     """
 
     def cut(index: np.ndarray, parts: int, upwards: bool) -> list[np.ndarray]:
@@ -86,7 +121,16 @@ def clusters(coordinates: Array, size: int) -> list[np.ndarray]:
 
 
 def farthest_first(coordinates: Array, pending: np.ndarray, centre: Array) -> np.ndarray:
-    """Pending members, the farthest from all before first, so that most of them lie between others."""
+    """Pending members, the farthest from all before first, so that most of them lie between others.
+
+    Parameters
+    ----------
+    coordinates : (m, d)
+    pending : (n,)
+        Which members.
+    centre : (d,)
+        From which the first is the farthest.
+    """
     chosen, order = coordinates[pending], []
     distance = squared_distances(chosen, centre)
     for _ in range(pending.size):
@@ -97,13 +141,34 @@ def farthest_first(coordinates: Array, pending: np.ndarray, centre: Array) -> np
 
 
 def nearest_members(coordinates: Array, some: np.ndarray, centre: Array, most: int) -> np.ndarray:
-    """Of some members, those nearest to one of these coordinates, the nearest first."""
+    """Of some members the `most` nearest ones, the nearest first.
+
+    Parameters
+    ----------
+    coordinates : (m, d)
+    some : (n,)
+        Which members.
+    centre : (d,)
+        To which they are near.
+    most : int
+    """
     return some[np.argsort(squared_distances(coordinates[some], centre), kind="stable")[:most]]
 
 
 def spline_weights(known: Array, wanted: Array, kernel: str, degree: int) -> Array | None:
-    """Weights (n, k) that take values at known coordinates (k, d) to wanted ones (n, d); None where no spline is worth
-    it: known ones coincide, or lie in a plane, as at an end of a prior.
+    """w with f(wanted) = w f(known), of splines by radial basis functions.
+
+    Parameters
+    ----------
+    known, wanted : (k, d), (n, d)
+        Coordinates.
+    kernel, degree
+        As SciPy's `RBFInterpolator`.
+
+    Returns
+    -------
+    (n, k) or None
+        None if no spline is worth it: known places coincide, or lie in a plane, as at an end of a prior.
     """
     from scipy.interpolate import RBFInterpolator  # late: what only looks at a solved run need not wait for it
 

@@ -28,8 +28,16 @@ Attempt = tuple[ChordSolution, Factors | None, tuple[int, int]]
 
 @dataclass(frozen=True)
 class LinearisedMember:
-    """A state (nx, 3, ny, 1) at one point (d,) of the unit cube, rough where it was only a stride on the way to others,
-    and d state / d s_p there.
+    """x + sum_p dx/ds_p (s_p - point_p): a state and its tangents at one point of the unit cube.
+
+    Attributes
+    ----------
+    point
+        (d,).
+    state
+        x (nx, 3, ny, 1), rough if it was only a stride on the way to others.
+    slopes
+        dx/ds_p, d arrays (nx, 3, ny, 1).
     """
 
     point: Array
@@ -46,8 +54,18 @@ class LinearisedMember:
 
 @dataclass(frozen=True)
 class ReferenceMember:
-    """A member whose factors serve its neighbours: its state (nx, 3, ny, 1) and, unless it had to be marched, the
-    factors in its band of rows and, if they are wanted, its tangents.
+    """A member whose factors serve its neighbours.
+
+    Attributes
+    ----------
+    state
+        (nx, 3, ny, 1), NaN if there is none.
+    status, reason, iterations
+        How it ended, see `status`, why if it failed, and after how many steps.
+    linearised
+        With its tangents, if they are wanted and it has not been marched.
+    factors, band
+        J^-1 in its band of rows, None if it has been marched or failed, and that band.
     """
 
     state: Array
@@ -62,7 +80,21 @@ class ReferenceMember:
 def linearised_median(
     problem_of: ProblemOf, parameters: int, tolerance: float, how: FallBack
 ) -> LinearisedMember | None:
-    """The member at the medians of all priors, for others to begin from; None if it has to be marched."""
+    """The member at the medians of all priors, for others to begin from.
+
+    Parameters
+    ----------
+    problem_of : callable
+    parameters : int
+        d.
+    tolerance : [m, m/s]
+    how : FallBack
+
+    Returns
+    -------
+    LinearisedMember or None
+        None if it has to be marched.
+    """
     point = np.full(parameters, 0.5)
     return solve_reference(problem_of, problem_of(point[None]), point, None, tolerance, how).linearised
 
@@ -70,14 +102,31 @@ def linearised_median(
 def solve_reference(
     problem_of: ProblemOf, problem: Problem, point: Array, warm: Array | None, tolerance: float, how: FallBack
 ) -> ReferenceMember:
-    """A member solved alone, with its tangents. problem: of the one member at the point."""
+    """R(x) = 0 of one member, see `solve_alone`, with its tangents.
+
+    Parameters
+    ----------
+    problem_of : callable
+        The problem of members at other points (n, d).
+    problem, point : Problem, (d,)
+        Of the member.
+    warm, tolerance, how
+        As `solve_alone`.
+    """
     alone = solve_alone(problem, warm, tolerance, how)
     return alone if alone.factors is None else _with_tangents(problem_of, problem, point, alone)
 
 
 def solve_alone(problem: Problem, warm: Array | None, tolerance: float, how: FallBack) -> ReferenceMember:
-    """R(x) = 0 of one member without its neighbours: from a warm start if there is one, then from a cold one, then by
-    marching; without tangents.
+    """R(x) = 0 of one member from a warm start, then from a cold one, then by marching; without tangents.
+
+    Parameters
+    ----------
+    problem : Problem
+    warm : (nx, 3, ny, 1) or None
+    tolerance : [m, m/s]
+        Largest correction.
+    how : FallBack
     """
     spent = 0
     for start in [warm, None] if warm is not None else [None]:
@@ -96,7 +145,14 @@ def solve_alone(problem: Problem, warm: Array | None, tolerance: float, how: Fal
 
 
 def reference_at(problem_of: ProblemOf, problem: Problem, point: Array, state: Array) -> ReferenceMember:
-    """A member already solved, its state (nx, 3, ny, 1), as a reference."""
+    """A member already solved as a reference, with its factors and tangents.
+
+    Parameters
+    ----------
+    problem_of, problem, point
+        As `solve_reference`.
+    state : (nx, 3, ny, 1)
+    """
     band = wet_band(problem, state)
     shared = factors(crop(problem, *band), rows_inside(state, band))
     solved = ReferenceMember(state, SOLVED_BY_NEWTON, "", 0, None, shared, band)
@@ -106,7 +162,15 @@ def reference_at(problem_of: ProblemOf, problem: Problem, point: Array, state: A
 def reference_beside(
     problem_of: ProblemOf, problem: Problem, point: Array, other: ReferenceMember, tolerance: float, how: FallBack
 ) -> ReferenceMember:
-    """A reference near another: with the factors of that one if they converge, else on its own."""
+    """R(x) = 0 of one member with the factors of a reference nearby, else as `solve_reference`.
+
+    Parameters
+    ----------
+    problem_of, problem, point, tolerance, how
+        As `solve_reference`.
+    other : ReferenceMember
+        With factors and tangents.
+    """
     assert other.linearised is not None
     assert other.factors is not None
     start = other.linearised.predict(point[None])

@@ -185,7 +185,14 @@ def _stretch(values, state, faces, bed, rise, half_range, film, thick, most_acro
 
 @compiled
 def tilt(step, answer):
-    """Steps of u, in place, to steps of w: dw = du + u d(rho)/dz (dz + dz beyond the face)."""
+    """dw = du + u d(rho)/dz (dz + dz beyond the face): steps of u to steps of w = rho u, in place.
+
+    Parameters
+    ----------
+    step : (nx, 3, ny, m)
+    answer : (nx, 3, ny) [1/s]
+        u d(rho)/dz, see `thickness`; 0 where water is deep.
+    """
     nx, _, ny, m = step.shape
     for i in range(nx):
         for j in range(ny):
@@ -232,7 +239,14 @@ def _correction(step, state, thin, bed, rise, half_range, film, thick):
 def eased(problem: Problem, state: Array, slope: Array, at_outlet: NDArray[np.bool_]) -> Array:
     """R(state), (nx, 3, ny, m), its rows of momentum of thin water written as slope (u - u*); zero when R is.
 
-    slope (nx, 3, ny, 1): `slope_of_friction` of the reference member; at_outlet (ny,): rows eased at the outlet, too.
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, m)
+    slope : (nx, 3, ny, 1) [1/s]
+        `slope_of_friction` of the reference member.
+    at_outlet : (ny,)
+        Rows eased at the outlet, too.
     """
     depth = cell_depths(problem, state)
     closed, sides = closures(problem, state, depth), side_fluxes(problem, depth)
@@ -242,7 +256,13 @@ def eased(problem: Problem, state: Array, slope: Array, at_outlet: NDArray[np.bo
 
 
 def slope_of_friction(problem: Problem, state: Array) -> Array:
-    """d(k |U| u)/du and d(k |U| v)/dv [1/s] at the faces of u and v in a state, (nx, 3, ny, m)."""
+    """d(k |U| u)/du and d(k |U| v)/dv at the faces of u and v, (nx, 3, ny, m) [1/s]; 0 for levels.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, m)
+    """
     depth = cell_depths(problem, state)
     rate = closures(problem, state, depth).rate
     return np.asarray(_friction_slope(state, depth, rate, side_fluxes(problem, depth)[0]))
@@ -258,28 +278,71 @@ def _face_depths(problem: Problem, state: Array) -> Array:
 
 
 def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
-    """Of one member, (nx, 3, ny): depths of its faces [m], and how its velocities answer to levels there [1/s]."""
+    """h_c and u d(rho)/dz of one member: depths of its faces, and how its velocities answer to levels there.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, 1)
+
+    Returns
+    -------
+    (nx, 3, ny) [m], (nx, 3, ny) [1/s]
+        The former infinite for levels and on the sides of the grid.
+    """
     thick = np.ascontiguousarray(_face_depths(problem, state)[..., 0])
     return thick, _answers(state, *problem.wetting, thick)
 
 
 def where_thin(problem: Problem, state: Array, thick: Array) -> NDArray[np.bool_]:
-    """Where water is thin, (nx, 3, ny): cells in any member of a state, faces there or at the reference member."""
+    """Where water is thin, (nx, 3, ny): cells in any member of a state, faces there or at the reference member.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, m)
+    thick : (nx, 3, ny) [m]
+        h_c, see `thickness`.
+    """
     return np.asarray(_thin_cells_and_faces(state, *problem.wetting, thick))
 
 
 def carry_thin(
     problem: Problem, values: Array, state: Array, thin: NDArray[np.bool_], thick: Array, back: bool = False
 ) -> None:
-    """Velocities (nx, 3, ny, m) times rho of thin faces at the levels of a state, or back; in place."""
+    """u -> rho u on thin faces at the levels of a state, or back; in place.
+
+    Parameters
+    ----------
+    problem : Problem
+    values : (nx, 3, ny, m) [m/s]
+    state, thin, thick
+        As `where_thin` has them, and what it gives.
+    back : bool
+    """
     _stretch(values, state, thin, *problem.wetting, thick, np.inf, back)
 
 
 def weigh_thin(problem: Problem, rates: Array, state: Array, thin: NDArray[np.bool_], thick: Array) -> None:
-    """Rows of momentum (nx, 3, ny, m) of thin faces times rho, those across at most times one, in place."""
+    """R_u -> rho R_u and R_v -> min(rho, 1) R_v on thin faces, in place.
+
+    Parameters
+    ----------
+    problem, state, thin, thick
+        As `carry_thin`.
+    rates : (nx, 3, ny, m) [m/s2]
+    """
     _stretch(rates, state, thin, *problem.wetting, thick, 1.0, False)
 
 
 def largest_correction(problem: Problem, step: Single, state: Array, thin: NDArray[np.bool_], thick: Array) -> Array:
-    """Largest change of each member (m,) [m, m/s] by a step of what is carried, in proportion to depth where thin."""
+    """Largest change of each member (m,) [m, m/s] by a step in w, in proportion to depth where thin; NaN if any is.
+
+    Parameters
+    ----------
+    problem, state, thin, thick
+        As `carry_thin`.
+    step : (nx, 3, ny, m)
+        Of levels and w, see `tilt`.
+    """
     return np.asarray(_correction(step, state, thin, *problem.wetting, thick))

@@ -15,8 +15,14 @@ MARGIN = 0.1
 
 
 def wet_band(problem: Problem, start: Array) -> tuple[int, int]:
-    """Rows start..stop-1 to solve: those that may be wet, with a margin; whole sides through which water enters, and
-    an inflow that stands apart.
+    """Rows start .. stop - 1 to solve: those that may be wet, with a margin.
+
+    With whole sides through which water enters, and with an inflow that stands apart.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : (nx, 3, ny, m)
     """
     above = above_bed(problem, start[:, LEVEL]).max(axis=(0, 2))
     wet = np.flatnonzero(above > -MARGIN)
@@ -34,7 +40,14 @@ def wet_band(problem: Problem, start: Array) -> tuple[int, int]:
 def overflows(part: Problem, state: Array, band: tuple[int, int], ny: int) -> np.ndarray:
     """Whether water stands in an outermost row of the band, where a wall is that the problem does not have (m,).
 
-    part: of the members whose states are given.
+    Parameters
+    ----------
+    part : Problem
+        Of the rows of the band.
+    state : (nx, 3, rows, m)
+    band : (start, stop)
+    ny : int
+        Rows of the whole problem.
     """
     above = above_bed(part, state[:, LEVEL])
     south = (above[:, 0].max(axis=0) > 0.0) & (band[0] > 0)
@@ -54,7 +67,18 @@ def walled(rows: Array) -> Array:
 
 
 def widen(part: Array, rows: int, band: tuple[int, int]) -> Array:
-    """The band put back into all rows; beyond it the level runs on flat and nothing moves."""
+    """A state of a band put back into all rows; beyond it the level runs on flat and nothing moves.
+
+    Parameters
+    ----------
+    part : (nx, 3, band rows, m)
+    rows : int
+    band : (start, stop)
+
+    Returns
+    -------
+    (nx, 3, rows, m)
+    """
     nx, _, _, m = part.shape
     wide = np.zeros((nx, 3, rows, m))
     wide[:, :, band[0] : band[1]] = part
@@ -66,8 +90,16 @@ def widen(part: Array, rows: int, band: tuple[int, int]) -> Array:
 def chord_in_band(
     problem: Problem, start: Array, shared: Factors, band: tuple[int, int], tolerance: float, most: int = 25
 ) -> ChordSolution:
-    """Members from their starts (nx, 3, rows, m) in the band of a centre, with its factors; one that outgrows the band
-    counts as not converged.
+    """x <- x - M^-1 R(x) in the band of a reference; a member that outgrows it counts as not converged.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of all rows.
+    start : (nx, 3, band rows, m)
+    shared, tolerance, most
+        As `chord`.
+    band : (start, stop)
     """
     part = crop(problem, *band)
     solution = chord(part, start, shared, tolerance, most)
