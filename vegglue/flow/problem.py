@@ -48,7 +48,15 @@ class BedFriction:
 
 @dataclass(frozen=True)
 class VegetatedCells:
-    """Friction of plants in their cells, see `plant_laws.plant_drag` for its fields; share: what they cover [-]."""
+    """Friction of plants in their cells; fields not named here as in `plant_laws.plant_drag`.
+
+    Attributes
+    ----------
+    share
+        What they cover of each cell (cell,) [-].
+    proportional
+        Whether phi h/h_d takes the place of phi if plants stand out of the water.
+    """
 
     column: NDArray[np.int64]
     row: NDArray[np.int64]
@@ -62,11 +70,17 @@ class VegetatedCells:
 
 @dataclass(frozen=True)
 class SideWalls:
-    """Rough vertical walls along the south and the north side of the grid; all empty without such walls.
+    """Rough vertical walls along the south and the north side of the grid, and on steps of the bed; all empty without.
 
-    south, north: length of the wall over that of the cell beside it, 0 without a wall (nx,) [-]; rate: c_w / dy (m,)
-    [1/m], see `wall_coefficient`. steps: walls on steps of the bed between rows j and j + 1, their length over that of
-    the lower cell, positive if the south one is lower, 0 without a step (nx, ny - 1) [-], or empty.
+    Attributes
+    ----------
+    south, north
+        Length of the wall over that of the cell beside it, 0 without a wall (nx,) [-].
+    rate
+        c_w / dy (m,) [1/m], see `wall_coefficient`.
+    steps
+        Walls between rows j and j + 1, their length over that of the lower cell, positive if the south one is lower, 0
+        without a step (nx, ny - 1) [-], or empty.
     """
 
     south: Array
@@ -108,9 +122,16 @@ class InflowSegment:
 
 @dataclass(frozen=True)
 class Boundaries:
-    """What enters and leaves: inflows, rows of the east side that are the outlet (ny,), the level there (m,) [m].
+    """What enters and leaves.
 
-    lateral_inflow (nx, ny, m) or empty: water that enters from above or below, without momentum [m/s].
+    Attributes
+    ----------
+    inflows
+        Through the sides.
+    outlet, outlet_level
+        Rows of the east side that are the outlet (ny,), and the level there (m,) [m].
+    lateral_inflow
+        Water that enters from above or below, without momentum (nx, ny, m) [m/s], or empty.
     """
 
     inflows: tuple[InflowSegment, ...]
@@ -178,7 +199,13 @@ class Problem:
 
 
 def above_bed(problem: Problem, level: Array) -> Array:
-    """Heights of levels (nx, ny, m) above the members' own beds [m], below 0 on land."""
+    """z_s - z_b of the members' own beds (nx, ny, m) [m], below 0 on land.
+
+    Parameters
+    ----------
+    problem : Problem
+    level : (nx, ny, m) [m]
+    """
     above = level - problem.bed[:, :, None]
     return above - problem.bed_rise if problem.bed_rise.size else above
 
@@ -192,7 +219,14 @@ def stretch_of_cells(problem: Problem) -> Array:
 
 
 def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
-    """The problem of some of its members; members: an index array, in which an index may repeat."""
+    """The problem of some of its members.
+
+    Parameters
+    ----------
+    problem : Problem
+    members : (n,)
+        Their indices, which may repeat.
+    """
 
     def some(values: Array) -> Array:
         return np.ascontiguousarray(values[..., members]) if values.shape[-1] else values  # nothing of what is empty
@@ -227,7 +261,14 @@ def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
 
 
 def crop(problem: Problem, south: int, north: int) -> Problem:
-    """The rows south .. north - 1, with walls beside them; no inflow may enter through a side that is cut off."""
+    """The rows south .. north - 1, with smooth walls beside them where rows are cut off.
+
+    Parameters
+    ----------
+    problem : Problem
+    south, north : int
+        No inflow may enter through a side that is cut off.
+    """
 
     def cut(values: Any) -> Any:
         return np.ascontiguousarray(values[:, south:north])

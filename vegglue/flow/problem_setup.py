@@ -85,7 +85,15 @@ def build_problem(case: Case, site: Site, experiment: str, theta: Theta) -> Prob
 
 
 def with_effects_of(case: Case, site: Site, experiment: str, theta: Theta, like: Problem) -> Problem:
-    """The problem of a case that differs from that of `like` by effects alone, and the values of their parameters."""
+    """The problem of a case that differs from that of another by effects alone, and by the values of their parameters.
+
+    Parameters
+    ----------
+    case, site, experiment, theta
+        As `build_problem`.
+    like : Problem
+        Of the other case, of the same m members.
+    """
     return replace(like, **_under_effects(case, in_experiment(site, experiment), experiment, theta))
 
 
@@ -179,8 +187,16 @@ def _site_changes(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry, 
 
 
 def share_under_water(case: Case, site: Site, setting: Experiment) -> Array:
-    """How much of what enters somewhere does so in each cell, (nx, ny) [-]: 1 in water expected to be deeper than
-    WHERE_WATER_ENTERS of that on the floor, 0 on land, over which it would have no steady way down.
+    """min(1, h / (a h_0)): how much of what enters somewhere does so in each cell, (nx, ny) [-].
+
+    h is the depth expected, h_0 that on the floor, a WHERE_WATER_ENTERS. On land, over which water would have no steady
+    way down, nothing enters.
+
+    Parameters
+    ----------
+    case, site
+        The case on its grid.
+    setting : Experiment
     """
     return np.clip(expected_depth(case, site, setting) / (WHERE_WATER_ENTERS * site_scales(case, site).depth), 0.0, 1.0)
 

@@ -82,7 +82,20 @@ def _bilinear(field: Array, grid: Grid, x: Array, y: Array) -> Array:
 
 
 def between(points: Array, first: float, step: float, size: int) -> tuple[NDArray[np.int64], Array]:
-    """Of `size` centres a step apart: the one below each point, and the weight of the next one [-]."""
+    """Of centres a step apart the one below each point, and the weight of the next one, 0 or 1 beyond the ends.
+
+    Parameters
+    ----------
+    points : (n,) [m]
+    first, step : [m]
+        Place of the first centre, and the distance of two.
+    size : int
+        How many there are.
+
+    Returns
+    -------
+    (n,), (n,) [-]
+    """
     steps = np.clip((points - first) / step, 0.0, size - 1.0)
     lower = np.minimum(steps.astype(np.int64), size - 2)
     return lower, steps - lower
@@ -202,7 +215,17 @@ READERS: Mapping[str, Reader] = {
 
 @dataclass(frozen=True)
 class FlowFields:
-    """One member at cell centres, (nx, ny): bed and level [m], depth [m], u and v [m/s]; NaN where dry."""
+    """One member at cell centres, NaN where dry.
+
+    Attributes
+    ----------
+    x, y
+        Of the centres (nx,), (ny,) [m].
+    bed, depth, level
+        (nx, ny) [m]; the bed everywhere.
+    u, v
+        (nx, ny) [m/s].
+    """
 
     x: Array
     y: Array
@@ -215,9 +238,18 @@ class FlowFields:
 
 @dataclass(frozen=True)
 class Readings:
-    """Of m members: prediction (m, station) [unit of its kind], flow (m, section) [m3/s], largest |Q - Q_in| over all
-    that enters (m,) [-], and level [m], u and v [m/s] of the columns kept, (m, 3, columns, ny), NaN where no part of a
-    cell is wet.
+    """What m members show.
+
+    Attributes
+    ----------
+    prediction
+        (m, station) [unit of its kind].
+    section_flow
+        (m, section) [m3/s].
+    mass_error
+        Largest |Q - Q_in| over all that enters (m,) [-].
+    fields
+        Level [m], u and v [m/s] of the columns kept (m, 3, columns, ny), NaN where no part of a cell is wet.
     """
 
     prediction: Array
@@ -252,7 +284,19 @@ def predictions_at_sensors(problem: Problem, state: Array, grid: Grid, station: 
 def predictions_under_effects(
     problem: Problem, state: Array, grid: Grid, station: pd.DataFrame, effects: Sequence[tuple[ActiveEffect, ...]]
 ) -> Array:
-    """`predictions_at_sensors` under sets of effects that differ on instruments alone: (m, set, station)."""
+    """`predictions_at_sensors` under sets of effects that differ on instruments alone.
+
+    Parameters
+    ----------
+    problem, state, grid, station
+        As `predictions_at_sensors`.
+    effects : sequence of tuples
+        Their effects on instruments take the place of those of the problem.
+
+    Returns
+    -------
+    (m, set, station) [unit of its kind]
+    """
     flow = GriddedFlow(problem, state, grid)
     value = _without_effects(flow, station)
     around = _around_stations(flow, value, station)
@@ -364,7 +408,15 @@ def _after_effects(
 def reading_weights(
     problem: Problem, state: Array, grid: Grid, station: pd.DataFrame, rows: slice = slice(None)
 ) -> Single:
-    """d prediction / d state (nx, 3, rows, n) of some rows at a state (nx, 3, ny, 1), without effects on instruments.
+    """d prediction / d state (nx, 3, rows, n) of one member, without effects on instruments.
+
+    Parameters
+    ----------
+    problem, grid, station
+        As `predictions_at_sensors`.
+    state : (nx, 3, ny, 1)
+    rows : slice
+        Of the grid, all by default.
 
     Raises
     ------
@@ -381,7 +433,14 @@ def reading_weights(
 
 
 def flow_fields(problem: Problem, state: Array, grid: Grid) -> FlowFields:
-    """The first member at cell centres, over its own bed; NaN where shallower than the film."""
+    """The first member at cell centres, over its own bed; NaN where shallower than the film.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : (nx, 3, ny, m)
+    grid : Grid
+    """
     now = faces(problem, state)
     centres = _at_centres(now, slice(0, grid.x.size))[..., 0]
     above = above_bed(problem, now.level)[..., 0]

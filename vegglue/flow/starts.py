@@ -58,10 +58,16 @@ def backwater(problem: Problem) -> Array:
 
 
 def on_grid(state: Array, shape: tuple[int, int]) -> Array:
-    """A state (nx, 3, ny, m) on a grid of `shape` (nx, ny) of the same reach.
+    """A state on a grid of twice as many cells along an axis or both, or of any number, see `between_cells`.
 
     Along an axis with twice as many cells levels are those of the cell around, and velocities on new faces the mean of
-    both neighbours; else see `between_cells`.
+    both neighbours.
+
+    Parameters
+    ----------
+    state : (nx, 3, ny, m)
+    shape : (nx, ny)
+        Of the other grid, of the same reach.
     """
     if any(fine not in (own, 2 * own) for fine, own in zip(shape, (state.shape[0], state.shape[2]), strict=True)):
         return between_cells(state, shape)
@@ -75,7 +81,13 @@ def on_grid(state: Array, shape: tuple[int, int]) -> Array:
 
 
 def between_cells(state: Array, shape: tuple[int, int]) -> Array:
-    """A state (nx, 3, ny, m) on a grid of any `shape` of the same reach, linear between its levels and velocities."""
+    """A state on another grid of the same reach, linear between its levels and velocities.
+
+    Parameters
+    ----------
+    state, shape
+        As `on_grid`; of two cells along each axis at least.
+    """
     (nx, _, ny, _), (fine_x, fine_y) = state.shape, shape
     # Levels stand at cell centres, v on the south side of cells, u on their east side.
     places = {LEVEL: (0.5, 0.5), ACROSS: (0.5, 0.0), ALONG: (1.0, 0.5)}
@@ -97,8 +109,16 @@ def _lower_and_share(coarse: int, fine: int, offset: float) -> tuple[NDArray[np.
 
 
 def lifted_flows(coarse: Problem, state: Array, fine: Problem) -> Array:
-    """As `on_grid`, but u times (k_coarse / k_fine)^SHARE, k the friction rate [1/m] of the laws of bed and plants:
-    finer cells have another beside a waterline and at the edges of plants. State (nx, 3, ny, m), of the same members.
+    """u -> u (k_coarse / k_fine)^SHARE beside `on_grid`, k the friction rate of the laws of bed and plants.
+
+    Finer cells have another k beside a waterline and at the edges of plants.
+
+    Parameters
+    ----------
+    coarse, fine : Problem
+        Of the same members; on as many cells or twice as many along each axis.
+    state : (nx, 3, ny, m)
+        On coarse cells.
     """
     lifted, (nx, ny) = on_grid(state, fine.shape), fine.shape
     before, after = drag(coarse, cell_depths(coarse, state)), drag(fine, cell_depths(fine, lifted))
