@@ -106,8 +106,16 @@ def dispersion(cells: Cells, excess: Array) -> dict[str, Array]:
 def curvature(cells: Cells) -> Array:
     """r = h (u^2 v_x - v^2 u_y + u v (v_y - u_x)) / |U|^3, depth over radius of the bend, as r / (1 + 4 r^2)^(1/2) [-].
 
-    Positive where the flow turns towards larger y, and never above 1/2: no bend is narrower than it is deep.
-    |U|^2 is u^2 + v^2 + (0.1 U)^2, U the speed of the site, so that water at rest has no bend. Shape (nx, ny, m).
+    Positive where the flow turns towards larger y, and never above 1/2: no bend is narrower than it is deep. |U|^2 is
+    u^2 + v^2 + (0.1 U)^2, U the speed of the site, so that water at rest has no bend.
+
+    Parameters
+    ----------
+    cells : Cells
+
+    Returns
+    -------
+    (nx, ny, m) [-]
     """
     u, v = cells.u, cells.v
     turn = u**2 * cells.v_x - v**2 * cells.u_y + u * v * (cells.v_y - cells.u_x)

@@ -76,13 +76,26 @@ def _submerged(law: int, phi: float, top: float, depth: float) -> float:
 
 @compiled
 def above_canopy(top: float, depth: float) -> float:
-    """g^(1/2)/kappa ln(max(h/h_d, 1)): what the water above the plants adds to C by Baptist's law [m^1/2/s]."""
+    """g^(1/2)/kappa ln(max(h/h_d, 1)): what the water above the plants adds to C by Baptist's law [m^1/2/s].
+
+    Parameters
+    ----------
+    top, depth : h_d, h [m]
+    """
     return math.sqrt(GRAVITY) / KARMAN * math.log(max(depth / top, 1.0))
 
 
 @compiled
 def baptist_chezy(phi: float, top: float, depth: float, bare: float) -> float:
-    """C = (1/C_b^2 + phi/2g)^(-1/2) + g^(1/2)/kappa ln(max(h/h_d, 1)) [m^1/2/s]."""
+    """C = (1/C_b^2 + phi/2g)^(-1/2) + g^(1/2)/kappa ln(max(h/h_d, 1)) [m^1/2/s].
+
+    Parameters
+    ----------
+    phi : [-]
+        C_D m D h_d.
+    top, depth : h_d, h [m]
+    bare : C_b [m^1/2/s]
+    """
     return 1.0 / math.sqrt(1.0 / bare**2 + phi / (2.0 * GRAVITY)) + above_canopy(top, depth)
 
 

@@ -37,11 +37,20 @@ def canopy_deflection(plants: PlantCells, rate: Array) -> dict[str, Array]:
 
 def bent_blade(cauchy: Array, buoyancy: Array) -> tuple[Array, Array]:
     """l_e/l = 1 - (1 - 0.9 Ca^(-1/3)) / (1 + Ca^(-3/2) (8 + B^(3/2))), the effective length of a flexible blade, and
-    h/l = 1 - (1 - Ca^(-1/4)) / (1 + Ca^(-3/5) (4 + B^(3/5)) + Ca^-2 (8 + B^2)), its height; both at most 1 [-].
 
-    Cauchy number Ca and buoyancy number B [-]; a blade is not shortened where Ca is below 0.9^3, nor lowered below 1.
-    Source: Luhar and Nepf (2011), doi 10.4319/lo.2011.56.6.2003, not compared with it: l_e as in ROMS
-    (vegetation_drag.F), the height from memory.
+        h/l = 1 - (1 - Ca^(-1/4)) / (1 + Ca^(-3/5) (4 + B^(3/5)) + Ca^-2 (8 + B^2)),
+
+    its height; both at most 1 [-]: a blade is not shortened where Ca is below 0.9^3, nor lowered below 1.
+
+    Parameters
+    ----------
+    cauchy, buoyancy : (cell, m) or (m,) [-]
+        Ca, the drag over the stiffness of the blade, and B, its buoyancy over that.
+
+    References
+    ----------
+    Luhar and Nepf (2011), doi:10.4319/lo.2011.56.6.2003, not compared with it: l_e as in ROMS (vegetation_drag.F), the
+    height from memory.
     """
     ca = np.maximum(cauchy, LEAST_CAUCHY)
     length = 1.0 - (1.0 - 0.9 * ca ** (-1 / 3)) / (1.0 + ca**-1.5 * (8.0 + buoyancy**1.5))

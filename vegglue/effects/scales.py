@@ -94,7 +94,15 @@ def has_scales(effect: Effect) -> bool:
 
 
 def at_site(effect: Effect, scales: SiteScales) -> Effect:
-    """The effect with its numbers in their units: multiples of the scales that `of` names are multiplied by these."""
+    """The effect with its numbers in their units: multiples of the scales that `of` names are multiplied by these.
+
+    Parameters
+    ----------
+    effect : Effect
+        Of the library.
+    scales : SiteScales
+        Of the site.
+    """
     if not has_scales(effect):
         return effect
 

@@ -11,7 +11,13 @@ AT_REST_SQUARED = 1e-6
 
 
 def speed_of(u: Array, v: Array) -> Array:
-    """|U| = (u^2 + v^2 + 0.001^2)^(1/2) [m/s]: it has a derivative at rest."""
+    """|U| = (u^2 + v^2 + 0.001^2)^(1/2) [m/s]: it has a derivative at rest.
+
+    Parameters
+    ----------
+    u, v : [m/s]
+        Of one shape, which comes back.
+    """
     return np.sqrt(u**2 + v**2 + AT_REST_SQUARED)
 
 
@@ -247,21 +253,38 @@ class Reading:
 
 
 def along(values: Array, dx: float) -> Array:
-    """d/dx by central differences, one-sided at the ends; values (nx, ny, m), the same shape comes back [unit/m]."""
+    """d/dx by central differences, one-sided at the ends, (nx, ny, m) [unit/m]; 0 in a single column.
+
+    Parameters
+    ----------
+    values : (nx, ny, m)
+    dx : [m]
+    """
     return _slope(values, dx) if values.shape[0] > 1 else np.zeros_like(values)
 
 
 def across(values: Array, dy: float) -> Array:
-    """d/dy by central differences, one-sided at the ends; values (nx, ny, m), the same shape comes back [unit/m]."""
+    """d/dy by central differences, one-sided at the ends, (nx, ny, m) [unit/m]; 0 in a single row.
+
+    Parameters
+    ----------
+    values : (nx, ny, m)
+    dy : [m]
+    """
     if values.shape[1] < 2:
         return np.zeros_like(values)
     return _slope(values.swapaxes(0, 1), dy).swapaxes(0, 1)
 
 
 def weighted_across(values: Array, weight: Array, dy: float) -> Array:
-    """d/dy, the mean of the differences on either side by their weight (nx, ny - 1, m) [unit/m].
+    """d/dy, the mean of the differences on either side by their weight, (nx, ny, m) [unit/m].
 
     Land has no weight, so that beside it the difference on the wet side counts alone.
+
+    Parameters
+    ----------
+    values, weight : (nx, ny, m), (nx, ny - 1, m)
+    dy : [m]
     """
     step, whole = np.zeros_like(values), np.zeros_like(values)
     weighted = weight * np.diff(values, axis=1)

@@ -15,7 +15,14 @@ from vegglue.effects.surroundings import Cells, ChannelGeometry
 
 
 def spot(geometry: ChannelGeometry, x: Array, y: Array, length: Array, width: Array) -> Array:
-    """exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) (nx, ny, m) [-]."""
+    """exp(-((x - x_0) / l)^2 - ((y - y_0) / w)^2) (nx, ny, m) [-].
+
+    Parameters
+    ----------
+    geometry : ChannelGeometry
+    x, y, length, width : (m,) [m]
+        x_0, y_0, l and w.
+    """
     return np.asarray(np.exp(-(((geometry.x - x) / length) ** 2) - ((geometry.y - y) / width) ** 2))
 
 
@@ -30,6 +37,14 @@ def rectangle(geometry: ChannelGeometry, x: Array, y: Array, length: Array, widt
         P = p(s, l, dx) p(n, w, dy),   p(s, l, d) = (tanh(2 (s + l) / d) - tanh(2 (s - l) / d)) / 2
 
     s and n are the distances from its middle along and across it: every parameter has a derivative.
+
+    Parameters
+    ----------
+    geometry : ChannelGeometry
+    x, y, length, width : (m,) [m]
+        Its middle, and half of its sides l and w.
+    angle : (m,) [degrees]
+        Of s to x, positive towards larger y.
     """
     turned, east, north = np.deg2rad(angle), geometry.x - x, geometry.y - y
     along = east * np.cos(turned) + north * np.sin(turned)
