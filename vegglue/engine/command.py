@@ -160,7 +160,19 @@ def read_predictions(path: Path, stations: int) -> Array:
 
 
 def refuse_marks(prediction: Array, station: pd.DataFrame) -> None:
-    """Raise FailedRunError if predictions (station,) are what codes write for dry cells and failed runs."""
+    """Refuse predictions that are what codes write for dry cells and failed runs.
+
+    Parameters
+    ----------
+    prediction : (n,) [unit of each station]
+    station : table of n stations
+
+    Raises
+    ------
+    FailedRunError
+        If one is a mark of a missing value, faster or higher than any river, exactly 0 where water was measured, or all
+        are 0.
+    """
     kinds, measured = station["kind"].to_numpy(str), station["value"].to_numpy(float)
     error, used = station["standard_error"].to_numpy(float), station["used"].to_numpy(bool)
     off = np.abs(prediction - measured)
@@ -188,7 +200,17 @@ def refuse_marks(prediction: Array, station: pd.DataFrame) -> None:
 
 @dataclass(frozen=True)
 class CommandEnd:
-    """How a run ended: its predictions (station,), or None and the reason; seconds: how long it took."""
+    """How a run ended.
+
+    Attributes
+    ----------
+    prediction
+        (station,) [unit of each], None if it failed.
+    reason
+        Why it failed, else empty.
+    seconds
+        That it took.
+    """
 
     prediction: Array | None
     reason: str
@@ -349,7 +371,12 @@ def _changes(settings: CommandEngine) -> Changes:
 
 
 def own_parameters(case: Case) -> tuple[str, ...]:
-    """Names of the parameters that a command gets: all but those of `effects`, which the built-in engine adds."""
+    """Names of the parameters that a command gets: all but those of `effects`, which the built-in engine adds.
+
+    Parameters
+    ----------
+    case : Case
+    """
     of_effects = {value for place, value, _ in values(case) if place[0] == "effects"}
     elsewhere = {value for place, value, _ in values(case) if place[0] != "effects"}
     return tuple(name for name in case.parameters if name in elsewhere or name not in of_effects)
@@ -443,8 +470,26 @@ def command_predictions(
     watch: Watch = silent,
     why: str = "",
 ) -> tuple[Array, list[str]]:
-    """Predictions (m, station), NaN if a run failed, and the reason of each, '' if it did not; why: what the runs are
-    for, the phase of their progress.
+    """f_c at many places: runs of the command, side by side, unless they are kept.
+
+    Parameters
+    ----------
+    runs, case, station, thetas
+        As `ended_runs`; m thetas.
+    watch, why
+        Called with the progress, and the phase of it: what the runs are for.
+
+    Returns
+    -------
+    (m, station)
+        [unit of each station], NaN if a run failed.
+    list of m str
+        The reason of each, empty if it did not.
+
+    Raises
+    ------
+    InputError, StorageError
+        As `ended_runs`.
     """
     found, reasons, failed = np.full((len(thetas), len(station)), np.nan), [""] * len(thetas), 0
     watch(Progress(why, 0, len(thetas), "runs"))

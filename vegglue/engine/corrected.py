@@ -79,7 +79,12 @@ Added = Callable[[Model, Array], tuple[Array, Array]]
 
 
 def rows_of_stations(known: pd.DataFrame, wanted: pd.DataFrame) -> NDArray[np.int64]:
-    """The row of each wanted station among the known ones, -1 if it is none of them."""
+    """The row of each wanted station among the known ones, -1 if it is none of them.
+
+    Parameters
+    ----------
+    known, wanted : tables of stations
+    """
     if wanted is known:
         return np.arange(len(known))
     rows = {key: row for row, key in enumerate(known[SAME_STATION].itertuples(index=False, name=None))}
@@ -91,7 +96,17 @@ class InsensitiveCommandError(InputError):
 
 
 def with_correction(added: Added, name: str) -> Engine:
-    """F(z) and what is added there: the built-in engine, corrected; name: of the engine."""
+    """F(z) + added(z): the built-in engine, corrected.
+
+    Responses to causes and cells stay those of F.
+
+    Parameters
+    ----------
+    added : callable
+        (model, z (p,)) -> what is added to predictions (n,) and slopes (n, p) there.
+    name : str
+        Of the engine.
+    """
 
     def linearise_corrected(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
         value, slope = added(model, z)
@@ -218,7 +233,12 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slope
 
 
 def without_effects(model: Model) -> Model:
-    """The model that a command stands for: no effects, and the parameters that the command is given."""
+    """The model that a command stands for: no effects, the parameters that the command is given, the built-in engine.
+
+    Parameters
+    ----------
+    model : Model
+    """
     names = own_parameters(model.case)
     parameters = {name: model.case.parameters[name] for name in names}
     return replace(model, case=model.case.model_copy(update={"effects": {}, "parameters": parameters}), engine=NEWTON)

@@ -38,7 +38,16 @@ def _their_flows(model: Model) -> dict[str, TheirFlow]:
 
 
 def their_predictions(station: pd.DataFrame, flows: dict[str, TheirFlow], grid: Grid) -> Array:
-    """Readings of the stations in the flow of the finished run (n,), NaN where it is dry."""
+    """Readings of the stations in the flow of the finished run (n,) [unit of each], NaN where it is dry.
+
+    Parameters
+    ----------
+    station : table of n stations
+    flows : dict of TheirFlow
+        By experiment.
+    grid : Grid
+        Across which a discharge is taken.
+    """
     found = np.full(len(station), np.nan)
     kinds, names = station["kind"].to_numpy(str), station["experiment"].to_numpy(str)
     x, y = station["x"].to_numpy(float), station["y"].to_numpy(float)
@@ -69,7 +78,15 @@ def _their_place(model: Model) -> Array:
 
 @dataclass(frozen=True)
 class ComparedFlows:
-    """Our flow and theirs with the same parameters: what is added to predictions, and how far both are apart."""
+    """Our flow and theirs with the same parameters.
+
+    Attributes
+    ----------
+    correction
+        f_theirs - F_0, what is added to predictions.
+    agreement
+        How far both flows are apart.
+    """
 
     correction: Correction
     agreement: ResultCompared

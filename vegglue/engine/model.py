@@ -86,7 +86,13 @@ def coarser_grid(case: Case, site: Site) -> tuple[Case, Site] | None:
 
 
 def ever_coarser(case: Case, site: Site) -> list[tuple[Case, Site]]:
-    """The case on its grid and on ever coarser ones, the coarsest first."""
+    """The case on its grid and on ever coarser ones, see `coarser_grid`, the coarsest first.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    """
     grids = [(case, site)]
     while (coarse := coarser_grid(*grids[0])) is not None:
         grids.insert(0, coarse)

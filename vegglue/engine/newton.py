@@ -123,7 +123,14 @@ class SteadyFlow:
 
 
 def problem_at(model: Model, experiment: str, z: Array) -> Problem:
-    """The flow problem of one experiment at z, (p,) or (m, p)."""
+    """The flow problem of one experiment at z.
+
+    Parameters
+    ----------
+    model : Model
+    experiment : str
+    z : (p,) or (m, p) [standard deviations of the prior]
+    """
     return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
 
 
@@ -243,8 +250,16 @@ def _from_coarser_cells(model: Model, experiment: str, z: Array, problem: Proble
 
 
 def on_half_as_many_cells(model: Model) -> Model | None:
-    """A model on half as many cells along and across, to whole numbers; None if the grid has less than COARSER_FROM
-    rows, or an inflow or the outlet has none of these cells.
+    """A model on half as many cells along and across, to whole numbers.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    Model or None
+        None if the grid has less than COARSER_FROM rows, or an inflow or the outlet has none of these cells.
     """
     (nx, ny), of = model.site.bed.shape, model.case.grid
     if ny < COARSER_FROM:
@@ -306,7 +321,18 @@ def _predict_members(model: Model, points: Sequence[Point], z: Array) -> Array:
 
 
 def predict_near(model: Model, point: Point, z: Array) -> Array:
-    """Predictions (m, n) at z (m, p) around a point, with its factors; NaN rows where they do not lead there."""
+    """f(z) around a point, with its factors; NaN rows where they do not lead there.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+    z : (m, p) [standard deviations of the prior]
+
+    Returns
+    -------
+    (m, n)
+    """
     found = np.full((len(z), len(model.station)), np.nan)
     for first in range(0, len(z), SLOTS_FROM_A_POINT):
         some = slice(first, min(first + SLOTS_FROM_A_POINT, len(z)))
@@ -487,8 +513,12 @@ def _with_own_factors(model: Model, point: Point) -> Point:
 def with_coarse_correction(point: Point, before: Point, after: Point) -> Point:
     """u + S dz + P (U_after - U_before - S_c dz): slopes of the point, and what they leave out on coarse cells.
 
-    u, U: states of the point and on cells of twice the size; S, S_c: their slopes; P: prolongation. See
-    `Engine.with_coarse_correction`.
+    u, U: states of the point and on cells of twice the size; S, S_c: their slopes; P: prolongation.
+
+    Parameters
+    ----------
+    point, before, after
+        See `Engine.with_coarse_correction`.
 
     References
     ----------
