@@ -216,7 +216,17 @@ def across_averages(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def upward_column(path: Path) -> str:
-    """The column of heights: `z`, a level, else `height` above the bed. Errors: as `headings_of`."""
+    """The column of heights in a file of points: `z`, a level, else `height` above the bed.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        As `headings_of`.
+    """
     there = headings_of(path)
     return "height" if "height" in there and "z" not in there else "z"
 

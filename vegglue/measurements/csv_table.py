@@ -71,7 +71,17 @@ def read_table(
 
 
 def headings_of(path: Path) -> list[str]:
-    """The headings of a CSV. Errors: as `read_table`."""
+    """The headings of a CSV.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        If it cannot be read as a table.
+    """
     return list(_raw_table(path).columns)
 
 
@@ -101,14 +111,43 @@ def _raw_table(path: Path) -> pd.DataFrame:
 
 
 def refuse_rows(path: Path, wrong: pd.Series, kind: str, column: pd.Series, **values: object) -> None:
-    """Errors: InputError of that kind with file, row, column and value of the first row that is `wrong` (rows,)."""
+    """Refuse a table in which a row is wrong.
+
+    Parameters
+    ----------
+    path : Path
+    wrong : Series of bool (rows,)
+    kind : str
+        Of the refusal.
+    column : Series (rows,)
+        Where it is wrong.
+    **values
+        Of the refusal.
+
+    Raises
+    ------
+    InputError
+        With file, row, column and value of the first row that is wrong.
+    """
     if wrong.any():
         row = wrong.idxmax()
         raise InputError(kind, file=path, row=row, column=str(column.name), got=column[row], **values)
 
 
 def refuse_repeated(path: Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
-    """Errors: InputError naming file and rows when two rows agree in all these columns."""
+    """Refuse a table of which two rows agree in some columns.
+
+    Parameters
+    ----------
+    path : Path
+    table : DataFrame
+    columns : sequence of str
+
+    Raises
+    ------
+    InputError
+        Naming file and rows.
+    """
     repeated = table.duplicated(list(columns))
     if repeated.any():
         row = repeated.idxmax()

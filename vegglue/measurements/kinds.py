@@ -62,10 +62,18 @@ class Kind:
 
 @dataclass(frozen=True)
 class UnstatedErrors:
-    """Used stations without a standard error: how many of each kind in words, and x, y of the first [m].
+    """Used stations without a standard error.
 
-    fill: columns of errors that exist and have gaps; add: columns that do not exist; usual: error of the first kind and
-    its unit.
+    Attributes
+    ----------
+    counts
+        How many of each kind, in words.
+    first
+        x, y of the first [m].
+    fill, add
+        Columns of errors that exist and have gaps, and that do not exist.
+    usual
+        Error of the first kind, and its unit.
     """
 
     counts: tuple[tuple[str, int], ...]
@@ -92,21 +100,50 @@ KINDS = {
 
 
 def kind_of(name: str, where: str = "observations") -> Kind:
-    """The kind of that name. Raises InputError, which begins with `where` and lists the known kinds."""
+    """The kind of that name.
+
+    Parameters
+    ----------
+    name : str
+    where : str
+        How a refusal begins.
+
+    Raises
+    ------
+    InputError
+        If it is none of KINDS.
+    """
     if name not in KINDS:
         raise InputError(f"{where}: expected a kind among {', '.join(KINDS)}, got {name!r}; correct it.")
     return KINDS[name]
 
 
 def velocity_rows(station: pd.DataFrame) -> NDArray[np.bool_]:
-    """Which stations measure a velocity, in whatever direction (station,). Errors: InputError for an unknown kind."""
+    """Which stations measure a velocity, in whatever direction (station,).
+
+    Parameters
+    ----------
+    station : table of stations
+
+    Raises
+    ------
+    InputError
+        If a kind is unknown.
+    """
     return np.array([kind_of(str(name)).velocity for name in station["kind"]], dtype=bool)
 
 
 def leading_velocities(station: pd.DataFrame) -> NDArray[np.bool_]:
-    """Which stations in use measure a velocity along x (station,); in whatever direction where none does.
+    """Which stations in use measure a velocity along x (station,); in whatever direction if none does.
 
-    Errors: InputError for an unknown kind.
+    Parameters
+    ----------
+    station : table of stations
+
+    Raises
+    ------
+    InputError
+        If a kind is unknown.
     """
     used = station["used"].to_numpy()
     along = used & (station["kind"] == STREAMWISE).to_numpy()
@@ -127,7 +164,17 @@ def stations_in_short(station: pd.DataFrame) -> str:
 
 
 def unstated_errors(station: pd.DataFrame) -> UnstatedErrors | None:
-    """Which of the used stations state no standard error; None if all do."""
+    """Which of the used stations state no standard error; None if all do.
+
+    Parameters
+    ----------
+    station : table of stations
+
+    Raises
+    ------
+    InputError
+        If a kind is unknown.
+    """
     used = station[station["used"]]
     stated = used["standard_error"] > 0
     bare = used[~stated]

@@ -107,10 +107,14 @@ def _with_types(parts: Sequence[pd.DataFrame], types: Mapping[str, type]) -> pd.
 
 
 def section_places(station: pd.DataFrame) -> pd.Series:
-    """The x of the section of each station [m]: the median of those of its name in its experiment, as a boat does not
-    keep its line.
+    """The x of the section of each station (station,) [m]: the median of those of its name in its experiment.
 
-    Stations without such a name, or that lie along the channel rather than across it, have their own x.
+    A boat does not keep its line. Stations without such a name, or that lie along the channel rather than across it,
+    have their own x.
+
+    Parameters
+    ----------
+    station : table of stations
     """
     group = station.groupby(["experiment", "section"])
     along = group["x"].transform("max") - group["x"].transform("min")
@@ -120,7 +124,13 @@ def section_places(station: pd.DataFrame) -> pd.Series:
 
 
 def section_place(station: pd.DataFrame, experiment: str, section: str) -> float:
-    """The x of a section of one experiment [m]: the median of its stations; NaN without any."""
+    """The x of a section of one experiment [m]: the median of its stations; NaN without any.
+
+    Parameters
+    ----------
+    station : table of stations
+    experiment, section : str
+    """
     own = (station["experiment"] == experiment) & (station["section"] == section)
     return float(station.loc[own, "x"].median())
 
@@ -202,7 +212,18 @@ def read_observations(case: Case) -> Observations:
 
 
 def refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:
-    """Errors: InputError for a section or device that an effect is limited to, but no measurement comes from."""
+    """Refuse an effect that is limited to what no measurement comes from.
+
+    Parameters
+    ----------
+    case : Case
+    table : table of stations
+
+    Raises
+    ------
+    InputError
+        For a section or device without a station.
+    """
     for name, entry in case.effects.items():
         for column, words in (("section", entry.sections), ("device", entry.devices)):
             known = [str(word) for word in table[column].unique() if word]
@@ -215,7 +236,18 @@ def refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:
 
 
 def fitted_curve(profile: "pd.Series[float]") -> ProfileFit | None:
-    """The curve of one row of Observations.profiles, for drawing; None without a fit. Its covariance is NaN."""
+    """u(z) of a vertical, for drawing; its covariance is NaN.
+
+    Parameters
+    ----------
+    profile : Series
+        A row of Observations.profiles.
+
+    Returns
+    -------
+    ProfileFit or None
+        None without a fit.
+    """
     if not np.isfinite(profile["top"]):
         return None
     return ProfileFit(profile["within"], profile["slope"], profile["top"], np.full((3, 3), np.nan), profile["scatter"])

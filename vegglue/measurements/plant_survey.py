@@ -21,7 +21,13 @@ DRAG_COEFFICIENT = 1.0  # [-] of submerged plants: Berends et al. (2020), after 
 
 @dataclass(frozen=True)
 class SurveyedQuantity:
-    """One row of the survey: mean, standard deviation between plants (0 if unknown) and number of plants, in SI."""
+    """One row of the survey, in SI.
+
+    Attributes
+    ----------
+    mean, standard_deviation, samples
+        Of the plants, between them (0 if unknown), and how many of them.
+    """
 
     mean: float
     standard_deviation: float

@@ -110,7 +110,15 @@ class ImplausibleValues:
 
 @dataclass(frozen=True)
 class ImplausibleOutlet:
-    """An outlet deeper than channels are, or all but still: level, depth, width of the grid [m] and Q / A [m/s]."""
+    """An outlet deeper than channels are, or all but still.
+
+    Attributes
+    ----------
+    level, depth, width
+        At the outlet, largest depth there, and width of the grid [m].
+    velocity
+        Q / A [m/s].
+    """
 
     experiment: str
     level: float
@@ -154,13 +162,24 @@ PLAUSIBLE: Judgement = (None, 1.0, "")
 
 
 def is_mark(value: float) -> bool:
-    """Whether a number is one that stands for a missing value: of nines only (-999, 99.9, 9999), 1e30 and the like."""
+    """Whether a number is one that stands for a missing value: of nines only (-999, 99.9, 9999), 1e30 and the like.
+
+    Parameters
+    ----------
+    value : [SI]
+        Measured, no coordinate.
+    """
     size = abs(value)
     return size >= LARGEST_MEASURED or size in _SIZES or (size >= LEAST_NINES and is_of_nines(size))
 
 
 def is_mark_anywhere(value: float) -> bool:
-    """Whether a number stands for a missing value also among places, where 9 and 99 are measured."""
+    """Whether a number stands for a missing value also among places, where 9 and 99 are measured.
+
+    Parameters
+    ----------
+    value : [SI]
+    """
     negative_nines = value <= -99.0 and is_of_nines(-value)
     return negative_nines or value in MARKS_OF_ANY_COLUMN or not abs(value) <= LARGEST_COORDINATE
 
@@ -215,7 +234,13 @@ def implausible_values(case: Case, site: Site, station: pd.DataFrame) -> list[Im
 
 
 def implausible_levels(case: Case, site: Site, station: pd.DataFrame) -> pd.Series:
-    """Whether each row is a level that its experiment cannot have, whatever its error."""
+    """Whether each row is a level that its experiment cannot have, whatever its error (station,).
+
+    Parameters
+    ----------
+    case, site, station
+        As `implausible_values`.
+    """
     _, wrong = _judged(case, site, station[station["used"]])
     of_errors = wrong["problem"].isin([Symptom.SMALL_ERROR, Symptom.LARGE_ERROR])
     return station.index.to_series().isin(wrong.index[(wrong["kind"] == WATER_LEVEL) & ~of_errors])

@@ -297,10 +297,19 @@ def section_discharges(
 
 
 def carried_discharges(case: Case, site: Site, station: pd.DataFrame) -> list[CarriedDischarge]:
-    """Of each section across the channel with FEWEST_VERTICALS in the water, in the order of the table; without levels
-    that its experiment cannot have.
+    """Q = sum_i w_i U_i of each section across the channel, see `conveyance_weights`.
 
-    station: as Observations.table [SI].
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    station : DataFrame
+        As Observations.table [SI]; levels that their experiment cannot have are left out.
+
+    Returns
+    -------
+    list of CarriedDischarge
+        In the order of the table; none with fewer than FEWEST_VERTICALS in the water.
     """
     used = station[station["used"] & ~implausible_levels(case, site, station)]
     velocity = used[(used["kind"] == STREAMWISE) & (used["section"] != "")]
@@ -313,8 +322,17 @@ def carried_discharges(case: Case, site: Site, station: pd.DataFrame) -> list[Ca
 
 
 def mismatched_discharges(case: Case, site: Site, station: pd.DataFrame) -> list[CarriedDischarge]:
-    """Sections that clearly carry another discharge than stated; none beside values that no flow can have, and none
-    whose discharge an effect of the case changes. station: as Observations.table [SI].
+    """Sections that clearly carry another discharge than stated, and whose discharge no effect of the case changes.
+
+    Parameters
+    ----------
+    case, site, station
+        As `carried_discharges`.
+
+    Returns
+    -------
+    list of CarriedDischarge
+        Empty beside values that no flow can have.
     """
     off = [
         one
@@ -325,13 +343,27 @@ def mismatched_discharges(case: Case, site: Site, station: pd.DataFrame) -> list
 
 
 def discharge_mismatches(off: Sequence[CarriedDischarge]) -> list[DischargeMismatch]:
-    """Sections that carry another discharge than stated, those that carry more together and then those with less."""
+    """Sections that carry another discharge than stated, those that carry more together and then those with less.
+
+    Parameters
+    ----------
+    off : sequence of CarriedDischarge
+        Of `mismatched_discharges`.
+    """
     groups = [one for one in off if one.ratio > 1.0], [one for one in off if one.ratio <= 1.0]
     return [DischargeMismatch(tuple(group)) for group in groups if group]
 
 
 def changing_discharge(case: Case, experiment: str, x: float) -> str:
-    """The key of an effect of the case by which another discharge than stated passes x [m]; '' for none."""
+    """The key of an effect of the case by which another discharge than stated passes a section; '' for none.
+
+    Parameters
+    ----------
+    case : Case
+    experiment : str
+    x : [m]
+        Of the section.
+    """
     for name, entry in case.effects.items():
         place = entry.values.get("x")
         is_below = not isinstance(place, str) and place is not None and place > x

@@ -21,7 +21,15 @@ BEYOND_MESH = 2.0
 
 @dataclass(frozen=True, eq=False)
 class TheirFlow:
-    """The flow of a finished run at its own places (n,), along and across the channel; SI. Dry places have depth 0."""
+    """The flow of a finished run at its own places, along and across the channel.
+
+    Attributes
+    ----------
+    x, y, bed, depth
+        (n,) [m]; the depth is 0 where it is dry.
+    u, v
+        (n,) [m/s].
+    """
 
     x: Array
     y: Array
@@ -90,7 +98,17 @@ class TheirFlow:
 
 
 def read_their_flow(path: Path) -> TheirFlow:
-    """The flow in a file of a case, with the columns COLUMNS. Raises InputError."""
+    """The flow in a file of a case, with the columns COLUMNS.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or holds dry places alone.
+    """
     rows = read_table(path, (), COLUMNS)
     if not (rows["depth"] > 0.0).any():
         raise InputError(f"{shown_path(path)}: expected a flow, got {len(rows)} dry places; import it anew.")
