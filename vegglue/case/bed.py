@@ -36,7 +36,17 @@ MOST_MEANS_KEPT = 16
 
 @dataclass(frozen=True)
 class Raster:
-    """Values (nx, ny) at centres x (nx,) and y (ny,), both rising [m]; NaN where the file has no data."""
+    """Values of a raster at its centres.
+
+    Attributes
+    ----------
+    x, y
+        (nx,) and (ny,), both rising [m].
+    size
+        Of a cell [m].
+    values
+        (nx, ny), NaN where the file has no data.
+    """
 
     x: Array
     y: Array
@@ -136,17 +146,31 @@ def levels_at(raster: Raster, x: Array, y: Array) -> Array:
 
 
 def nearest_at(raster: Raster, x: Array, y: Array) -> Array:
-    """Values of the raster cells in which x (nx, 1) and y (1, ny), or both (nx, ny), lie; NaN outside."""
+    """Values of the raster cells in which places lie; NaN outside.
+
+    Parameters
+    ----------
+    raster : Raster
+    x, y : (nx, 1), (1, ny), or both (nx, ny) [m]
+    """
     i = np.clip(np.rint((x - raster.x[0]) / raster.size).astype(int), 0, raster.x.size - 1)
     j = np.clip(np.rint((y - raster.y[0]) / raster.size).astype(int), 0, raster.y.size - 1)
     return np.where(_covered(raster, x, y), raster.values[i, j], np.nan)
 
 
 def survey_levels(path: Path, x: Array, y: Array) -> Array:
-    """Levels [m] at x (nx, 1) and y (1, ny), or both (nx, ny): linear on the Delaunay triangles of surveyed points x,
-    y, z; NaN outside their hull.
+    """z linear on the Delaunay triangles of surveyed points, (nx, ny) [m]; NaN outside their hull.
 
-    Errors: InputError when the file cannot be read, or all points lie on one line.
+    Parameters
+    ----------
+    path : Path
+        A table of x, y, z.
+    x, y : (nx, 1), (1, ny), or both (nx, ny) [m]
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or all points lie on one line.
     """
     from scipy.interpolate import LinearNDInterpolator  # late: a bed without points need not wait for it
     from scipy.spatial import QhullError
@@ -162,7 +186,18 @@ def survey_levels(path: Path, x: Array, y: Array) -> Array:
 
 
 def read_points(path: Path, columns: Sequence[str] = ("x", "y", "z")) -> Array:
-    """Columns of a CSV file, (points, columns) [m]. Errors: InputError for a missing column or number."""
+    """Columns of a CSV file, (points, columns) [m].
+
+    Parameters
+    ----------
+    path : Path
+    columns : sequence of str
+
+    Raises
+    ------
+    InputError
+        For a missing column or number.
+    """
     lines = (line for line in read_text(path, LARGEST_DATA).splitlines() if line.strip() and not line.startswith("#"))
     points = []
     try:
@@ -183,9 +218,18 @@ def read_points(path: Path, columns: Sequence[str] = ("x", "y", "z")) -> Array:
 
 
 def read_bed_survey(path: Path, loose: Sequence[int] = ()) -> BedSurvey:
-    """The columns x, y, z and line of a CSV file; loose: see `BedSurvey`.
+    """The columns x, y, z and line of a CSV file.
 
-    Errors: InputError for what is no number, or too few points.
+    Parameters
+    ----------
+    path : Path
+    loose : sequence of int
+        See `BedSurvey`.
+
+    Raises
+    ------
+    InputError
+        For what is no number, or too few or too many points.
     """
     points = read_points(path, (*"xyz", "line"))
     if not FEWEST_SURVEYED <= len(points) <= MOST_SURVEYED:
@@ -222,10 +266,22 @@ def _covered(raster: Raster, x: Array, y: Array) -> NDArray[np.bool_]:
 
 
 def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
-    """Level z_b (nx, ny) [m] of one layer, NaN for no data; upstream: x of the upstream edge of the case [m].
+    """z_b of one layer, (nx, ny) [m]; NaN for no data.
 
     A trapezoid has z_b = level - S (x - x_0) + s min(max(|y - axis| - b/2, 0), (B - b)/2), with floor b and top B [m].
     Relevelled lines of a survey change it by what the kriged mean changes by without their levels.
+
+    Parameters
+    ----------
+    layer : BedLayer
+    grid : Grid
+    upstream : [m]
+        x_0, that of the upstream edge of the case.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read.
     """
     if layer.trapezoid is not None:
         channel = layer.trapezoid
@@ -266,8 +322,18 @@ def cell_places(grid: Grid) -> Array:
 
 
 def spline_places(grid: Grid, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array]:
-    """x (a,) and y (b,) [m] of places from edge to edge of a grid, SPACING of the shortest length apart or as many as
-    there are cells: from these `to_cells` follows a bed of such covariances.
+    """Places from edge to edge of a grid from which `to_cells` follows a bed of such covariances.
+
+    SPACING of their shortest length apart, or as many as there are cells.
+
+    Parameters
+    ----------
+    grid : Grid
+    covariances : sequence of CovarianceOfBed
+
+    Returns
+    -------
+    x, y : (a,), (b,) [m]
     """
 
     def places(centres: Array, size: float, lengths: Sequence[float]) -> Array:
@@ -280,8 +346,14 @@ def spline_places(grid: Grid, covariances: Sequence[CovarianceOfBed]) -> tuple[A
 
 
 def to_cells(values: Array, x: Array, y: Array, grid: Grid) -> Array:
-    """Values (a b, k) at places x (a,) and y (b,) carried to all cells (nx ny, k) by cubic splines, in the single
-    precision that a bed has.
+    """Cubic splines through values at places, at all cells (nx ny, k), in the single precision that a bed has.
+
+    Parameters
+    ----------
+    values : (a b, k)
+    x, y : (a,), (b,) [m]
+        See `spline_places`.
+    grid : Grid
     """
     from scipy.interpolate import make_interp_spline  # late: a case without a survey need not wait for it
 
@@ -294,10 +366,19 @@ def to_cells(values: Array, x: Array, y: Array, grid: Grid) -> Array:
 
 
 def bed_levels(case: Case, grid: Grid, experiment: str = "") -> Array:
-    """Bed level z_b (nx, ny) [m] at the centres of any grid, of each cell the last layer that has data: those of the
-    case, then those of an experiment that is named and has its own.
+    """z_b at the centres of any grid, (nx, ny) [m]: of each cell that of the last layer that has data.
 
-    Errors: InputError if no layer has data, or a file cannot be read.
+    Parameters
+    ----------
+    case : Case
+    grid : Grid
+    experiment : str
+        Whose own layers come after those of the case, if it is named and has some.
+
+    Raises
+    ------
+    InputError
+        If no layer has data, or a file cannot be read.
     """
     bed = np.full((grid.x.size, grid.y.size), np.nan)
     own = case.experiments[experiment].bed if experiment in case.experiments else None

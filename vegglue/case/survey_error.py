@@ -62,8 +62,16 @@ PLACES_AT_A_TIME = 5000
 
 @dataclass(frozen=True)
 class BedSurvey:
-    """points: x along, y across and z (n, 3) [m]; line: number of the line of each (n,), -1 for a point in none; loose:
-    numbers of lines whose level is not known, as they were levelled wrongly, only their shape.
+    """Points of a survey of the bed.
+
+    Attributes
+    ----------
+    points
+        x along, y across and z (n, 3) [m].
+    line
+        Number of the line of each (n,), -1 for a point in none.
+    loose
+        Numbers of lines whose level is not known, as they were levelled wrongly, only their shape.
     """
 
     points: Array
@@ -104,7 +112,14 @@ class BedSurvey:
 
 
 def correlation_of_bed(places: Array, others: Array, along: float, across: float, rough: bool) -> Array:
-    """M (n, m) [-] between places (n, >= 2) and others (m, >= 2) [m]."""
+    """M = m(r), or exp(-|dx| / l_x) m(|dy| / l_y) of a rough bed, (n, m) [-], as in the head of this file.
+
+    Parameters
+    ----------
+    places, others : (n, >= 2), (m, >= 2) [m]
+    along, across : l_x, l_y [m]
+    rough : bool
+    """
     found, axes = np.empty((len(places), len(others))), slice(1 if rough else 0, 2)
     here, there = (each[:, :2] / (along, across) for each in (places, others))
     for first in range(0, len(others), PLACES_AT_A_TIME):
@@ -116,8 +131,17 @@ def correlation_of_bed(places: Array, others: Array, along: float, across: float
 
 
 def fitted_covariances(survey: BedSurvey) -> list[CovarianceOfBed]:
-    """Those of a survey with their chances, which sum to one; the least likely ones are left out. Of more than
-    MOST_FITTED points those in the middle of the reach count.
+    """Covariances of the largest restricted likelihood for each l_x, with their chances, which sum to one.
+
+    Parameters
+    ----------
+    survey : BedSurvey
+        Its lines all count as levelled well; of more than MOST_FITTED points those in the middle of the reach count.
+
+    Returns
+    -------
+    list of CovarianceOfBed
+        The least likely ones are left out.
     """
     if len(survey.points) > MOST_FITTED:
         own = {number: survey.points[survey.line == number, 0].mean() for number in np.unique(survey.line)}
@@ -195,8 +219,17 @@ def covariances_beside_wrong_line(survey: BedSurvey) -> list[CovarianceOfBed]:
 
 
 def left_out(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array]:
-    """Reading less prediction and its standard deviation (n,) [m] of each point, with its line left out; of a point in
-    no line with itself left out. The standard deviation is that of the reading, with the error of its point.
+    """(Q_ii)^-1 (Q z)_i of each line i: reading less prediction with it left out; of a point in no line, itself.
+
+    Parameters
+    ----------
+    survey : BedSurvey
+    covariances : sequence of CovarianceOfBed
+
+    Returns
+    -------
+    error, standard deviation : (n,), (n,) [m]
+        Of each point; the latter is that of the reading, with the error of its point.
     """
     z = survey.points[:, 2]
     errors, squares = (np.zeros((len(covariances), len(z))) for _ in range(2))
@@ -213,7 +246,12 @@ def left_out(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple
 def lines_left_out(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], straight: Array) -> LinesLeftOut:
     """How well the lines between the outermost, or else all points, are predicted from the others.
 
-    straight: level less that of straight lines between the neighbours, with its line left out (n,) [m], NaN for none.
+    Parameters
+    ----------
+    survey, covariances
+        As `left_out`.
+    straight : (n,) [m]
+        Level less that of straight lines between the neighbours, with its line left out; NaN for none.
     """
     error, stated = left_out(survey, covariances)
     judged = np.isfinite(straight)
@@ -236,8 +274,18 @@ def lines_left_out(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], st
 
 
 def line_offsets(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array, Array]:
-    """d = 1'(Q z)_i / 1' Q_ii 1 and its standard error (1' Q_ii 1)^(-1/2) of each line i (lines,) [m]: by how much the
-    whole line is too high; and the correlations of 1'(Q z)_i (lines, lines) [-].
+    """d = 1'(Q z)_i / 1' Q_ii 1 and its standard error (1' Q_ii 1)^(-1/2): by how much the whole line i is too high.
+
+    Parameters
+    ----------
+    survey, covariances
+        As `left_out`.
+
+    Returns
+    -------
+    d, standard error : (lines,), (lines,) [m]
+    correlations : (lines, lines) [-]
+        Of 1'(Q z)_i.
     """
     z, lines, whole = survey.points[:, 2], survey.lines, survey.of_lines
     off, squares = (np.zeros((len(covariances), len(lines))) for _ in range(2))
@@ -253,11 +301,20 @@ def line_offsets(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> t
 
 
 def evidence_of_lines(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array]:
-    """h (lines,) and H (lines, lines) [-] with h = H d + e, e ~ N(0, 1): what the survey says about offsets d [m].
+    """h = H d + e, e ~ N(0, 1): what the survey says about offsets d [m] of its lines.
 
         H' H = G,   H' h = g,   g_i = d_i / s_i^2,   G_ij = c_ij / (s_i s_j)
 
     d_i, s_i and c_ij are those of `line_offsets`. A level and a slope of all lines leave no trace.
+
+    Parameters
+    ----------
+    survey, covariances
+        As `left_out`.
+
+    Returns
+    -------
+    h, H : (lines,) [-], (lines, lines) [1/m]
     """
     off, error, correlation = line_offsets(survey, covariances)
     values, vectors = np.linalg.eigh(correlation / np.outer(error, error))
@@ -274,8 +331,15 @@ def stands_out(found: LinesLeftOut) -> bool:
 def mean_level(
     survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array, levels: Array | None = None
 ) -> Array:
-    """The mean (m,) [m] of the bed at places (m, 2) [m], given a survey; levels (n, k): its columns (m, k) had the
-    points these levels [m].
+    """X beta + k' K^-1 (z - X beta): the mean of the bed given a survey, over its covariances (m,) [m].
+
+    Parameters
+    ----------
+    survey, covariances
+        As `left_out`.
+    places : (m, 2) [m]
+    levels : (n, k) [m], optional
+        In place of z; columns (m, k) come back.
     """
     basis = survey.basis(survey.points)
     z = survey.points[:, 2:] if levels is None else levels
@@ -293,7 +357,13 @@ def mean_level(
 
 
 def line_weights(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array) -> Array:
-    """By how much `mean_level` at places (m, 2) [m] rises with the level of each line (m, lines) [-]."""
+    """By how much `mean_level` rises with the level of each line (m, lines) [-].
+
+    Parameters
+    ----------
+    survey, covariances, places
+        As `mean_level`.
+    """
     return mean_level(survey, covariances, places, survey.of_lines)
 
 
@@ -369,7 +439,18 @@ def _kriging(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> _Krig
 
 
 def root_of_covariance(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array) -> Array:
-    """Columns B (m, k) [m], with B B' the covariance of the bed at places (m, 2) [m] around `mean_level`."""
+    """B with B B' the covariance of the bed around `mean_level`, but for a share LEFT_OUT of its variance.
+
+    Parameters
+    ----------
+    survey, covariances, places
+        As `mean_level`.
+
+    Returns
+    -------
+    (m, k) [m]
+        k is MOST_OF_SQUARE_ROOT at most.
+    """
     # Cholesky's square root B by the largest variance left, of several places apart at once: their columns are one
     # product of matrices, which takes a tenth of the time of one by one.
     kriging = _kriging(survey, covariances)
