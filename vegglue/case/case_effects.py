@@ -17,7 +17,14 @@ Theta = Mapping[str, Array]
 
 
 def value_of(value: Value, theta: Theta, members: int) -> Array:
-    """The number for all members, or the values of the parameter of that name, (members,)."""
+    """A number for all members, or the values of the parameter of that name, (members,) [its unit].
+
+    Parameters
+    ----------
+    value : float or str
+    theta : mapping of str to (members,)
+    members : int
+    """
     if isinstance(value, str):
         return np.array(theta[value], dtype=np.float64)
     return np.full(members, float(value))
@@ -45,7 +52,16 @@ def stages_of(case: Case, parameter: str) -> set[Stage]:
 
 
 def active_effects(case: Case, experiment: str, theta: Theta, members: int) -> tuple[ActiveEffect, ...]:
-    """Effects that act in one experiment, in the order of the library, with values (members,) of their parameters."""
+    """Effects that act in one experiment, in the order of the library.
+
+    Parameters
+    ----------
+    case : Case
+    experiment : str
+    theta : mapping of str to (members,)
+        Values of the parameters in their units.
+    members : int
+    """
     order = list(library(case.effect_file))
     here = [
         (effect_of(case, name), entry)

@@ -28,7 +28,15 @@ GEOMETRIES_KEPT = 8
 
 
 def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry:
-    """The geometry (nx, ny, 1) that effects see in one experiment, with the patches that stand in it."""
+    """The geometry (nx, ny, 1) that effects see in one experiment, with the patches that stand in it.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+        On this or another grid.
+    experiment : str
+    """
     stems = np.array([patch.stems for patch in case.plants.patches])
     relative = tuple((stems / stems.mean()).tolist()) if stems.size else ()
     scales, patches = site_scales(case, site), patches_present(case, experiment)
@@ -45,8 +53,18 @@ def patches_present(case: Case, experiment: str) -> tuple[int, ...]:
 
 
 def discharges_upstream_of(case: Case, experiment: Experiment, x: float) -> list[float | str] | None:
-    """Discharges, numbers or parameters, of what has entered upstream of x [m]; None where a side inflow lets water in
-    on both sides of x.
+    """Discharges, numbers [m3/s] or parameters, of what has entered upstream of x.
+
+    Parameters
+    ----------
+    case : Case
+    experiment : Experiment
+    x : [m]
+
+    Returns
+    -------
+    list or None
+        None if a side inflow lets water in on both sides of x.
     """
     given = []
     for name, value in experiment.discharge.items():
@@ -177,10 +195,17 @@ def _ends(share: Array, centres: Array, step: float) -> tuple[float, float]:
 
 
 def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
-    """h = max(z_out, z_floor(x) + z_out - z_floor(L)) - z_b, shape (nx, ny) [m]; negative where dry.
+    """h = max(z_out, z_floor(x) + z_out - z_floor(L)) - z_b, (nx, ny) [m]; negative where dry.
 
     A water surface parallel to the floor, but nowhere below the level at the outlet: good enough to see what is odd,
     usually too low where plants hold the water up.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    experiment : Experiment
+        Its level is a number, or the middle of a prior.
     """
     outlet = middle_value(case, experiment.level)
     floor = site.bed.min(axis=1)
@@ -189,7 +214,16 @@ def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
 
 
 def chezy(case: Case, of: FrictionClass, coefficient: float, depth: float) -> float:
-    """C [m^1/2/s] of a friction class with a value of its coefficient: h^(1/6)/n, 18 log10(12 h/k_s), or given."""
+    """C = h^(1/6)/n, 18 log10(12 h/k_s), or as given [m^1/2/s].
+
+    Parameters
+    ----------
+    case : Case
+        Of which the least 12 h/k_s is.
+    of : FrictionClass
+    coefficient : [s m^(-1/3), m or m^1/2/s]
+    depth : h [m]
+    """
     if of.law == "manning":
         return depth ** (1.0 / 6.0) / coefficient
     if of.law == "keulegan":
@@ -208,13 +242,17 @@ _kept: OrderedDict[tuple[int, ...], tuple[tuple[object, ...], SiteScales]] = Ord
 
 
 def site_scales(case: Case, site: Site | None = None) -> SiteScales:
-    """The scales of a case; site: on its grid, if it is at hand.
+    """h, U = Q / A and u* = (g h S)^(1/2) of a case, means over its experiments; h the median depth on the floor.
 
-        h = mean over the experiments of the median depth on the floor,   U = Q / A,   u* = (g h S)^(1/2)
-
-    with a water surface parallel to the floor, as `expected_depth` has it, and S the slope of the bed if Manning's n or
+    With a water surface parallel to the floor, as `expected_depth` has it, and S the slope of the bed if Manning's n or
     the roughness between the ends of its prior can balance it, else S = (U / (C h^(1/2)))^2 of the middle of the prior.
     Kept for the parts of the case on which they depend, which its children and its coarser grids share.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site, optional
+        On its grid, if it is at hand.
     """
     parts = (case.bed, case.experiments, case.friction, case.plants, case.eddy_viscosity)
     key = tuple(map(id, parts))

@@ -30,8 +30,14 @@ DISTANCES_AT_ONCE = 10_000_000
 
 @dataclass(frozen=True)
 class Centreline:
-    """Nodes of a centreline: s from its beginning [m], X and Y on the map [m], direction theta from the map's x axis,
-    counterclockwise [radians].
+    """Nodes of a centreline (nodes,).
+
+    Attributes
+    ----------
+    s, x, y
+        s from its beginning, X and Y on the map [m].
+    heading
+        theta from the x axis of the map, counterclockwise [radians].
     """
 
     s: Array
@@ -45,6 +51,10 @@ def centreline_of(shape: CentrelineShape) -> Centreline:
 
     Through points it is a natural cubic spline, its parameter the length of the polygon. Straight parts and arcs follow
     each other, in pieces whose chords are ds sin(dtheta/2) / (dtheta/2) long.
+
+    Parameters
+    ----------
+    shape : CentrelineShape
     """
     if shape.points is not None:
         from scipy.interpolate import CubicSpline  # late: a straight grid need not wait for it
@@ -73,7 +83,18 @@ def heading_at(line: Centreline, s: Array) -> Array:
 
 
 def on_map(line: Centreline, s: Array, n: Array) -> tuple[Array, Array]:
-    """x and y on the map [m] of places s along the centreline and n to its left [m]."""
+    """x = X(s) - n sin(theta), y = Y(s) + n cos(theta).
+
+    Parameters
+    ----------
+    line : Centreline
+    s, n : [m]
+        Places along it and to its left, of shapes that broadcast.
+
+    Returns
+    -------
+    x, y [m]
+    """
     x, y, theta = *_position(line, s), heading_at(line, s)
     return x - n * np.sin(theta), y + n * np.cos(theta)
 
@@ -82,6 +103,11 @@ def along_and_across(line: Centreline, x: Array, y: Array) -> tuple[Array, Array
     """s and n [m] of places on the map: those of the nearest point of the centreline, where p - (X, Y) is normal to it.
 
     Newton's steps ds = (p - (X, Y)) . t / (1 - n kappa), from the nearest node.
+
+    Parameters
+    ----------
+    line : Centreline
+    x, y : (n,) [m]
     """
     size = max(DISTANCES_AT_ONCE // line.x.size, 1)
     nearest = [
@@ -135,9 +161,16 @@ class Grid:
 
 
 def build_grid(case: Case) -> Grid:
-    """Cell centres x_i = x_0 + (i + 1/2) dx and y_j = y_0 + (j + 1/2) dy of a case [m].
+    """x_i = x_0 + (i + 1/2) dx and y_j = y_0 + (j + 1/2) dy: the grid of a case.
 
-    Errors: InputError where the centreline turns so sharply that cells would end in a point.
+    Parameters
+    ----------
+    case : Case
+
+    Raises
+    ------
+    InputError
+        If the centreline turns so sharply that cells would end in a point.
     """
     (west, east), (south, north), (dx, dy) = case.grid.x, case.grid.y, case.grid.cell
     nx, ny = round((east - west) / dx), round((north - south) / dy)
@@ -155,16 +188,28 @@ def build_grid(case: Case) -> Grid:
 
 
 def filter_width_of(case: Case) -> float:
-    """Delta = (dx dy)^(1/2) of the cells of a case, where it names no other [m]: below it eddies are not resolved.
+    """Delta = (dx dy)^(1/2) of the cells of a case [m], if it names no other: below it eddies are not resolved.
 
-    Source: Deardorff (1970), doi:10.1017/S0022112070000691, in two dimensions; not checked against it.
+    Parameters
+    ----------
+    case : Case
+
+    References
+    ----------
+    Deardorff (1970), doi:10.1017/S0022112070000691, in two dimensions; not checked against it.
     """
     dx, dy = case.grid.cell
     return float(case.grid.filter_width or np.sqrt(dx * dy))
 
 
 def on_cells(case: Case, cell: tuple[float, float]) -> Case:
-    """The case on cells of another size [m]; eddies are unresolved below the same width as on its own."""
+    """The case on cells of another size; eddies are unresolved below the same width as on its own.
+
+    Parameters
+    ----------
+    case : Case
+    cell : (dx, dy) [m]
+    """
     grid = case.grid.model_copy(update={"cell": cell, "filter_width": filter_width_of(case)})
     other: Case = case.model_copy(update={"grid": grid})
     return other
@@ -176,7 +221,12 @@ def centreline_in(case: Case) -> Centreline | None:
 
 
 def curvature_of(grid: Grid) -> Array:
-    """kappa = dtheta/ds of the centreline in each column of cells, (nx,) [1/m], positive where it turns left."""
+    """kappa = dtheta/ds of the centreline in each column of cells, (nx,) [1/m], positive where it turns left.
+
+    Parameters
+    ----------
+    grid : Grid
+    """
     if grid.centreline is None:
         return np.zeros(grid.x.size)
     edges = np.append(grid.x - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx)
@@ -184,7 +234,12 @@ def curvature_of(grid: Grid) -> Array:
 
 
 def cell_stretch(grid: Grid) -> Array:
-    """J = 1 - y kappa, the length of a cell over that on the centreline, (nx, ny) [-]; (1, 1) on a straight grid."""
+    """J = 1 - y kappa, the length of a cell over that on the centreline, (nx, ny) [-]; (1, 1) on a straight grid.
+
+    Parameters
+    ----------
+    grid : Grid
+    """
     if grid.centreline is None:
         return np.ones((1, 1))
     return np.asarray(1.0 - curvature_of(grid)[:, None] * grid.y)

@@ -124,10 +124,19 @@ def build_site(case: Case) -> Site:
 
 
 def cells_at(site: Site, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Indices (n,) each of the cells that places [m] lie in, the outermost beyond.
+    """The cells that places lie in, the outermost beyond.
 
     On the edge of two cells across, that of the lower one: a station at the toe of a bank stands on the floor, on
     either side of the channel. On one along, that of the upstream one.
+
+    Parameters
+    ----------
+    site : Site
+    x, y : (n,) [m]
+
+    Returns
+    -------
+    column, row : (n,), (n,)
     """
     grid = site.grid
     column = _index(x, grid.x, grid.dx, -1)

@@ -100,7 +100,17 @@ def _standard_bounds(mean: float, sd: float, low: float | None, high: float | No
 
 
 def sample_prior(parameters: Mapping[str, Parameter], members: int, seed: int) -> dict[str, NDArray[np.float64]]:
-    """x_ij = F_j^-1(s_ij) with s the `sobol_points`; an array (members,) for each parameter [unit of its prior]."""
+    """x_ij = F_j^-1(s_ij) with s the `sobol_points`.
+
+    Parameters
+    ----------
+    parameters : mapping of str to Parameter
+    members, seed : int
+
+    Returns
+    -------
+    dict of str to (members,) [unit of its prior]
+    """
     if not parameters:
         return {}
     points = sobol_points(len(parameters), members, seed)
@@ -147,18 +157,37 @@ def refuse_without_parameters(case: Case) -> None:
 
 
 def theta_at(case: Case, z: Array) -> dict[str, Array]:
-    """theta_j = F_j^-1(Phi(z_j)), an array (m,) for each parameter [its unit]; z (m, p) or (p,) [-]."""
+    """theta_j = F_j^-1(Phi(z_j)) of each parameter, {name: (m,)} [its unit].
+
+    Parameters
+    ----------
+    case : Case
+    z : (m, p) or (p,) [-]
+        Held within FURTHEST of 0.
+    """
     return parameters_at(case, ndtr(np.clip(np.atleast_2d(z), -FURTHEST, FURTHEST)))
 
 
 def z_at(case: Case, theta: dict[str, Array]) -> Array:
-    """z_j = Phi^-1(F_j(theta_j)) (m, p) [-], the inverse of `theta_at`, at most FURTHEST from 0."""
+    """z_j = Phi^-1(F_j(theta_j)) (m, p) [-], the inverse of `theta_at`, at most FURTHEST from 0.
+
+    Parameters
+    ----------
+    case : Case
+    theta : dict of str to (m,) [its unit]
+    """
     columns = [_normal(prior, theta[name]) for name, prior in case.parameters.items()]
     return np.column_stack(columns)
 
 
 def z_of(prior: Parameter, value: float) -> float:
-    """z = Phi^-1(F(value)) of one value of one parameter [-]."""
+    """z = Phi^-1(F(value)) [-], at most FURTHEST from 0.
+
+    Parameters
+    ----------
+    prior : Parameter
+    value : [unit of the prior]
+    """
     return float(_normal(prior, np.array([value]))[0])
 
 
@@ -168,9 +197,16 @@ def _normal(prior: Parameter, values: Array) -> Array:
 
 @dataclass(frozen=True)
 class PriorSample:
-    """Members as points s (m, p) of the unit cube [-] and as theta, {parameter: (m,)} [its unit], made of them once.
+    """Members as points of the unit cube and as theta, made of them once.
 
     Stored, solved and compared is this theta: made again of some of the points, its last digits may differ.
+
+    Attributes
+    ----------
+    points
+        s (m, p) [-].
+    theta
+        {parameter: (m,)} [its unit].
     """
 
     points: Array
@@ -192,14 +228,26 @@ def sample_at(case: Case, points: Array) -> PriorSample:
 
 
 def sample_of(case: Case, theta: Mapping[str, Array]) -> PriorSample:
-    """Members with these parameters, {parameter: (m,)}; s_j = F_j(theta_j)."""
+    """s_j = F_j(theta_j): members with these parameters.
+
+    Parameters
+    ----------
+    case : Case
+    theta : mapping of str to (m,) [its unit]
+    """
     values = {name: np.asarray(theta[name], dtype=np.float64) for name in case.parameters}
     columns = [probability(prior, values[name]) for name, prior in case.parameters.items()]
     return PriorSample(np.column_stack(columns), values)
 
 
 def parameters_at(case: Case, points: Array) -> dict[str, Array]:
-    """theta_j = F_j^-1(s_j), an array (m,) for each parameter [its unit]; points s (m, p) [-]."""
+    """theta_j = F_j^-1(s_j), {parameter: (m,)} [its unit].
+
+    Parameters
+    ----------
+    case : Case
+    points : s (m, p) [-]
+    """
     return {name: quantile(prior, points[:, j]) for j, (name, prior) in enumerate(case.parameters.items())}
 
 
@@ -214,7 +262,14 @@ def value_at(case: Case, value: Value, share: float) -> float:
 
 
 def prior_range(case: Case, value: Value) -> Bounds:
-    """What a value may be: 95 % of its prior, or itself twice."""
+    """What a value may be: 95 % of its prior, or itself twice [its unit].
+
+    Parameters
+    ----------
+    case : Case
+    value : float or str
+        A number, or the name of a parameter.
+    """
     if isinstance(value, str):
         low, high = quantile(case.parameters[value], [0.025, 0.975])
         return float(low), float(high)

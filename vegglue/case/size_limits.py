@@ -28,9 +28,15 @@ MOST_STATIONS = 20_000
 
 
 def factor_bytes(columns: float, rows: float) -> float:
-    """The memory of one member's factors [bytes]; columns nx along x, rows ny along y.
+    """B = 4 x 3 nx (3 ny)^2 by blocks, and on wide grids SPARSE_BYTES nx ny log2(ny): memory of one member's factors.
 
-    B = 4 x 3 nx (3 ny)^2 by blocks, and on wide grids SPARSE_BYTES nx ny log2(ny).
+    Parameters
+    ----------
+    columns, rows : nx, ny
+
+    Returns
+    -------
+    [bytes]
     """
     if rows >= WIDE_FROM:
         return SPARSE_BYTES * columns * rows * math.log2(rows)

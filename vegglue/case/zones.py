@@ -24,6 +24,11 @@ def corners_of(case: Case, patch: Patch) -> Array:
     """Corners (x, y) of a patch in order around it in the coordinates of the grid, (corners, 2) [m].
 
     A polygon is given on the map: along a centreline its sides bend, so that they are cut into short ones.
+
+    Parameters
+    ----------
+    case : Case
+    patch : Patch
     """
     line = centreline_in(case)
     if patch.polygon is not None and line is not None:
@@ -39,7 +44,10 @@ def corners_of(case: Case, patch: Patch) -> Array:
 def distance_to_outline(outline: Array, x: float, y: float) -> float:
     """d = min |p - (a + t (b - a))| over all sides a, b and t in [0, 1], the distance of p = (x, y) [m].
 
-    outline: corners (corners, 2) [m].
+    Parameters
+    ----------
+    outline : (corners, 2) [m]
+    x, y : [m]
     """
     start, side = outline, np.roll(outline, -1, axis=0) - outline
     from_start = np.array([x, y]) - start
@@ -64,7 +72,12 @@ def in_polygon(corners: Polygon, grid: Grid) -> Mask:
 
 
 def area_of(outline: Array) -> float:
-    """A = |sum(x_i y_(i+1) - x_(i+1) y_i)| / 2 [m2]; outline: corners (corners, 2) [m]."""
+    """A = |sum(x_i y_(i+1) - x_(i+1) y_i)| / 2 [m2].
+
+    Parameters
+    ----------
+    outline : (corners, 2) [m]
+    """
     x, y = outline.T
     return float(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
 
@@ -81,6 +94,12 @@ def share_in_patch(case: Case, patch: Patch, grid: Grid) -> Array:
 
     Of a polygon: lengths within it along LINES_IN_ROW lines of each row. A line enters it where it crosses the outline
     for the first, third .. time, and leaves it in between.
+
+    Parameters
+    ----------
+    case : Case
+    patch : Patch
+    grid : Grid
     """
     if patch.polygon is None:
         along, across = _share_in_range(patch.x, grid.x, grid.dx), _share_in_range(patch.y, grid.y, grid.dy)
@@ -133,7 +152,13 @@ def cells_of_patch(patch: Patch, grid: Grid) -> Mask:
 
 
 def slope(bed: Array, grid: Grid) -> Array:
-    """|grad z_b| by central differences, shape (nx, ny) [-]."""
+    """|grad z_b| by central differences, (nx, ny) [-].
+
+    Parameters
+    ----------
+    bed : (nx, ny) [m]
+    grid : Grid
+    """
     along, across = np.gradient(bed, grid.dx, grid.dy)
     return np.hypot(along / cell_stretch(grid), across)
 
@@ -141,7 +166,16 @@ def slope(bed: Array, grid: Grid) -> Array:
 def friction_classes(case: Case, grid: Grid, bed: Array) -> NDArray[np.int64]:
     """Index of the friction class of each cell (nx, ny): that of the last zone it lies in, else the default.
 
-    bed: levels (nx, ny) [m]. Errors: InputError for a raster that cannot be read or holds a number without a class.
+    Parameters
+    ----------
+    case : Case
+    grid : Grid
+    bed : (nx, ny) [m]
+
+    Raises
+    ------
+    InputError
+        For a raster that cannot be read or holds a number without a class.
     """
     names = list(case.friction.classes)
     index = np.full(bed.shape, names.index(case.friction.default), dtype=np.int64)
@@ -170,8 +204,12 @@ def friction_classes(case: Case, grid: Grid, bed: Array) -> NDArray[np.int64]:
 def beyond_slope_break(steep: Mask, bed: Array) -> Mask:
     """Cells (nx, ny) from the first steep one outward, on both sides of the lowest cell of each cross-section.
 
-    steep (nx, ny); bed: levels (nx, ny) [m]. The lowest cell is sought among those that are not steep: of an even
-    floor, the first one may be at the toe of a bank.
+    The lowest cell is sought among those that are not steep: of an even floor, the first one may be at the toe of a
+    bank.
+
+    Parameters
+    ----------
+    steep, bed : (nx, ny), (nx, ny) [m]
     """
     even = np.where(steep & ~steep.all(axis=1, keepdims=True), np.inf, bed)
     columns, rows = np.arange(bed.shape[1])[None, :], even.argmin(axis=1)[:, None]
@@ -207,7 +245,18 @@ def ranges_without_cells(case: Case, grid: Grid) -> Iterator[str]:
 
 
 def refuse_ranges_without_cells(case: Case, grid: Grid) -> None:
-    """Errors: InputError when no cell centre lies in the range of an inflow or of the outlet."""
+    """Refuse a grid on which an inflow or the outlet has no cell.
+
+    Parameters
+    ----------
+    case : Case
+    grid : Grid
+
+    Raises
+    ------
+    InputError
+        If no cell centre lies in the range of one.
+    """
     for key in ranges_without_cells(case, grid):
         raise InputError(
             f"{shown_path(case.source)}: `{key}` expected a range with the centre of a cell in it, got one between "
