@@ -82,7 +82,7 @@ def half_width(site: Site) -> float:
     return float(np.median(_section(site)[1]))
 
 
-def beyond_floor(site: Site) -> NDArray[np.bool_]:
+def _beyond_floor(site: Site) -> NDArray[np.bool_]:
     """Cells (nx, ny) beyond the toe of the banks."""
     return ~_section(site)[2]
 
@@ -260,11 +260,11 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
         return kept[1]
     site = build_site(case) if site is None else site
     depths, means, speeds, discharges = [], [], [], []
-    banks, kinds = beyond_floor(site), np.zeros(2 * len(site.class_names))
+    banks, kinds = _beyond_floor(site), np.zeros(2 * len(site.class_names))
     for name, experiment in case.experiments.items():
         here = in_experiment(site, name)
         of_cells = np.maximum(expected_depth(case, here, experiment), 0.0)
-        beyond, even = beyond_floor(here), (_side_slope(here) <= BANK_SLOPE) & (of_cells > 0.0)
+        beyond, even = _beyond_floor(here), (_side_slope(here) <= BANK_SLOPE) & (of_cells > 0.0)
         kinds += np.bincount((2 * here.friction_class + beyond)[even], minlength=kinds.size)
         floor = np.where(beyond, 0.0, of_cells)
         wet = (of_cells > 0.0).sum(axis=1)

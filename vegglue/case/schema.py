@@ -101,7 +101,7 @@ FARTHEST_BOUND = 7.0
 WIDEST_LOG = 20.0
 
 
-def unusable(distribution: str, numbers: Mapping[str, float | None]) -> str | None:
+def _unusable(distribution: str, numbers: Mapping[str, float | None]) -> str | None:
     """What a prior should have been; None for one that can be drawn from.
 
     numbers: low, high, mean, sd, median and log_sd, None where there is none.
@@ -165,7 +165,7 @@ class Parameter(Part):
         if self.distribution == "loguniform" and self.low is not None and self.low <= 0:
             raise ValueError("a `low` above 0 for a loguniform prior")
         keys_of_numbers = ("low", "high", "mean", "sd", "median", "log_sd")
-        wanted = unusable(self.distribution, {key: getattr(self, key) for key in keys_of_numbers})
+        wanted = _unusable(self.distribution, {key: getattr(self, key) for key in keys_of_numbers})
         if wanted is not None:
             raise ValueError(wanted)
         return self
