@@ -107,7 +107,8 @@ def even_geometry(bed: Array, banks: Array, cell: tuple[float, float]) -> Channe
     far = nothing + np.inf
     return ChannelGeometry(
         x=centres(nx * cell[0], nx)[:, None, None], y=(centres(ny * cell[1], ny) - 0.5 * ny * cell[1])[None, :, None],
-        share_along=np.zeros((nx, 1, 1)), dx=cell[0], dy=cell[1], filter_width=(cell[0] * cell[1]) ** 0.5,
+        share_along=np.zeros((nx, 1, 1)), length=nx * cell[0], dx=cell[0], dy=cell[1],
+        filter_width=(cell[0] * cell[1]) ** 0.5,
         bed=bed[..., None], offset=nothing,
         half_width=nothing + 1.5, side_slope=nothing, bank=banks[..., None].astype(float), planted=nothing, front=far,
         edge=far, wake=far, patch=nothing - 1.0,

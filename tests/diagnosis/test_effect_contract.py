@@ -8,9 +8,20 @@ import pytest
 
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
-from vegglue.diagnosis.effect_contract import AMPLITUDE, CHANNEL, CHANNEL_SCALES, ContractRule, breaches, sizes, trial
+from vegglue.diagnosis.effect_contract import (
+    AMPLITUDE,
+    CHANNEL,
+    CHANNEL_SCALES,
+    ContractRule,
+    breaches,
+    moving_water,
+    sizes,
+    trial,
+)
 from vegglue.effects.definition import STAGES, Amplitude, Effect, Shape
 from vegglue.effects.library import SHIPPED, library
+from vegglue.flow import closures
+from vegglue.flow.equations import residual
 from vegglue.flow.march import march
 from vegglue.flow.newton import newton
 from vegglue.flow.problem import ALONG, take
@@ -25,6 +36,19 @@ OF_THE_PLANET = ("wind", "turning_earth")
 @pytest.mark.parametrize("effect", SHIPPED, ids=lambda effect: effect.name)
 def test_every_shipped_effect_keeps_the_contract_at_three_scales(effect, scale):
     assert breaches(effect, scale=CHANNEL_SCALES[scale]) == []
+
+
+OF_THE_FLOW = [effect for effect in library().values() if effect.stage in ("resistance", "exchange", "force")]
+
+
+@pytest.mark.parametrize("effect", OF_THE_FLOW, ids=lambda effect: effect.name)
+def test_no_effect_depends_on_the_columns_that_are_worked_on_together(effect, monkeypatch):
+    """A layer that grows from the inflow began anew after 200 columns."""
+    problem = trial(effect).problem(effect.amplitude.off + effect.amplitude.small)
+    state = moving_water(problem)
+    whole = residual(problem, state)
+    monkeypatch.setattr(closures, "CLOSURE_STRIP", 5)
+    assert np.array_equal(residual(problem, state), whole)
 
 
 def test_no_effect_holds_a_length_or_a_speed_of_its_own():

@@ -17,7 +17,7 @@ def filled(kind, given, shape):
     """A noun with some fields given, 0 in all others, of one shape; numbers and parts of it as they are."""
     kept = {
         name: given[name]
-        for name in ("dx", "dy", "filter_width", "geometry", "viscosity", "shear_depth")
+        for name in ("length", "dx", "dy", "filter_width", "geometry", "viscosity", "shear_depth")
         if name in given
     }
     names = [item.name for item in fields(kind) if item.name not in kept]
@@ -25,7 +25,8 @@ def filled(kind, given, shape):
 
 
 def geometry(**given):
-    usual = {"dx": 0.5, "dy": 0.25, "filter_width": 0.3, "stretch": 1.0, "depth_scale": 1.0, "speed_scale": 0.5}
+    usual = {"length": 4.5, "dx": 0.5, "dy": 0.25, "filter_width": 0.3, "stretch": 1.0}
+    usual |= {"depth_scale": 1.0, "speed_scale": 0.5}
     return ChannelGeometry(**filled(ChannelGeometry, usual | given, (5, 5, 1)))
 
 
@@ -181,7 +182,7 @@ ROWS = {
         {"viscosity": 0.01 * 4.0 * 0.5 * 0.2},
     ),
     "growing_shear_layer": (  # 2.25 m from the inflow, where 2 k = 0.1 1/m
-        cells(u=shear, on=geometry(x=np.arange(1.0, 6.0)[:, None, None])),
+        cells(u=shear),
         {"spreading": 0.2, "rate": 0.05},
         {"viscosity": (0.07 * 0.2 * (1.0 - exp(-0.225)) / 0.1) ** 2 * 0.2},
     ),
@@ -287,7 +288,11 @@ def test_water_that_enters_at_a_place_is_all_the_water():
     """Over a grid that holds the spot, q dx dy sums up to Q."""
     line = 0.05 * np.arange(-100, 101)
     wide = ChannelGeometry(
-        **filled(ChannelGeometry, {"dx": 0.05, "dy": 0.05, "filter_width": 0.05, "stretch": 1.0}, (201, 201, 1))
+        **filled(
+            ChannelGeometry,
+            {"length": 10.05, "dx": 0.05, "dy": 0.05, "filter_width": 0.05, "stretch": 1.0},
+            (201, 201, 1),
+        )
     )
     wide = replace(wide, x=line[:, None, None], y=line[None, :, None])
     spot = {"x": np.array([0.3]), "y": np.array([-0.2]), "length": np.array([1.1]), "width": np.array([0.4])}

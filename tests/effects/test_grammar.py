@@ -61,7 +61,7 @@ def trial_cells() -> Cells:
     there = [random.integers(0, 2, (6, 5, 1)).astype(float) for _ in range(2)]
     place = np.zeros((6, 5, 1))
     geometry = ChannelGeometry(
-        x=place, y=place, share_along=place, dx=1.0, dy=1.0, filter_width=1.0, bed=place, offset=place,
+        x=place, y=place, share_along=place, length=6.0, dx=1.0, dy=1.0, filter_width=1.0, bed=place, offset=place,
         half_width=1.0, side_slope=place,
         bank=there[0], planted=there[1], front=place, edge=place, wake=place, patch=place,
     )  # fmt: skip

@@ -50,7 +50,8 @@ def panels(bed, rows):
     nothing, far = np.zeros_like(other), np.full_like(other, np.inf)
     return ChannelGeometry(
         x=centres(COLUMNS * SPACING, COLUMNS)[:, None, None], y=y[None, :, None],
-        share_along=np.zeros((COLUMNS, 1, 1)), dx=SPACING, dy=WIDTH / rows, filter_width=SPACING,
+        share_along=np.zeros((COLUMNS, 1, 1)), length=COLUMNS * SPACING, dx=SPACING, dy=WIDTH / rows,
+        filter_width=SPACING,
         bed=bed[..., None], offset=nothing, half_width=nothing + 3.0, side_slope=nothing, bank=other, planted=nothing,
         front=far, edge=far, wake=far, patch=nothing - 1.0,
     )  # fmt: skip

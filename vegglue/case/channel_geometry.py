@@ -113,6 +113,7 @@ def _geometry(
         x=grid.x[:, None, None],
         y=grid.y[None, :, None],
         share_along=((np.arange(grid.x.size) + 0.5) / grid.x.size - 0.5)[:, None, None],
+        length=grid.dx * grid.x.size,
         dx=grid.dx,
         dy=grid.dy,
         filter_width=filter_width,
@@ -163,7 +164,8 @@ def part_of(geometry: ChannelGeometry, columns: slice, rows: slice) -> ChannelGe
     if geometry.turning.size:
         cut |= {"stretch": geometry.stretch[columns, rows], "turning": geometry.turning[columns, rows]}
     along = {name: getattr(geometry, name)[columns] for name in ("x", "share_along")}
-    whole = {name: getattr(geometry, name) for name in ("dx", "dy", "filter_width", "depth_scale", "speed_scale")}
+    numbers = ("length", "dx", "dy", "filter_width", "depth_scale", "speed_scale")
+    whole = {name: getattr(geometry, name) for name in numbers}
     return ChannelGeometry(y=geometry.y[:, rows], **whole, **along, **cut)
 
 

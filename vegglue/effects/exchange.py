@@ -81,7 +81,7 @@ def growing_shear_layer(cells: Cells, spreading: Array, rate: Array) -> dict[str
     dict
         `viscosity` (nx, ny, m) [m2/s].
     """
-    along = cells.geometry.x - cells.geometry.x[0] + 0.5 * cells.geometry.dx
+    along = (0.5 + cells.geometry.share_along) * cells.geometry.length
     width = spreading * -np.expm1(-2.0 * rate * along) / (2.0 * rate)
     return {"viscosity": (MIXING_OF_LAYER * width) ** 2 * np.abs(cells.u_y)}
 

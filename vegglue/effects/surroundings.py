@@ -30,7 +30,9 @@ class ChannelGeometry:
     x, y
         Along and across the channel [m].
     share_along
-        (x - x_m) / L, x_m the middle of the grid and L its length, -1/2 .. 1/2 (nx, 1, 1) [-].
+        (x - x_m) / L, x_m the middle of the grid, -1/2 .. 1/2 (nx, 1, 1) [-].
+    length
+        L, that of the whole grid [m]: effects on the flow see some columns at a time.
     dx, dy
         Size of a cell [m].
     filter_width
@@ -69,6 +71,7 @@ class ChannelGeometry:
     x: Array
     y: Array
     share_along: Array
+    length: float
     dx: float
     dy: float
     filter_width: float
