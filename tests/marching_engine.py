@@ -4,7 +4,8 @@ It shares the equations with `newton` and nothing of how they are solved, and sh
 Slow: for small channels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from vegglue.engine.newton import problem_at
 from vegglue.flow.equations import faces
 from vegglue.flow.local_changes import Term, with_changed_term
 from vegglue.flow.march import march
-from vegglue.flow.problem import Problem, joined
+from vegglue.flow.problem import EMPTY, Problem
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.flow.starts import backwater
@@ -132,3 +133,60 @@ def _start(problem: Problem, near: Point | None, experiment: str) -> Array:
     if near is None or experiment not in near.flows or near.flows[experiment].shape[::2] != problem.shape:
         return backwater(problem)
     return np.repeat(near.flows[experiment], problem.members, axis=3)
+
+
+def joined(problems: Sequence[Problem]) -> Problem:
+    """Problems of one experiment on one grid as one, the members of each after those of the one before.
+
+    What is alike, as the grid and its classes, is that of the first; effects of each are off in members of all others.
+    """
+    first, members = problems[0], [one.members for one in problems]
+    start, total = np.cumsum([0, *members]), sum(members)
+
+    def together(parts: Iterable[Array]) -> Array:
+        return np.concatenate(list(parts), axis=-1)
+
+    def as_far_as_any(parts: Sequence[Array]) -> Array:
+        """Arrays (nx, ny, m), 0 of a problem without one; empty if none has one."""
+        shape = next((one.shape[:2] for one in parts if one.size), None)
+        if shape is None:
+            return EMPTY
+        return together(
+            one if one.size else np.zeros((*shape, count)) for one, count in zip(parts, members, strict=True)
+        )
+
+    inflows = []
+    for alike in zip(*(one.boundaries.inflows for one in problems), strict=True):
+        cells = max(len(one.spread) for one in alike)
+        spread = [np.broadcast_to(one.spread, (cells, count)) for one, count in zip(alike, members, strict=True)]
+        inflows.append(replace(alike[0], discharge=together(one.discharge for one in alike), spread=together(spread)))
+    effects = []
+    for one, begin in zip(problems, start, strict=False):
+        for active in one.effects:
+            amplitude = active.effect.amplitude
+            values = {name: np.full(total, value[0]) for name, value in active.values.items()}
+            values[amplitude.name][:] = amplitude.off
+            for name, value in active.values.items():
+                values[name][begin : begin + one.members] = value
+            effects.append(replace(active, values=values))
+    return replace(
+        first,
+        friction=replace(first.friction, coefficient=together(one.friction.coefficient for one in problems)),
+        plants=replace(
+            first.plants,
+            phi=together(one.plants.phi for one in problems),
+            canopy_height=together(one.plants.canopy_height for one in problems),
+            bare_chezy=together(one.plants.bare_chezy for one in problems),
+        ),
+        viscosity=together(one.viscosity for one in problems),
+        boundaries=replace(
+            first.boundaries,
+            inflows=tuple(inflows),
+            outlet_level=together(one.boundaries.outlet_level for one in problems),
+            lateral_inflow=as_far_as_any([one.boundaries.lateral_inflow for one in problems]),
+        ),
+        bed_rise=as_far_as_any([one.bed_rise for one in problems]),
+        walls=replace(first.walls, rate=together(one.walls.rate for one in problems)),
+        effects=tuple(effects),
+        geometry=next((one.geometry for one in problems if one.geometry is not None), None),
+    )
