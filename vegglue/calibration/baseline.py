@@ -282,8 +282,17 @@ def with_own_error_at(noise: Noise, coarse: Model, point: Point) -> Noise:
 
 
 def model_that_errs(base: Baseline) -> SearchModel:
-    """The model on the cells on which its own error is computed: those of the case if sides of patches may lie off,
-    since cells of twice the size do not resolve what water does there; else those of the search.
+    """The model on the cells on which its own error is computed.
+
+    Parameters
+    ----------
+    base : Baseline
+
+    Returns
+    -------
+    SearchModel
+        On the cells of the case if sides of patches may lie off, since cells of twice the size do not resolve what
+        water does there; else `search_model`.
     """
     if base.model.case.model_error.edges:
         return SearchModel(base.model, base.noise, base.fitted.point)

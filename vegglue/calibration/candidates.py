@@ -287,7 +287,19 @@ def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, fl
 
 
 def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> Case:
-    """The case with one effect more; its amplitude is a parameter, its shapes are numbers, but for those of `free`."""
+    """The case with one effect more, its amplitude and free shapes as parameters with priors.
+
+    Parameters
+    ----------
+    case : Case
+    candidate : Candidate
+    shapes : mapping of float
+        Values of its other shapes [unit of each], for those that are not fixed.
+
+    Returns
+    -------
+    Case
+    """
     effects = {**case.effects, candidate.key: effect_entry(candidate, candidate.parameter, shapes)}
     parameters = {**case.parameters, **candidate.priors}
     return case.model_copy(update={"effects": effects, "parameters": parameters})

@@ -222,7 +222,18 @@ def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) 
 def kinds_of_places(
     fingerprints: Fingerprints, in_places: Mapping[Unlisted, score_test.Projected]
 ) -> list[HypothesisKind]:
-    """A kind for each term: all its spots are as likely before, and all terms."""
+    """prior = 1 / (GROUPS m n): a kind for each of m terms, all of its n spots as likely before.
+
+    Parameters
+    ----------
+    fingerprints : Fingerprints
+    in_places : mapping of Projected
+        Of the spots of each term.
+
+    Returns
+    -------
+    list of HypothesisKind
+    """
     kinds = []
     for one in fingerprints.places:
         spots = np.ones(one.x.size)
@@ -237,7 +248,22 @@ def kinds_of_instruments(
     projected: Mapping[InstrumentKind, score_test.Projected],
     flagged: tuple[int, ...],
 ) -> list[HypothesisKind]:
-    """A kind each for single readings, probes, gauges and lines, without those that are known to be off."""
+    """prior = 1 / (GROUPS m n): a kind for each of m kinds of instruments, all of its n instruments as likely before.
+
+    Parameters
+    ----------
+    noise : Noise
+    instruments : mapping of tuple of Instrument
+        By kind.
+    projected : mapping of Projected
+        Of the offsets of each kind that has any.
+    flagged : tuple of int
+        Excluded readings, indices of used stations: an instrument of these alone is known to be off, and of size 0.
+
+    Returns
+    -------
+    list of HypothesisKind
+    """
     kinds = []
     for name, of_kind in projected.items():
         of = [1.0 if i.line else np.median(noise.error[list(i.readings)]) for i in instruments[name]]

@@ -14,10 +14,21 @@ from vegglue.measurements.plausibility import implausible_levels
 
 
 def critical_remarks(case: Case, site: Site, observations: Observations) -> list[object]:
-    """What would mislead all that is computed with the measurements: wrong units, signs, marks of missing values,
-    outlets that no water reaches, and sections that carry another discharge than stated.
+    """What would mislead all that is computed with the measurements.
 
-    Nothing of measurements if none is in use: commands that need them refuse that, with the reason of the first.
+    Wrong units, signs, marks of missing values, outlets that no water reaches, and sections that carry another
+    discharge than stated.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    observations : Observations
+
+    Returns
+    -------
+    list of dataclass instances
+        None of measurements if none is in use: commands that need them refuse that, with the reason of the first.
     """
     dry: list[object] = [*flow_check.remarks_on_dry_outlets(case, site, observations)]
     if not observations.table["used"].any():

@@ -291,7 +291,19 @@ def excluding(model: Model, aside: pd.DataFrame) -> Model:
 
 
 def without_stations(station: pd.DataFrame, aside: pd.DataFrame) -> pd.DataFrame:
-    """A table of stations, with these measurements not used."""
+    """A table of stations with some measurements not used.
+
+    Parameters
+    ----------
+    station : DataFrame
+    aside : DataFrame
+        With the columns of MEASUREMENT, all of which have to be the same.
+
+    Returns
+    -------
+    DataFrame
+        `used` False and `reason` EXCLUDED for those that were in use.
+    """
     known = set(aside.itertuples(index=False, name=None))
     there = np.array([row in known for row in station[MEASUREMENT].itertuples(index=False, name=None)], dtype=bool)
     there &= station["used"].to_numpy()
@@ -458,9 +470,16 @@ def improvement(
 
 
 def homogeneity(base: Baseline) -> dict[str, float]:
-    """For each parameter the chance p that it is the same in all experiments, each moved to by one linear step [-].
+    """P that a parameter is the same in all experiments, each moved to by one linear step; the test of `transfer`.
 
-    The test of `transfer`; parameters that fewer than two experiments constrain are left out.
+    Parameters
+    ----------
+    base : Baseline
+
+    Returns
+    -------
+    dict of float
+        By parameter [-]; those that fewer than two experiments constrain are left out.
     """
     noise, point = base.noise, base.fitted.point
     slope, left = noise.used(point.slope), noise.residual(point.prediction)

@@ -253,7 +253,17 @@ def possible_change(model: Model, point: Point, term: Unlisted | Term, x: float,
 
 
 def cannot_be(interval: tuple[float, float], possible: tuple[float, float]) -> bool:
-    """Whether a change lies outside what is possible with its whole 95 % interval."""
+    """Whether a change lies outside what is possible with its whole 95 % interval.
+
+    Parameters
+    ----------
+    interval, possible : (float, float)
+        Low and high, in one unit; see `possible_change`.
+
+    Returns
+    -------
+    bool
+    """
     return interval[0] > possible[1] or interval[1] < possible[0]
 
 

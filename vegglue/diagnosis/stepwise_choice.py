@@ -127,9 +127,21 @@ class Choice:
 
 
 def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = False) -> Choice:
-    """Each is tried in the order named, those that do not help by themselves then together; what the last model does
-    not need is dropped again, and what is vaguer has to be clearly better than what is known. clearly: errors must fall
-    by clear_fall standard errors.
+    """Each is tried in the order named, those that do not help by themselves then together; see `why_not_kept`.
+
+    What the last model does not need is dropped again, and what is vaguer has to be clearly better than what is known.
+
+    Parameters
+    ----------
+    named : sequence of Nominee
+    score_with : callable
+        Names -> score of the model with these, None if no flow is found.
+    clearly : bool
+        Whether errors must fall by clear_fall standard errors.
+
+    Returns
+    -------
+    Choice
     """
     order = [one.name for one in named]
 

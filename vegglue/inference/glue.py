@@ -215,7 +215,18 @@ def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterio
 
 
 def refuse_undefined_efficiency(case: Case, station: pd.DataFrame) -> None:
-    """Raise InputError if `infer` is to weigh by efficiencies, and all measured values of a kind are equal."""
+    """Refuse to weigh by efficiencies if all measured values of a kind are equal.
+
+    Parameters
+    ----------
+    case : Case
+        `infer` states whether efficiencies are used.
+    station : DataFrame
+
+    Raises
+    ------
+    InputError
+    """
     settings = case.infer
     if settings.method != "glue" or (settings.likelihood == "gaussian" and settings.behavioural is None):
         return
@@ -230,7 +241,20 @@ def refuse_undefined_efficiency(case: Case, station: pd.DataFrame) -> None:
 
 
 def check_stations(ensemble: Ensemble, station: pd.DataFrame, config: Path | None = None) -> None:
-    """Raise InputError if the stations are not those that were simulated, or none is used."""
+    """Refuse stations that are not those that were simulated.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+    station : DataFrame
+    config : Path, optional
+        For the command to be run again.
+
+    Raises
+    ------
+    InputError
+        Also if no station is used.
+    """
     same = len(station) == len(ensemble.station) and all(
         np.array_equal(station[column].to_numpy(), ensemble.station[column].to_numpy())
         for column in ("experiment", "kind", "x", "y")

@@ -128,7 +128,17 @@ def ensemble_hash(case: Case, given: PriorSample | None = None) -> str:
 
 
 def refuse_too_many(case: Case, observations: Observations) -> None:
-    """Raise InputError for a case without parameters, or with more predictions than a file is laid out for."""
+    """Refuse a case without parameters, or with more than MOST_PREDICTIONS.
+
+    Parameters
+    ----------
+    case : Case
+    observations : Observations
+
+    Raises
+    ------
+    InputError
+    """
     refuse_without_parameters(case)
     if (predictions := case.simulate.members * len(observations.table)) > MOST_PREDICTIONS:
         raise InputError(
@@ -332,7 +342,17 @@ def _stations_in(observations: Observations, experiment: str) -> np.ndarray:
 
 
 def section_positions(observations: Observations) -> tuple[tuple[str, float], ...]:
-    """Name and mean x [m] of every section a velocity was measured in."""
+    """Sections in which a velocity was measured.
+
+    Parameters
+    ----------
+    observations : Observations
+
+    Returns
+    -------
+    tuple of (str, float)
+        Name and mean x [m] of each.
+    """
     velocity = observations.table[velocity_rows(observations.table)]
     return tuple((str(name), float(x)) for name, x in velocity.groupby("section", sort=False)["x"].mean().items())
 
