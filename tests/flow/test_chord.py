@@ -83,7 +83,7 @@ def test_one_that_strayed_is_not_taken_up_again() -> None:
     end = chord(problem, far, shared, 1e-8)
     assert not end.converged[0]
     assert np.isinf(end.correction[0])
-    _, kept = finish(problem, far, 1e-8)
+    _, kept, _ = finish(problem, far, 1e-8)
     assert kept is None
 
 

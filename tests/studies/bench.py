@@ -120,9 +120,10 @@ def steady(case) -> float:  # type: ignore[no-untyped-def]
 def roofline(case) -> None:  # type: ignore[no-untyped-def]
     """A chord step of MEMBER_SLOTS members by flops and bytes, beside what this core and its memory give."""
     problem = build_problem(case, build_site(case), "D3a", sample_prior(case.parameters, MEMBER_SLOTS, 1))
-    solution, shared, band = settled(take(problem, np.array([0])), None, 1e-6)
+    end = settled(take(problem, np.array([0])), None, 1e-6)
+    shared = end.factors
     assert shared is not None
-    part, state = crop(problem, *band), np.repeat(solution.state, MEMBER_SLOTS, axis=3)
+    part, state = crop(problem, *end.band), np.repeat(end.solution.state, MEMBER_SLOTS, axis=3)
     rates = eased(part, state, shared.slope, part.boundaries.outlet)
     residual = shortest(lambda: eased(part, state, shared.slope, part.boundaries.outlet))
     solve = shortest(lambda: shared.step(rates))
@@ -229,7 +230,8 @@ def same(case) -> None:  # type: ignore[no-untyped-def]
 
 def three_ways(problem, start):  # type: ignore[no-untyped-def]
     """How far a member of an ensemble, and one marched, are from Newton's; minutes of flow it was marched."""
-    alone, _, band = settled(problem, start, 1e-9)
+    end = settled(problem, start, 1e-9)
+    alone, band = end.solution, end.band
     part = crop(problem, *band)
     wet = faces(part, alone.state).cell[:, None] > SHALLOW
     apart = np.abs(rows_inside(start, band) - alone.state)[np.broadcast_to(wet, alone.state.shape)].max()
@@ -251,10 +253,10 @@ def exact(case) -> None:  # type: ignore[no-untyped-def]
         one = chunk.take(np.array([member]))
         for experiment in case.experiments:
             problem = build_problem(case, site, experiment, one.theta)
-            alone, _, band = settled(problem, start_from[experiment].predict(one.points), FURTHER)
-            assert alone.converged[0]
+            end = settled(problem, start_from[experiment].predict(one.points), FURTHER)
+            assert end.factors is not None
             here = (observations.table["experiment"] == experiment).to_numpy()
-            state = widen(alone.state, problem.shape[1], band)
+            state = widen(end.solution.state, problem.shape[1], end.band)
             prediction = read_sensors(problem, state, site.grid, observations.table[here], ()).prediction[0]
             apart.append(np.abs(rows["prediction"][member, here] - prediction).max())
     print(

@@ -218,8 +218,9 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
         # A fit that finds no flow tries another place; where one begins, the flow is worth a cold start, and a march.
         begins = before is None or before.state.shape[0] != problem.shape[0] or before.rows != problem.shape[1]
         for beginning in [*tried, None] if begins else tried:
-            solution, own, band = settled(problem, beginning, tolerance)
-            if own is not None:
+            found = settled(problem, beginning, tolerance)
+            if found.factors is not None:
+                flow = SteadyFlow(found.solution.state, found.band, problem.shape[1], found.factors, EMPTY, found.moved)
                 break
         else:
             if not begins:
@@ -230,9 +231,8 @@ def _steady(model: Model, experiment: str, z: Array, near: Point | None) -> tupl
             if not marched.steady:
                 return None
             band = wet_band(problem, marched.state)
-            part, state = crop(problem, *band), rows_inside(marched.state, band)
-            solution, own = replace(solution, state=state), factors(part, state)
-        flow = SteadyFlow(solution.state, band, problem.shape[1], own, EMPTY, 0.0)
+            state = rows_inside(marched.state, band)
+            flow = SteadyFlow(state, band, problem.shape[1], factors(crop(problem, *band), state), EMPTY, 0.0)
     return flow, _read_stations(model, experiment, problem, flow.state, flow.band)[0]
 
 
@@ -245,8 +245,10 @@ def _from_coarser_cells(model: Model, experiment: str, z: Array, problem: Proble
     if coarse is None:
         return None
     there = problem_at(coarse, experiment, z)
-    solution, own, band = settled(there, _from_coarser_cells(coarse, experiment, z, there), ROUGH)
-    return None if own is None else between_cells(widen(solution.state, there.shape[1], band), problem.shape)
+    found = settled(there, _from_coarser_cells(coarse, experiment, z, there), ROUGH)
+    if found.factors is None:
+        return None
+    return between_cells(widen(found.solution.state, there.shape[1], found.band), problem.shape)
 
 
 def on_half_as_many_cells(model: Model) -> Model | None:

@@ -103,7 +103,7 @@ def _alone(state: Array, size: float, iterations: int, converged: bool) -> Chord
     return ChordSolution(state, np.array([size]), np.array([iterations]), np.array([converged]))
 
 
-def finish(problem: Problem, near: Array, tolerance: float) -> tuple[ChordSolution, Factors | None]:
+def finish(problem: Problem, near: Array, tolerance: float) -> tuple[ChordSolution, Factors | None, float]:
     """x <- x - M^-1 R(x), the factors M of J renewed while they help: one member from a start near its root.
 
     Parameters
@@ -116,7 +116,9 @@ def finish(problem: Problem, near: Array, tolerance: float) -> tuple[ChordSoluti
     ChordSolution
         Where it ended.
     Factors or None
-        Of J at a state within CLOSE of the root; None if no root was found.
+        Of J as it was used last; None if no root was found.
+    float
+        By how much the state has moved since those factors [m, m/s]; 0 within CLOSE.
 
     References
     ----------
@@ -130,8 +132,8 @@ def finish(problem: Problem, near: Array, tolerance: float) -> tuple[ChordSoluti
         moved = float(np.abs(end.state - state).max())
         end = replace(end, iterations=np.array([spent]))
         if end.converged[0]:
-            return end, shared if moved < CLOSE else factors(problem, end.state)
+            return end, shared, moved if moved >= CLOSE else 0.0
         if not end.correction[0] < min(largest, LONGEST_CORRECTION):
             break
         state, largest = end.state, float(end.correction[0])
-    return end, None
+    return end, None, np.inf

@@ -23,7 +23,20 @@ from vegglue.flow.wet_band import chord_in_band, overflows, rows_inside, wet_ban
 TANGENT_STEP = 1e-4
 # The problem of members at points (m, d) of the unit cube.
 ProblemOf = Callable[[Array], Problem]
-Attempt = tuple[ChordSolution, Factors | None, tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One member solved by itself.
+
+    solution: its state in a band of rows that may be wet; factors there, None if it has not converged; moved: by how
+    much the state has moved since them, 0 within CLOSE [m, m/s].
+    """
+
+    solution: ChordSolution
+    factors: Factors | None
+    moved: float
+    band: tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -130,10 +143,12 @@ def solve_alone(problem: Problem, warm: Array | None, tolerance: float, how: Fal
     """
     spent = 0
     for start in [warm, None] if warm is not None else [None]:
-        solution, shared, band = settled(problem, start, tolerance)
-        spent += int(solution.iterations[0])
-        if shared is not None:
-            state = widen(solution.state, problem.shape[1], band)
+        tried = settled(problem, start, tolerance)
+        spent += int(tried.solution.iterations[0])
+        if tried.factors is not None:
+            inside, band = tried.solution.state, tried.band
+            shared = tried.factors if tried.moved < CLOSE else factors(crop(problem, *band), inside)
+            state = widen(inside, problem.shape[1], band)
             return ReferenceMember(state, SOLVED_BY_NEWTON, "", spent, None, shared, band)
     cold, rows = backwater(problem), (0, problem.shape[1])
     marched = march_to_rest(problem, cold, tolerance, how)
@@ -197,43 +212,41 @@ def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
 
     Returns
     -------
-    solution, factors, band
-        Its state in the band of rows that may be wet, the factors there, None if it has not converged, and that band.
+    Attempt
     """
     if warm is None:
         return _by_newton(problem, backwater(problem), tolerance, FROM_AFAR)
     band = wet_band(problem, warm)
-    solution, shared = finish(crop(problem, *band), rows_inside(warm, band), tolerance)
-    solution, shared, band = _in_wider_band(problem, solution, shared, band, tolerance)
-    if solution.converged[0] and shared is not None:
-        return solution, shared, band
-    again, shared, band = _by_newton(problem, warm, tolerance, FROM_NEARBY)
-    return replace(again, iterations=solution.iterations + again.iterations), shared, band
+    tried = _finished(problem, rows_inside(warm, band), band, tolerance)
+    if tried.factors is not None:
+        return tried
+    return _after(tried.solution, _by_newton(problem, warm, tolerance, FROM_NEARBY))
 
 
 def _by_newton(problem: Problem, start: Array, tolerance: float, how: Beginning) -> Attempt:
     band = wet_band(problem, start)
-    part = crop(problem, *band)
-    near = newton(part, rows_inside(start, band), CLOSE, how)
+    near = newton(crop(problem, *band), rows_inside(start, band), CLOSE, how)
     if not near.converged[0]:
-        return near, None, band
-    solution, shared = finish(part, near.state, tolerance)
-    solution = replace(solution, iterations=solution.iterations + near.iterations)
-    solution, shared, band = _in_wider_band(problem, solution, shared, band, tolerance)
-    return solution, shared if solution.converged[0] else None, band
+        return Attempt(near, None, np.inf, band)
+    return _after(near, _finished(problem, near.state, band, tolerance))
 
 
-def _in_wider_band(
-    problem: Problem, solution: ChordSolution, shared: Factors | None, band: tuple[int, int], tolerance: float
-) -> Attempt:
-    """Solved again in a wider band if water came to stand at the edge of this one."""
+def _finished(problem: Problem, near: Array, band: tuple[int, int], tolerance: float) -> Attempt:
+    """`finish` in a band, and again in a wider one if water came to stand at the edge of this one."""
     part = crop(problem, *band)
-    if not (solution.converged[0] and overflows(part, solution.state, band, problem.shape[1])[0]):
-        return solution, shared, band
-    wider = widen(solution.state, problem.shape[1], band)
+    tried = Attempt(*finish(part, near, tolerance), band)
+    state = tried.solution.state
+    if tried.factors is None or not overflows(part, state, band, problem.shape[1])[0]:
+        return tried
+    wider = widen(state, problem.shape[1], band)
     band = wet_band(problem, wider)
-    solution, shared = finish(crop(problem, *band), rows_inside(wider, band), tolerance)
-    return solution, shared, band
+    again = Attempt(*finish(crop(problem, *band), rows_inside(wider, band), tolerance), band)
+    return _after(tried.solution, again)
+
+
+def _after(first: ChordSolution, then: Attempt) -> Attempt:
+    """What came in the end, with the iterations of both."""
+    return replace(then, solution=replace(then.solution, iterations=first.iterations + then.solution.iterations))
 
 
 def _with_tangents(problem_of: ProblemOf, problem: Problem, point: Array, solved: ReferenceMember) -> ReferenceMember:
