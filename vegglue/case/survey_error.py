@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve, cholesky, solve_triangular
-from scipy.spatial.distance import cdist
 from scipy.special import logsumexp, ndtri
 
 from vegglue.arrays import Array
@@ -120,6 +119,8 @@ def correlation_of_bed(places: Array, others: Array, along: float, across: float
     along, across : l_x, l_y [m]
     rough : bool
     """
+    from scipy.spatial.distance import cdist  # late: a case without a survey need not wait for it
+
     found, axes = np.empty((len(places), len(others))), slice(1 if rough else 0, 2)
     here, there = (each[:, :2] / (along, across) for each in (places, others))
     for first in range(0, len(others), PLACES_AT_A_TIME):

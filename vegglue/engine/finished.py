@@ -8,6 +8,7 @@ what they rest on, and `agreement` measures it.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -19,8 +20,10 @@ from vegglue.engine.corrected import Correction, without_effects
 from vegglue.engine.interface import Model, Point, flow_at_centres, linearise
 from vegglue.errors import InputError
 from vegglue.measurements.kinds import velocity_rows
-from vegglue.measurements.their_flow import TheirFlow, read_their_flow
 from vegglue.results.verdict import ResultCompared
+
+if TYPE_CHECKING:
+    from vegglue.measurements.their_flow import TheirFlow
 
 # Largest differences of both flows at which the slopes of one stand for the other. Derived: evidence takes the trace of
 # an effect as known to 15 % (decision 18); friction gives u ~ h^(2/3), and its slope S ~ h^(-10/3), so that 5 % of the
@@ -30,14 +33,16 @@ MOST_APART, MOST_LEVEL_APART, MOST_AREA_APART = 0.15, 0.05, 0.15
 SHALLOW = 0.1
 
 
-def _their_flows(model: Model) -> dict[str, TheirFlow]:
+def _their_flows(model: Model) -> "dict[str, TheirFlow]":
     """The flow of the finished run in each experiment of a model. Raises InputError."""
+    from vegglue.measurements.their_flow import read_their_flow  # late: few cases wait for its trees of places
+
     result = model.case.finished_result
     assert result is not None
     return {name: read_their_flow(result.files[name]) for name in model.case.experiments}
 
 
-def their_predictions(station: pd.DataFrame, flows: dict[str, TheirFlow], grid: Grid) -> Array:
+def their_predictions(station: pd.DataFrame, flows: "dict[str, TheirFlow]", grid: Grid) -> Array:
     """Readings of the stations in the flow of the finished run (n,) [unit of each], NaN where it is dry.
 
     Parameters
@@ -129,7 +134,7 @@ def compared_flows(model: Model) -> ComparedFlows:
     return ComparedFlows(Correction((), np.zeros(0), model.station, value, none), agreement)
 
 
-def _agreement(model: Model, point: Point, flows: dict[str, TheirFlow], measured: float) -> ResultCompared:
+def _agreement(model: Model, point: Point, flows: "dict[str, TheirFlow]", measured: float) -> ResultCompared:
     """Both flows at the centres of our cells, of all experiments together."""
     result, limits = model.case.finished_result, (MOST_APART, MOST_LEVEL_APART, MOST_AREA_APART)
     code = result.code if result is not None else ""

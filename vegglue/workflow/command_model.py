@@ -7,6 +7,7 @@ runs/<name>/engine/place.json holds that place and the hash of the case; all run
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from vegglue.engine.corrected import corrected, correction_at, with_correction, 
 from vegglue.engine.finished import compared_flows
 from vegglue.engine.interface import Model, Point, linearise
 from vegglue.errors import InputError, shown_path
-from vegglue.inference.surrogate import CommandToLearn
 from vegglue.inference.weighted_statistics import root_mean_square, stations_by_kind
 from vegglue.measurements.kinds import STREAMWISE, kind_of
 from vegglue.progress import Watch
@@ -29,6 +29,9 @@ from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.verdict import CommandCompared, CommandDiffers, CommandNotSettled, ResultCompared
 from vegglue.wording.phases import COMMAND_ONCE_MORE
 from vegglue.wording.remedies import MAKE_ROOM
+
+if TYPE_CHECKING:
+    from vegglue.inference.surrogate import CommandToLearn
 
 PLACE_FILE, FINISHED = "place.json", "finished"
 # Standard deviation of the discharge along the channel over its mean [-], above which a flow is not at rest. Chosen:
@@ -99,10 +102,12 @@ def with_command(model: Model, folder: Path, watch: Watch) -> Model:
     return replace(model, engine=with_correction(found.correction.at, FINISHED))
 
 
-def command_to_learn(model: Model, folder: Path, watch: Watch) -> tuple[Model, CommandToLearn]:
+def command_to_learn(model: Model, folder: Path, watch: Watch) -> "tuple[Model, CommandToLearn]":
     """The built-in engine corrected where the command of a case fits best, so that many predictions cost no run; and
     what a surrogate is learned from.
     """
+    from vegglue.inference.surrogate import CommandToLearn  # late: only `infer` of a command waits for it
+
     place, runs = place_of_command(model, folder, watch), command_runs(model.case, folder)
     near = replace(model, engine=with_correction(place.correction.at, "place"))
     return near, CommandToLearn(runs, place.run, place.failed, runs.settings.most_runs)
