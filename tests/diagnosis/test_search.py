@@ -100,7 +100,7 @@ def test_products_have_the_references_of_both_laws(model: Model, point: Point) -
 def test_every_silence_has_words_of_its_own() -> None:
     """Water below 5 cm has no cell in which a law acts: errors alone left as much in 100 % of no cases."""
     found = [Discovery(0.4, 65, (), {}), Discovery(0.001, 65, (), {}), Discovery(1.0, 0, (), {})]
-    assert [one.enough_for_errors for one in found] == [False, True, False]
+    assert [one.alarmed for one in found] == [False, True, False]
     assert len({one.sentence for one in found}) == 3
 
 

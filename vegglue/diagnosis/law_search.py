@@ -144,7 +144,7 @@ class Discovery:
         return self.laws[0]
 
     @property
-    def enough_for_errors(self) -> bool:
+    def alarmed(self) -> bool:
         """Whether errors alone leave as much no more often than the rate of an alarm."""
         return self.p <= constants().false_alarm_rate
 
