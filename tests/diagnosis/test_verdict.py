@@ -16,12 +16,11 @@ from diagnoses import (
 )
 from verdicts import ABSURD, AS_STATED, FITS, MISSES, NONE, step, tags, verdict_on
 
-from vegglue.calibration.candidates import START_OFF_ENDS, Instrument
+from vegglue.calibration.candidates import Instrument
 from vegglue.calibration.fit import chance_of_misfit
 from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.search_state import rivals_in, undecided_of
-from vegglue.diagnosis.verdict_rules import AT_BOUND
 from vegglue.results.causes import CandidateEffect, ModelErrorUsed, Rival, Step
 from vegglue.results.verdict import (
     AmplitudeAtBound,
@@ -269,10 +268,6 @@ def test_a_place_many_times_as_large_as_plausible_is_none() -> None:
 )
 def test_what_is_not_at_a_bound(candidates: tuple[CandidateEffect, ...]) -> None:
     assert verdict_on(step("a"), candidates=candidates).kind == "identified"
-
-
-def test_a_bound_is_as_near_as_refits_start() -> None:
-    assert AT_BOUND == START_OFF_ENDS
 
 
 def test_a_misfit_that_remains_is_noted_beside_a_name_only() -> None:

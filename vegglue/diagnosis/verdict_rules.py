@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from dataclasses import field as by_default
 
+from vegglue.calibration.candidates import START_OFF_ENDS
 from vegglue.case.parameter_space import FURTHEST
 from vegglue.decision_constants import constants
 from vegglue.effects.identity import EffectIdentity
@@ -48,9 +49,6 @@ OF_DISCHARGES = (
     "partial_depth", "floor_level_error", "bank_level_error", "bed_slope_error", "flank_scour",
 )  # fmt: skip
 TERMS_OF_DISCHARGES, OF_DEVICES = ("inflow", "bed"), ("device_gain", "zero_offset")
-# Share of a plausible size within which an amplitude lies at an end of its support: as far off as refits start at
-# least, see `candidates.START_OFF_ENDS`.
-AT_BOUND = 0.01
 
 
 @dataclass(frozen=True)
@@ -191,11 +189,12 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
     names = {step.accepted for step in inputs.steps}
     at_bound = []
     for one in (each for each in inputs.candidates if each.name in names):
-        # An end other than that at which it is off, or as far off its prior as a calibration goes.
+        # An end other than that at which it is off, or as far off its prior as a calibration goes; nearer than refits
+        # start.
         amplitude = one.amplitude
         ends = [end for end in amplitude.support if end != amplitude.off]
-        near = any(abs(amplitude.value - end) < AT_BOUND * amplitude.scale for end in ends)
-        if near or amplitude.relative_size > FURTHEST - AT_BOUND:
+        near = any(abs(amplitude.value - end) < START_OFF_ENDS * amplitude.scale for end in ends)
+        if near or amplitude.relative_size > FURTHEST - START_OFF_ENDS:
             at_bound.append(one.name)
     if at_bound:
         return verdict.AmplitudeAtBound(tuple(at_bound))
