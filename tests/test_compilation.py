@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from house import FILES, PACKAGE
 
-from vegglue.compilation import SHARED, _stamp, shapes_loops
+from vegglue.compilation import SHARED, _stamp, compiled, shapes_loops
 from vegglue.wording.phases import COMPILING
 
 CHEZY = """
@@ -78,6 +78,21 @@ def test_a_cold_and_a_warm_cache_give_the_same_digits(tmp_path: Path) -> None:
     assert runs[0].stdout == runs[1].stdout
 
 
+def test_code_of_other_types_never_takes_the_same_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two processes each find no code of a loop yet, and number their own as the first."""
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", str(tmp_path))
+    loop = compiled(_twice)
+    index = loop._cache._cache_file
+    monkeypatch.setattr(index, "_load_index", dict)
+    for types in ("float64", "int64"):
+        index.save((types,), types)
+    assert len(list(tmp_path.rglob("*.nbc"))) == 2
+
+
+def _twice(value: float) -> float:
+    return 2.0 * value
+
+
 @pytest.mark.slow
 def test_without_a_folder_to_write_to_loops_are_compiled_each_time_and_it_is_said_once(tmp_path: Path) -> None:
     """As in a container with a read-only install and no home: a file stands where each folder would be."""
@@ -118,10 +133,14 @@ def test_a_file_depends_on_those_below_it_only(tmp_path: Path) -> None:
 
 FIRST_USE = """
 import numpy as np
-from vegglue.flow.block_elimination import solve
 from vegglue.engine.model import with_compilation
-print(with_compilation("calibrating"))
-solve(np.zeros((2, 3, 2, 2)), np.zeros((2, 2)), np.zeros((2, 2, 1)))
+from vegglue.flow.kernels import rates
+from vegglue.parallel import at_most
+with at_most(1):
+    print(with_compilation("calibrating"))
+cell, side = np.ones((1, 1, 1)), np.ones((1, 1))
+of_flow = np.ones((1, 3, 1, 1)), side, np.zeros((0, 0, 0)), side, 0.01, False, cell, cell, side, side, side
+rates(*of_flow, np.ones(1, bool), np.ones(1), 1.0, 1.0, None)
 print(with_compilation("calibrating"))
 """
 

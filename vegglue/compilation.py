@@ -3,13 +3,14 @@
 import re
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from multiprocessing import current_process
 from pathlib import Path
 from typing import Any
 
 from numba import njit
+from numba.core.sigutils import normalize_signature
 
 # Files that loops take constants and flags from, beside those that hold loops themselves.
 SHARED = ("compilation.py", "physical_constants.py")
@@ -58,7 +59,17 @@ def _cached(loop: Callable[..., Any], **flags: Any) -> Any:
     index: Any = getattr(getattr(kept, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):  # documented nowhere: a numba without it caches as it always does
         index._source_stamp = (index._source_stamp, _stamp(Path(loop.__code__.co_filename)))
+        index.save = partial(_save, index)
     return kept
+
+
+def _save(index: Any, key: tuple[Any, ...], code: Any) -> None:
+    """Keep machine code in a file named after its types: two processes that number files may give two of them one name,
+    and the index of one then leads to the code of the other.
+    """
+    types = sha256(repr(key).encode()).hexdigest()[:16]
+    index._data_name_pattern = f"{index._index_name}.{types}.{{number:d}}.nbc"
+    type(index).save(index, key, code)
 
 
 @cache
@@ -75,6 +86,11 @@ def is_kept(loop: Any) -> bool:
     index: Any = getattr(getattr(loop, "_cache", None), "_cache_file", None)
     # Documented nowhere, as above: an index is empty where there is no file, or it is of other code or another numba.
     return not hasattr(index, "_load_index") or bool(index._load_index())
+
+
+def compile_for(loop: Any, *types: str) -> None:
+    """Compile a loop for arguments of these types, or take from the cache what an earlier process has left."""
+    loop.compile(normalize_signature(f"({', '.join(types)})")[0])  # kept code of types as text is not found by values
 
 
 @cache

@@ -7,20 +7,23 @@ from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.schema import Case
 from vegglue.case.zones import ranges_without_cells
 from vegglue.compilation import is_kept
+from vegglue.engine.first_compilation import compile_beside
 from vegglue.engine.interface import Engine, Model
 from vegglue.engine.newton import NEWTON
-from vegglue.flow.block_elimination import solve
+from vegglue.flow.kernels import rates
 from vegglue.measurements.observations import Observations
 from vegglue.wording.phases import COMPILING
 
 
 def with_compilation(phase: str) -> str:
-    """The phase of a command that solves flows, and that it compiles first where no earlier process did.
+    """The phase of a command that solves flows, and that it compiles first where no earlier process did, by two
+    processes.
 
     25 s of a core for a diagnosis were measured, 64 s on a busy machine; then nothing seems to move.
     """
-    if solve.signatures or is_kept(solve):
+    if rates.signatures or is_kept(rates):  # others may be kept by a second process alone
         return phase
+    compile_beside()
     return phase + COMPILING
 
 

@@ -444,7 +444,7 @@ def _responses_by_adjoints(model: Model, point: Point, experiment: str, terms: S
         found = {term: np.zeros((n, nx, grid.y.size), np.float32) for term in terms}
         for term, (local, of_wholes) in changes.items():
             windows = np.zeros((nx, ny, n), dtype=np.float32)
-            _sum_windows(sensitivity, local, windows)
+            sum_windows(sensitivity, local, windows)
             answers = found[term][:, :, rows]
             answers[...] = np.moveaxis(windows, -1, 0)
             for inflow, of_discharge, of_whole in zip(inflows, of_discharges, of_wholes, strict=True):
@@ -479,7 +479,7 @@ def _cell_changes(part: Problem, state: Array, geometry: ChannelGeometry, term: 
 
 
 @compiled
-def _sum_windows(sensitivity: Single, change: Single, found: Single) -> None:
+def sum_windows(sensitivity: Single, change: Single, found: Single) -> None:
     """-l . dR of every cell (nx, ny, n), summed over the window of CELL_STRIDE cells around it, into found.
 
     sensitivity l (nx, 3, ny, n), change dR (nx, 3, ny, CELL_STRIDE^2).

@@ -24,7 +24,7 @@ SPARSE = 4
 
 
 @compiled_exactly
-def _remember(turns, sums, slot, moved, step, last_step):
+def remember(turns, sums, slot, moved, step, last_step):
     """Slot of the memory: t = f - f_last, s = t + (x - x_last), member by member; t of every SPARSE-th column only.
 
     Returns inner products per member of that turn with every turn, and of every turn with f, (depth, m) each.
@@ -50,7 +50,7 @@ def _remember(turns, sums, slot, moved, step, last_step):
 
 
 @compiled_exactly
-def _mix(state, step, sums, weights):
+def mix(state, step, sums, weights):
     """Anderson's next state x + f - sum_d g_d s_d, in place; returns the change (nx, 3, ny, m)."""
     depth, nx, _, ny, m = sums.shape
     moved = np.empty_like(step)
@@ -115,13 +115,13 @@ class Memory:
         if self.last is not None:
             last_step, moved = self.last
             now = (self.count - 1) % MEMORY_DEPTH
-            row, right = _remember(self.turns[:depth], self.sums, now, moved, step, last_step)
+            row, right = remember(self.turns[:depth], self.sums, now, moved, step, last_step)
             self.stored[now] = self.count
             own = self.stored[:depth, None] > self.since
             row, right = np.where(own & own[now], row, 0.0), np.where(own, right, 0.0)
             self.gram[now, :depth], self.gram[:depth, now] = row, row
             weights = minimise(np.ascontiguousarray(self.gram[:depth, :depth]), right)
-        self.last = step, _mix(state, step, self.sums[:depth], weights)
+        self.last = step, mix(state, step, self.sums[:depth], weights)
         self.count += 1
 
 

@@ -56,7 +56,7 @@ def _beside(state, before, i, j, along):
 
 
 @compiled
-def _friction_slope(state, depth, drag, west):
+def friction_slope(state, depth, drag, west):
     """d(k |U| u)/du [1/s] of the unknowns (nx, 3, ny, m); none for levels."""
     nx, _, ny, m = state.shape
     slope, before = np.zeros((nx, 3, ny, m)), west / depth[0]
@@ -74,7 +74,7 @@ def _friction_slope(state, depth, drag, west):
 
 
 @compiled
-def _ease(out, state, depth, drag, west, slope, film, at_outlet):
+def ease(out, state, depth, drag, west, slope, film, at_outlet):
     """Rows of momentum along the channel in thin water, in place, as slope (u - u*); blended in below THIN films.
 
     slope (nx, 3, ny, 1): of the state whose factors are in use; at_outlet (ny,): rows eased at the outlet, too.
@@ -118,7 +118,7 @@ def _above(state, bed, rise, i, j, a, b, k):
 
 
 @compiled
-def _answers(state, bed, rise, half_range, film, thick):
+def answers(state, bed, rise, half_range, film, thick):
     """u d(rho)/dz [1/s] of one member's faces (nx, 3, ny) where rho is one, z the level of either cell beside."""
     nx, _, ny = thick.shape
     answer = np.zeros((nx, 3, ny))
@@ -136,7 +136,7 @@ def _answers(state, bed, rise, half_range, film, thick):
 
 
 @compiled
-def _thin_cells_and_faces(state, bed, rise, half_range, film, thick):
+def thin_cells_and_faces(state, bed, rise, half_range, film, thick):
     """Cells and faces (nx, 3, ny) that are thin in any member of a state, or, faces only, at the reference member."""
     nx, _, ny, m = state.shape
     found = np.zeros((nx, 3, ny), np.bool_)
@@ -162,7 +162,7 @@ def _rho(h: float, reference: float, per_thin: float) -> float:
 
 
 @compiled
-def _stretch(values, state, faces, bed, rise, half_range, film, thick, most_across, back):
+def stretch(values, state, faces, bed, rise, half_range, film, thick, most_across, back):
     """Velocities or rows of some faces (nx, 3, ny) times rho at the levels of a state, or divided by it, in place;
     across the channel by at most `most_across`. values (nx, 3, ny, m).
     """
@@ -205,7 +205,7 @@ def tilt(step, answer):
 
 
 @compiled
-def _correction(step, state, thin, bed, rise, half_range, film, thick):
+def correction(step, state, thin, bed, rise, half_range, film, thick):
     """Largest change of each member (m,) [m, m/s] by a step in the unknowns of chord steps, NaN if any is.
 
     In thin places in proportion to the depth there, that of its face for a velocity.
@@ -251,7 +251,7 @@ def eased(problem: Problem, state: Array, slope: Array, at_outlet: NDArray[np.bo
     depth = cell_depths(problem, state)
     closed, sides = closures(problem, state, depth), side_fluxes(problem, depth)
     out = residual_of(problem, state, depth, sides, closed)
-    _ease(out, state, depth, closed.rate, sides[0], slope, problem.film, at_outlet)
+    ease(out, state, depth, closed.rate, sides[0], slope, problem.film, at_outlet)
     return out
 
 
@@ -265,7 +265,7 @@ def slope_of_friction(problem: Problem, state: Array) -> Array:
     """
     depth = cell_depths(problem, state)
     rate = closures(problem, state, depth).rate
-    return np.asarray(_friction_slope(state, depth, rate, side_fluxes(problem, depth)[0]))
+    return np.asarray(friction_slope(state, depth, rate, side_fluxes(problem, depth)[0]))
 
 
 def _face_depths(problem: Problem, state: Array) -> Array:
@@ -291,7 +291,7 @@ def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
         The former infinite for levels and on the sides of the grid.
     """
     thick = np.ascontiguousarray(_face_depths(problem, state)[..., 0])
-    return thick, _answers(state, *problem.wetting, thick)
+    return thick, answers(state, *problem.wetting, thick)
 
 
 def where_thin(problem: Problem, state: Array, thick: Array) -> NDArray[np.bool_]:
@@ -304,7 +304,7 @@ def where_thin(problem: Problem, state: Array, thick: Array) -> NDArray[np.bool_
     thick : (nx, 3, ny) [m]
         h_c, see `thickness`.
     """
-    return np.asarray(_thin_cells_and_faces(state, *problem.wetting, thick))
+    return np.asarray(thin_cells_and_faces(state, *problem.wetting, thick))
 
 
 def carry_thin(
@@ -320,7 +320,7 @@ def carry_thin(
         As `where_thin` has them, and what it gives.
     back : bool
     """
-    _stretch(values, state, thin, *problem.wetting, thick, np.inf, back)
+    stretch(values, state, thin, *problem.wetting, thick, np.inf, back)
 
 
 def weigh_thin(problem: Problem, rates: Array, state: Array, thin: NDArray[np.bool_], thick: Array) -> None:
@@ -332,7 +332,7 @@ def weigh_thin(problem: Problem, rates: Array, state: Array, thin: NDArray[np.bo
         As `carry_thin`.
     rates : (nx, 3, ny, m) [m/s2]
     """
-    _stretch(rates, state, thin, *problem.wetting, thick, 1.0, False)
+    stretch(rates, state, thin, *problem.wetting, thick, 1.0, False)
 
 
 def largest_correction(problem: Problem, step: Single, state: Array, thin: NDArray[np.bool_], thick: Array) -> Array:
@@ -345,4 +345,4 @@ def largest_correction(problem: Problem, step: Single, state: Array, thin: NDArr
     step : (nx, 3, ny, m)
         Of levels and w, see `tilt`.
     """
-    return np.asarray(_correction(step, state, thin, *problem.wetting, thick))
+    return np.asarray(correction(step, state, thin, *problem.wetting, thick))
