@@ -70,6 +70,7 @@ from vegglue.engine.newton import problem_at
 from vegglue.flow.closures import bed_drag, drag
 from vegglue.flow.local_changes import Term
 from vegglue.normal_range import NORMAL95
+from vegglue.parallel import in_threads
 from vegglue.progress import Progress, Watch
 from vegglue.results.causes import PatchOutline
 from vegglue.wording.phases import COMPARING_LINE
@@ -572,17 +573,9 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
                 if size > constants().implausible_size and not screening.testable(columns[j]):
                     total = -np.inf
                 found.append(Hypothesis("effect", refit.candidate.name, total, columns[j], refit))
-        for one, _ in places:
-            of_term = zip(spots, refits[len(effects) :], strict=True)
-            ended = [(spot, refit) for (of, spot), refit in of_term if of is one and refit is not None]
-            if ended:
-                its_kind = kind_named(screening.kinds, one.term)
-                spot, refit = max(ended, key=lambda end: end[1].log_factor)
-                there = found_place(search, one, its_kind, spot, refit)
-                name = there.refit.candidate.name
-                possible = possible_change(search.model, search.point, one.term, *(there.refit.shapes[k] for k in "xy"))
-                total = -np.inf if cannot_be(there.refit.interval95, possible) else there.log_evidence
-                found.append(Hypothesis(its_kind.name, name, total, spot, there.refit, there.errors, there.spread))
+        ended = [(one, spot, refit) for (one, spot), refit in zip(spots, refits[len(effects) :], strict=True) if refit]
+        tasks = [(screening, one, [(spot, refit) for of, spot, refit in ended if of is one]) for one, _ in places]
+        found += [one for one in in_threads(somewhere_of, tasks) if one is not None]
         if spots and PATCH not in tried:
             names.append(PATCH)
             found = with_patch(screening, found)
@@ -590,6 +583,19 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
         promising = [float(of_each[j]) for j in _promising(of_each) if prints.candidates[j].name not in tried]
         promising += [kind_named(screening.kinds, one.term).total for one in prints.places if one.name not in tried]
         best = max(elsewhere, *(one.log_evidence for one in found), *promising)
+
+
+def somewhere_of(screening: Screening, places: Places, ends: Sequence[tuple[int, Refit]]) -> Hypothesis | None:
+    """Something of a term where it explains most, from its refits at some spots; None if there are none."""
+    if not ends:
+        return None
+    kind, search = kind_named(screening.kinds, places.term), screening.search
+    spot, refit = max(ends, key=lambda end: end[1].log_factor)
+    there = found_place(search, places, kind, spot, refit)
+    name = there.refit.candidate.name
+    possible = possible_change(search.model, search.point, places.term, *(there.refit.shapes[k] for k in "xy"))
+    total = -np.inf if cannot_be(there.refit.interval95, possible) else there.log_evidence
+    return Hypothesis(kind.name, name, total, spot, there.refit, there.errors, there.spread)
 
 
 def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypothesis]:
