@@ -13,7 +13,7 @@ from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_
 
 from vegglue.decision_constants import constants
 from vegglue.diagnosis import candidate_effects
-from vegglue.diagnosis.candidate_effects import candidate_laws, laws_beside
+from vegglue.diagnosis.candidate_effects import candidate_laws, laws_beside, same_as_accepted
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.search_state import PriorWeight, SearchState
 from vegglue.effects.grammar import LAWS
@@ -37,7 +37,8 @@ def suspected(
     cosine = np.eye(5)
     cosine[1, 2:] = 0.95  # every law looks like waves
     screening: Any = SimpleNamespace(
-        p=p, of_each=lambda evidence: evidence, laws=laws, settings=[{"reference": 0.4}] * 2 + [{}],
+        p=p, of_each=lambda evidence: evidence, laws=laws, columns=[np.array([j]) for j in range(3)],
+        settings=[{"reference": 0.4}] * 2 + [{}],
         kind=SimpleNamespace(log_evidence=np.array([9.0, 7.0, 1.0]), gain=np.full(3, -0.5)), of_listed=2,
         best_column=lambda law: law, listed=SimpleNamespace(fingerprints=prints), cosine=cosine,
     )  # fmt: skip
@@ -89,6 +90,24 @@ def test_a_law_is_named_beside_an_effect_that_is_not_clearly_likelier(
     wind, waves = (Step(name, (name,), (1.0,), ((name,),), 200.0, 5.0, 1e-4) for name in ("wind", "waves"))
     assert (suspected(SearchState(steps=(wind,), prior_weights=weights), lost=lost) is not None) == reported
     assert suspected(SearchState(steps=(waves,), prior_weights=weights), lost=lost) is None
+
+
+@pytest.mark.parametrize("speed", [0.8, 0.95])  # cosine of the laws of the speed
+def test_another_form_of_an_accepted_law_is_no_other_cause(speed: float) -> None:
+    """Friction of the floor that changes with the depth is one cause, be it by a power or by a step; with the speed it
+    is another, unless the speed goes with the depth, as in uniform flow.
+    """
+    names = ("law_floor_depth_step", "law_floor_speed_power", "law_floor_speed_step", "law_bank_depth_step")
+    prints = SimpleNamespace(candidates=[SimpleNamespace(name="depth_dependent_bed")], columns=[np.array([0])])
+    cosine = np.eye(5)
+    cosine[0, 2] = speed
+    screening: Any = SimpleNamespace(
+        laws=[SimpleNamespace(law=LAWS[name]) for name in names], columns=[np.array([j]) for j in range(4)],
+        settings=[{}] * 4, listed=SimpleNamespace(fingerprints=prints), of_listed=1, cosine=cosine,
+    )  # fmt: skip
+    as_depth = speed > constants().alike_cosine
+    assert same_as_accepted(screening, ["depth_dependent_bed"]).tolist() == [True, as_depth, as_depth, False]
+    assert not same_as_accepted(screening, ["wind"]).any()
 
 
 @pytest.mark.parametrize(("p_last", "first"), [(1e-3, True), (0.3, False)])

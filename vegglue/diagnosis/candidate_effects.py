@@ -6,7 +6,8 @@ Laws would explain what no listed effect does; `discover` writes one down.
 
 They have an alarm of their own, which follows that of everything listed: the listed library goes first. Those that are
 not clearly less likely than what was accepted are calibrated, as in `discover`, and named beside it; a law that leaves
-the same trace as an accepted effect is that effect.
+the same trace as an accepted effect is that effect, and so is another form of an effect that is a law itself: both say
+that a term changes with a quantity, or with one that goes with it in these data, and the known form goes first.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,6 +27,7 @@ from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import Hypothesis, chances_in_set
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.search_state import SearchState
+from vegglue.effects.grammar import LAWS, SAME_AS
 from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import (
     AmplitudeEstimate,
@@ -231,13 +233,27 @@ def candidate_laws(
 
 
 def same_as_accepted(screening: LawScreening, accepted: Sequence[str]) -> NDArray[np.bool_]:
-    """Whether the law of each column leaves the same trace as an accepted effect (l,)."""
+    """Whether the law of each column is an accepted effect (l,).
+
+    It leaves the same trace; or the effect is a law itself, and this is another form of it, of the same quantity or of
+    one that the data cannot separate: in the form of the effect it leaves the same trace.
+    """
     prints = screening.listed.fingerprints
     own = [some for one, some in zip(prints.candidates, prints.columns, strict=True) if one.name in accepted]
     if not own:
         return np.zeros(len(screening.settings), dtype=bool)
     cosine = np.abs(screening.cosine[np.concatenate(own), screening.of_listed :])
-    return np.asarray(cosine.max(axis=0) > constants().alike_cosine)
+    same = np.asarray(cosine.max(axis=0) > constants().alike_cosine)
+    laws = [LAWS[law] for law, effect in SAME_AS.items() if effect in accepted]
+    columns_of = [(one.law, columns) for one, columns in zip(screening.laws, screening.columns, strict=True)]
+    subjects = {law.subject for law in laws} | {
+        law.subject
+        for law, columns in columns_of
+        if same[columns].any() and (law.term, law.form) in [(one.term, one.form) for one in laws]
+    }
+    for law, columns in columns_of:
+        same[columns] |= law.subject in subjects
+    return same
 
 
 def _may_be_laws(chance: float) -> bool:
