@@ -35,11 +35,11 @@ from vegglue.case.schema import Case, Planned, PlannedGauge, PlannedTransect
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import hypotheses_of
-from vegglue.diagnosis.diagnose import _best_branch, _with_alarm
+from vegglue.diagnosis.diagnose import _best_branch
 from vegglue.diagnosis.plan import _effects, needed_evidence, plan_measurements, shown_by
 from vegglue.diagnosis.plan_model import place_along, plan_model, planned_pieces, possible_pieces, with_chosen
 from vegglue.diagnosis.plan_search import plan_search
-from vegglue.diagnosis.search_state import SearchState, Undecided
+from vegglue.diagnosis.search_state import SearchState, Undecided, with_alarm
 from vegglue.engine.interface import Model
 from vegglue.errors import InputError
 from vegglue.plain_json import plain
@@ -155,7 +155,7 @@ def one_set(model: Model, plan: FieldPlan, number: int, truth: Truth | None, pos
 def first_step(model: Model) -> SearchState:
     """What a diagnosis accepts first; `alarmed` as before it."""
     screening = screen(baseline(model))
-    found = _with_alarm(screening, SearchState())
+    found = with_alarm(screening, SearchState())
     if not found.alarmed:
         return found
     branch = _best_branch(screening, hypotheses_of(screening, silent), found, silent)

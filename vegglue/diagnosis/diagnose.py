@@ -18,7 +18,6 @@ from vegglue.calibration.candidates import Instrument, candidate_in_case, error_
 from vegglue.calibration.fit import chi2, fit, interval95
 from vegglue.calibration.noise import with_unknown_errors
 from vegglue.calibration.residual_screening import Screening, screen
-from vegglue.calibration.score_test import alarm_p
 from vegglue.case.channel_geometry import cells_across
 from vegglue.case.gridded_site import Site
 from vegglue.case.size_limits import WIDE_FROM, factor_bytes
@@ -50,6 +49,7 @@ from vegglue.diagnosis.search_state import (
     refitted,
     step_found,
     undecided_of,
+    with_alarm,
     with_rivals_again,
 )
 from vegglue.engine.interface import Model
@@ -162,7 +162,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         tested = candidate_effects_of(screening)
         # Of what was refitted, or accepted and so tested no more, earlier rounds know more than the last test.
         effects = tested | {name: one for name, one in effects.items() if one.amplitude.refitted or name not in tested}
-        found = _with_alarm(screening, found)
+        found = with_alarm(screening, found)
         if found.implausible or not found.alarmed:
             break
         hypotheses = hypotheses or hypotheses_of(screening, watch)
@@ -174,10 +174,8 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
         found, base = branch.found, branch.base
         if branch.what == "instrument":  # amplitudes that were calibrated with these readings are no longer true
             effects = tested | {step.accepted: effects[step.accepted] for step in found.steps}
-        newest = 1 if branch.what == "effect" else 0
-        earlier, last = found.steps[: len(found.steps) - newest], found.steps[len(found.steps) - newest :]
-        base, again, effects = with_rivals_again(base, earlier, found.flagged, effects, watch)
-        found = found.with_steps((*again, *last))
+        earlier = found.steps[:-1] if branch.what == "effect" else found.steps
+        base, found, effects = with_rivals_again(base, found, earlier, effects, watch)
         watch(Progress(SEARCHING_WITH))
         kept = branch if base is branch.base else SearchBranch(branch.what, found, base)
         screening, hypotheses = kept.screening or screen(base, found.flagged), kept.hypotheses
@@ -187,12 +185,6 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
             value, low, high = interval95(model, fitted, candidate_in_case(model.case, one.name).parameter)
             effects[one.name] = replace(one, amplitude=replace(one.amplitude, value=value, interval95=(low, high)))
     return assemble_diagnosis(first, screening, found, effects, unseen, laws, watch)
-
-
-def _with_alarm(screening: Screening, found: SearchState) -> SearchState:
-    later = constants().later_alarm_share if found.accepted or found.instruments else 1.0
-    p = alarm_p(screening.kinds, screening.errors, 1, found.slack)
-    return replace(found, p=p, rate=constants().false_alarm_rate * later)
 
 
 def _best_branch(
@@ -206,7 +198,7 @@ def _best_branch(
     """
 
     def with_what_is_next(one: SearchBranch, further: Screening) -> SearchBranch:
-        alarmed = _with_alarm(further, one.found).alarmed
+        alarmed = with_alarm(further, one.found).alarmed
         return replace(one, screening=further, hypotheses=hypotheses_of(further, watch) if alarmed else ())
 
     def further(one: SearchBranch) -> float:

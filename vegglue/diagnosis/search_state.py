@@ -1,7 +1,9 @@
 """What a search has found so far, and how the winner of a competition becomes a step, a place or an instrument.
 
 Where two things are missing, what explains the first may depend on the second: an effect that seemed sure is one of
-several, or another leads. The whole competition is then repeated without the effect, with what was accepted since.
+several, or another leads. The whole competition is then repeated without the effect, with what was accepted since. If
+that explains all by itself, and no alarm is sounded, the effect is dropped: what is accepted does not depend on the
+order in which it was found.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +17,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import Instrument, candidate_in_case, effect_entry, error_columns
 from vegglue.calibration.fit import chi2
 from vegglue.calibration.residual_screening import Screening, screen
-from vegglue.calibration.score_test import kind_named, prior_shrinkage
+from vegglue.calibration.score_test import alarm_p, kind_named, prior_shrinkage
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import (
     Hypothesis,
@@ -129,6 +131,21 @@ class SearchState:
         earlier = sum(one.explained for one in self.prior_weights if one.name in unneeded)
         weight = PriorWeight(step.accepted, explained + earlier, log_prior)
         return replace(self, steps=(*kept, step), prior_weights=(*weights, weight))
+
+    def without_step(self, step: Step, lost: float) -> "SearchState":
+        """Without an effect that what was accepted since makes unneeded; lost: rise of chi2 without it.
+
+        What it explained is explained by the last that was accepted, and the effect after it begins where it did.
+        """
+        left = [one for one in self.steps if one is not step]
+        after = self.steps.index(step)
+        if after < len(left):
+            left[after] = replace(left[after], chi2_before=step.chi2_before)
+        explained = sum(one.explained for one in self.prior_weights if one.name == step.accepted) - lost
+        weights = [one for one in self.prior_weights if one.name != step.accepted]
+        if weights:
+            weights[-1] = replace(weights[-1], explained=weights[-1].explained + explained)
+        return replace(self, steps=tuple(left), prior_weights=tuple(weights))
 
     def with_steps(self, steps: tuple[Step, ...]) -> "SearchState":
         """The same steps with other rivals in the model, which keep the prior weights of those that they replace."""
@@ -389,24 +406,39 @@ def rivals_among(
     return {names[j]: float(chance[j]) for j in likeliest}, tuple(tuple(names[j] for j in group) for group in kept)
 
 
+def with_alarm(screening: Screening, found: SearchState) -> SearchState:
+    """What was found, with the alarm that anything else is missing.
+
+    Parameters
+    ----------
+    screening : Screening
+        Of the model with all that was found.
+    found : SearchState
+
+    Returns
+    -------
+    SearchState
+        With p of the alarm, and the rate below which it is sounded.
+    """
+    later = constants().later_alarm_share if found.accepted or found.instruments else 1.0
+    p = alarm_p(screening.kinds, screening.errors, 1, found.slack)
+    return replace(found, p=p, rate=constants().false_alarm_rate * later)
+
+
 def with_rivals_again(
-    base: Baseline,
-    steps: Sequence[Step],
-    flagged: tuple[int, ...],
-    effects: Mapping[str, CandidateEffect],
-    watch: Watch,
-) -> tuple[Baseline, tuple[Step, ...], dict[str, CandidateEffect]]:
+    base: Baseline, found: SearchState, steps: Sequence[Step], effects: Mapping[str, CandidateEffect], watch: Watch
+) -> tuple[Baseline, SearchState, dict[str, CandidateEffect]]:
     """The model with the best rival of every step, each compared again without it in the model.
 
-    A step stays as it is if no flow is found without its effect, or with any.
+    A step without which no alarm is sounded is dropped, and those that are left are compared again. A step stays as it
+    is if no flow is found without its effect, or with any.
 
     Parameters
     ----------
     base : Baseline
+    found : SearchState
     steps : sequence of Step
         Of effects that were accepted before what was last: an effect, something at a place, an instrument.
-    flagged : tuple of int
-        Readings that are excluded, indices among the used stations.
     effects : mapping of CandidateEffect
         By name.
     watch : callable
@@ -414,18 +446,23 @@ def with_rivals_again(
 
     Returns
     -------
-    Baseline, tuple of Step, dict of CandidateEffect
-        The model with the rivals at the values of their shapes that they competed with, the steps with their chances as
-        they are now, and the effects with the amplitudes of their refits.
+    Baseline, SearchState, dict of CandidateEffect
+        The model with the rivals at the values of their shapes that they competed with, what was found with the chances
+        as they are now, and the effects with the amplitudes of their refits.
     """
-    kept, known = list[Step](), dict(effects)
-    for step in steps:
-        kept.append(step)
+    known, waiting = dict(effects), list(steps)
+    while waiting:
+        step = waiting.pop(0)
         watch(Progress(COMPARING_AGAIN.format(step.accepted)))
         less = without_effect(base, candidate_in_case(base.model.case, step.accepted))
         if less is None:
             continue
-        screening = screen(less, flagged)
+        screening = screen(less, found.flagged)
+        without = found.without_step(step, chi2(less.noise, less.fitted.point) - chi2(base.noise, base.fitted.point))
+        if not with_alarm(screening, without).alarmed:
+            base, found = less, without
+            waiting = list(found.steps)
+            continue
         hypotheses = hypotheses_of(screening, watch)
         listed = [j for j, one in enumerate(hypotheses) if one.kind == "effect"]
         if step.accepted not in [hypotheses[j].name for j in listed] or np.isinf(hypotheses[listed[0]].log_evidence):
@@ -441,9 +478,10 @@ def with_rivals_again(
                 continue
             base = further
         again = step_found(screening, hypotheses, lead, base, step.p_family)
-        kept[-1] = replace(again, chi2_before=step.chi2_before, chi2_after=step.chi2_after)
+        again = replace(again, chi2_before=step.chi2_before, chi2_after=step.chi2_after)
+        found = found.with_steps(tuple(again if other is step else other for other in found.steps))
         known |= refitted(hypotheses, known)
-    return base, tuple(kept), known
+    return base, found, known
 
 
 def leading_refit(screening: Screening, hypotheses: Sequence[Hypothesis]) -> int:
