@@ -110,6 +110,19 @@ def test_another_form_of_an_accepted_law_is_no_other_cause(speed: float) -> None
     assert not same_as_accepted(screening, ["wind"]).any()
 
 
+@pytest.mark.parametrize(("forms", "reported"), [(0, True), (2, False)])
+def test_an_accepted_law_has_the_evidence_of_its_likeliest_form(
+    forms: int, reported: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a smooth flume friction by a power of the depth lost against the momentum that the flow carries, by a step of
+    the speed; friction by a step of the depth explains more than both.
+    """
+    monkeypatch.setattr(candidate_effects, "same_as_accepted", lambda *_: np.arange(3) < forms)
+    power = Step("depth_dependent_bed", ("depth_dependent_bed",), (1.0,), (("depth_dependent_bed",),), 200.0, 5.0, 1e-4)
+    found = SearchState(steps=(power,), prior_weights=(PriorWeight("any", 0.0, -1.0),))
+    assert (suspected(found) is not None) == reported
+
+
 @pytest.mark.parametrize(("p_last", "first"), [(1e-3, True), (0.3, False)])
 def test_a_law_goes_before_an_effect_only_if_the_effect_leaves_it_something(p_last: float, first: bool) -> None:
     """In a smooth flume friction at one depth led friction by a power of it, beside which nothing was left."""

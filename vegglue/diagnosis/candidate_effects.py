@@ -191,8 +191,12 @@ def candidate_laws(
         against = [one.log_evidence for one in found.undecided.hypotheses]
     else:
         against = [kind.total for kind in last.kinds]
-    evidence = np.where(same_as_accepted(screening, found.effects), -np.inf, screening.kind.log_evidence)
+    same = same_as_accepted(screening, found.effects)
+    evidence = np.where(same, -np.inf, screening.kind.log_evidence)
     of_laws, strengths = screening.of_each(evidence), {}
+    # What was accepted stands for all its forms, with the evidence of the likeliest.
+    of_forms = float(screening.kind.log_evidence[same].max(initial=-np.inf))
+    against = [max(one, of_forms) for one in against]
 
     def chances_of_laws() -> Array:
         return chances_in_set(np.append(of_laws, against))[: of_laws.size]
@@ -200,7 +204,7 @@ def candidate_laws(
     if _may_be_laws(float(chances_of_laws().sum())):
         alone = [] if found.places else found.effects
         calibrated, kept, own = refitted(screening, alone, found.log_prior, max(against))
-        against = [own] if found.accepted else against
+        against = [max(own, of_forms)] if found.accepted else against
         of_laws = screening.of_each(np.where(np.isinf(evidence), -np.inf, kept))
         strengths = {one.name: one.what.amplitude for one in calibrated if isinstance(one.what, Refit)}
     if not np.isfinite(of_laws).any():
