@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from coarse_twin import coarse_twin
 from diagnoses import a_candidate_effect, an_anomaly, candidate_laws_of
-from linear_baseline import CASE_OF_TWINS, at_best, stations_of
+from linear_baseline import CASE_OF_TWINS, at_best, linear_engine, stations_of
 from verdicts import step
 
 from vegglue.calibration.baseline import Baseline
@@ -82,6 +82,21 @@ def test_what_is_significant_in_the_last_model_is_kept_unless_it_is_in_it() -> N
     )
     assert significant_effects(last, SearchState(steps=(step("jet"),))) == {"wind": 0.008}
     assert significant_effects(last, SearchState(steps=(step("jet"),)), slack=1.0) == {}
+
+
+@pytest.mark.parametrize(("others", "hangs"), [(0.0, True), (6.0, False)])
+def test_a_parameter_that_one_section_alone_strains_is_found(others: float, hangs: bool) -> None:
+    """Section C wants it 6 standard deviations off its prior; so do the others, or they want it in the middle."""
+    station, parameters = stations_of(CASE_OF_TWINS, ("A", "B", "C"), 4), len(CASE_OF_TWINS.parameters)
+    slope = 0.02 * np.random.default_rng(2).standard_normal((len(station), parameters))
+    slope[:, 0] = np.where(station["section"] == "C", 0.1, 0.02)
+    values = slope[:, 0] * np.where(station["section"] == "C", 6.0, others)
+    engine = linear_engine(lambda model: (np.zeros(len(station)), slope))
+    base = at_best(CASE_OF_TWINS, station, values, slope, engine)
+    name = base.model.names[0]
+    assert abs(base.fitted.point.z[0]) > constants().far_off_prior
+    found = conclusion.strained_without_a_section(base, name)
+    assert found is None if not hangs else (found is not None and found[0] == "C" and found[1] < 0.1)
 
 
 @pytest.mark.parametrize(("other", "named"), [(0.1, True), (0.0, False)])

@@ -243,6 +243,7 @@ VERDICTS: dict[str, Diagnosis] = {
         bank(name="bank_roughness", title=SURFACES.title, amplitude=1.1, interval95=(0.9, 1.3)),
     )),
     "a far parameter": doubt(ParameterFarFromPrior("n_b", 4.5), effects=(bank(),)),
+    "a parameter that hangs on a section": doubt(ParameterFarFromPrior("eddy_viscosity", 6.0, ("t0", 0.1))),
     "an absurd size": doubt(AmplitudeBeyondPlausible("wind", 5.2), effects=(bank(),)),
     "misfit beyond errors": doubt(MisfitBeyondErrors(2.3), effects=(bank(),)),
     "misfit unexplained": doubt(MisfitUnexplained()),

@@ -11,10 +11,10 @@ import pandas as pd
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fingerprints import least_depth
-from vegglue.calibration.fit import chance_of_misfit, chi2, freedom_of_misfit, interval95
+from vegglue.calibration.fit import chance_of_misfit, chi2, fit, freedom_of_misfit, interval95
 from vegglue.calibration.law_screening import LawScreening
 from vegglue.calibration.learned_bed import bed_of_spots, learned_bed
-from vegglue.calibration.noise import Noise, covariance_of_data, with_correlation
+from vegglue.calibration.noise import Noise, covariance_of_data, with_correlation, with_unknown_errors
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named
 from vegglue.case.bed import read_bed_survey
@@ -326,6 +326,7 @@ def _verdict(
             by_chance=unseen.by_chance,
             neighbours=neighbours,
             strained=(strained, far),
+            strained_without=strained_without_a_section(base, strained) if far > constants().far_off_prior else None,
             between=largest_error_between(base) if silent else 1.0,
             carried=tuple(mismatched_discharges(model.case, model.site, model.station)),
             significant_effects=beside,
@@ -380,6 +381,30 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
         if names[best] not in together and ahead > np.log(constants().same_kind_odds):
             return NameHangsOnSection(step.accepted, str(used["section"].to_numpy()[~kept][0]), names[best])
     return None
+
+
+def strained_without_a_section(base: Baseline, parameter: str) -> tuple[str, float] | None:
+    """The section without which a parameter lies nearer to the middle of its prior than far_off_prior, and how far it
+    lies then [standard deviations]; None without one.
+
+    Calibrated again without the velocities of the section that moves it there most, to first order.
+    """
+    noise, point = base.noise, base.fitted.point
+    used, own = base.model.station.iloc[noise.rows], base.model.names.index(parameter)
+    of_velocity = velocity_rows(used)
+    slope, residual = noise.used(point.slope), noise.residual(point.prediction)
+    left: dict[str, tuple[float, Noise]] = {}
+    for section in dict.fromkeys(used["section"][of_velocity]):
+        of_section = np.flatnonzero(of_velocity & (used["section"] == section).to_numpy())
+        less = with_unknown_errors(noise, np.eye(noise.rows.size)[:, of_section])
+        white, rest = less.whiten(slope), less.whiten(residual)
+        z = point.z + np.linalg.solve(white.T @ white + np.eye(point.z.size), white.T @ rest - point.z)
+        left[str(section)] = abs(float(z[own])), less
+    if len(left) < 2:
+        return None
+    section = min(left, key=lambda name: left[name][0])
+    far = abs(float(fit(base.model, left[section][1], point).point.z[own]))
+    return (section, far) if far < constants().far_off_prior else None
 
 
 def as_calibrated(place: LocalAnomaly, base: Baseline) -> LocalAnomaly:

@@ -75,6 +75,7 @@ class VerdictInputs:
     by_chance: float = 1.0
     neighbours: bool = False  # whether readings side by side are excluded
     strained: tuple[str, float] = ("", 0.0)  # the parameter furthest off its prior, and how far [standard deviations]
+    strained_without: tuple[str, float] | None = None  # the section without which it is not too far, and how far then
     between: float = 1.0  # errors between the sections over those of the data [-]
     carried: tuple[CarriedDischarge, ...] = ()  # sections that clearly carry another discharge than stated
     # significant_effects, remainder: those that were not accepted, with p [-], and whether all of them may be a
@@ -185,7 +186,7 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
     if inputs.errors.scale > constants().absurd_errors:
         return verdict.ErrorsLargerThanStated(inputs.errors.scale)
     if far > constants().far_off_prior:
-        return verdict.ParameterFarFromPrior(parameter, far)
+        return verdict.ParameterFarFromPrior(parameter, far, inputs.strained_without)
     names = {step.accepted for step in inputs.steps}
     at_bound = []
     for one in (each for each in inputs.candidates if each.name in names):

@@ -58,10 +58,13 @@ class MisfitBeyondErrors:
 
 @dataclass(frozen=True)
 class ParameterFarFromPrior:
-    """A parameter replaces a cause: it lies so many standard deviations from the middle of its prior."""
+    """A parameter replaces a cause: it lies so many standard deviations from the middle of its prior; without: the
+    section without which it does not lie too far, and how far then.
+    """
 
     parameter: str
     deviations: float
+    without: tuple[str, float] | None = None
 
 
 @dataclass(frozen=True)
