@@ -40,6 +40,7 @@ from vegglue.inference.weighted_statistics import root_mean_square
 from vegglue.measurements.kinds import STREAMWISE, kind_of, velocity_rows
 from vegglue.measurements.section_discharge import mismatched_discharges
 from vegglue.normal_range import NORMAL95
+from vegglue.parallel import submit
 from vegglue.progress import Watch
 from vegglue.results.causes import (
     TERMS_AT_PLACES,
@@ -165,12 +166,13 @@ def assemble_diagnosis(
     -------
     Diagnosis
     """
-    refitted = partial(laws_beside_accepted, watch=watch)
+    refitted, measured_bed = partial(laws_beside_accepted, watch=watch), submit(_measured_bed, last, found)
     laws = candidate_laws(first, last, found, laws_beside_first, partial(laws_beside, last), refitted)
     if found.places and not found.steps and not found.instruments and laws is not None and laws.clear:
         # What competed after the place did so in the flow with it.
         found = replace(found, places=(), prior_weights=(), of_shape=0.0, undecided=None)
         last, effects = first, candidate_effects_of(first)
+        measured_bed = submit(_measured_bed, last, found)
     found = replace(found, places=tuple(as_calibrated(one, last.base) for one in found.places))
     ranked = tuple(sorted(effects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit, errors = misfit_of(first, last, found.flagged), estimated_errors(last, found)
@@ -179,8 +181,12 @@ def assemble_diagnosis(
     base, before = last.base, first.base
     model_error = _model_error(last)
     hangs_on = name_without_a_section(first, found)
-    bed_map, of_bed = (None, ()) if found.implausible else bed_of_measurements(last)
-    verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, held_out, hangs_on, of_bed)
+    # Whether silence is earned is a question only if nothing was found.
+    silent, unseen = not (found.steps or found.places or found.undecided), HeldOutErrors(float("nan"), 1.0)
+    if silent and held_out is not None:
+        unseen = held_out_errors(base, held_out)
+    bed_map, of_bed = measured_bed()
+    verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, silent, unseen, hangs_on, of_bed)
     strongest = first.ranking[:COMPARED]
     columns = [first.best_column(j) for j in strongest]
     # Scores of the term of the first place that was found, else of drag, before anything was accepted.
@@ -219,6 +225,11 @@ def assemble_diagnosis(
         bed_map=bed_map,
         laws=laws,
     )
+
+
+def _measured_bed(last: Screening, found: SearchState) -> tuple[FieldMapKept | None, tuple[BedCorrected, ...]]:
+    """`bed_of_measurements`, none beside values that no flow can have."""
+    return (None, ()) if found.implausible else bed_of_measurements(last)
 
 
 def bed_of_measurements(last: Screening) -> tuple[FieldMapKept | None, tuple[BedCorrected, ...]]:
@@ -281,17 +292,14 @@ def _verdict(
     field: FieldFound | None,
     laws: CandidateLaws | None,
     model_error: ModelErrorUsed | None,
-    held_out: Model | None,
+    silent: bool,
+    unseen: HeldOutErrors,
     hangs_on: NameHangsOnSection | None,
     of_bed: tuple[BedCorrected, ...],
 ) -> Verdict:
     """The verdict on what was found, once all that it rests on is computed."""
     base, model, z = last.base, last.base.model, last.base.fitted.point.z
-    # Whether silence is earned is a question only if nothing was found.
-    silent = not (found.steps or found.places or found.undecided)
-    unseen = HeldOutErrors(float("nan"), 1.0)
-    if silent and held_out is not None:
-        unseen = held_out_errors(base, held_out)
+    carried = submit(mismatched_discharges, model.case, model.site, model.station)
     # The calibrated parameter, other than the amplitude of an effect, that is furthest off the middle of its prior.
     of_effects = parameters_of_effects(model.case)
     own = [(abs(float(z[j])), name) for j, name in enumerate(model.names) if name not in of_effects]
@@ -328,7 +336,7 @@ def _verdict(
             strained=(strained, far),
             strained_without=strained_without_a_section(base, strained) if far > constants().far_off_prior else None,
             between=largest_error_between(base) if silent else 1.0,
-            carried=tuple(mismatched_discharges(model.case, model.site, model.station)),
+            carried=tuple(carried()),
             significant_effects=beside,
             remainder=bool(beside) and not significant_effects(last, found, found.slack),
             surroundings=tuple(surroundings),
