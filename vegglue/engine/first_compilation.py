@@ -16,7 +16,6 @@ from typing import Any
 
 import vegglue
 from vegglue.compilation import compile_for
-from vegglue.effects import plant_laws
 from vegglue.engine.newton import sum_windows
 from vegglue.flow import anderson, batch, block_elimination, kernels, thin_water
 from vegglue.parallel import cores_allowed
@@ -26,14 +25,13 @@ COMPILER = (
     "from vegglue.engine.first_compilation import compile_others; compile_others()"
 )
 # Arrays of doubles, singles, integers and truth values by their number of axes, all contiguous.
-D1, D2, D3, D4 = "f8[::1]", "f8[:,::1]", "f8[:,:,::1]", "f8[:,:,:,::1]"
+D2, D3, D4 = "f8[:,::1]", "f8[:,:,::1]", "f8[:,:,:,::1]"
 S2, S3, S4, S5 = "f4[:,::1]", "f4[:,:,::1]", "f4[:,:,:,::1]", "f4[:,:,:,:,::1]"
 I1, I2, B1, B3 = "i8[::1]", "i8[:,::1]", "b1[::1]", "b1[:,:,::1]"
 WETTING = (D2, D3, D2, "f8")
-# What a diagnosis on a straight grid gives its loops: two that it needs before the residual, then those after it, the
-# last one first, so that command and second process meet once and never compile the same loops in step.
+# What a diagnosis on a straight grid gives its loops: the one that it needs just before the residual, then those after
+# it, the last one first, so that command and second process meet once and never compile the same loops in step.
 COMPILED_BESIDE: tuple[tuple[Any, tuple[str, ...]], ...] = (
-    (plant_laws.plant_drag, (D3, D3, I1, I1, I1, D1, D2, D2, D2, "b1")),
     (thin_water.friction_slope, (D4, D3, D3, D2)),
     (kernels.push, (D4, D3, D3, D3, D3, D3, D3, "f8", "f8", "f8", "none")),
     (sum_windows, (S4, S4, S3)),
