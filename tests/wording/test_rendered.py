@@ -101,7 +101,7 @@ from vegglue.pages.findings import (
 )
 from vegglue.pages.headline import WorstZone
 from vegglue.pages.parameters import PosteriorVerdict, ResidualCompared
-from vegglue.results.causes import CandidateEffect, FaultyInstrument, ModelErrorUsed, Rival
+from vegglue.results.causes import TERMS_AT_PLACES, CandidateEffect, FaultyInstrument, ModelErrorUsed, Rival
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.ensemble import FieldsTooLarge
 from vegglue.results.field_exports import QUANTITIES_OF_FLOW
@@ -616,6 +616,18 @@ def test_each_refusal_has_a_template_and_an_example() -> None:
     code = "".join(path.read_text(encoding="utf-8") for path in package.rglob("*.py"))
     raised = set(re.findall(r'InputError\(\s*"(\w+)",|refuse_rows\(.*?"(\w+)",', code))
     assert {one or other for one, other in raised} == worded == {one.kind for one in REFUSED}
+
+
+def test_each_list_of_words_by_place_term_has_them_all() -> None:
+    """`plan` ended without its page when obstacles across the channel were new."""
+    wording = HERE.parents[1] / "vegglue" / "wording"
+    lists = [
+        set(re.findall(r'"(\w+)":', words))
+        for path in wording.rglob("*.j2")
+        for words in re.findall(r'\{"drag":[^{}]*\}', path.read_text(encoding="utf-8"))
+    ]
+    assert len(lists) >= 4
+    assert all(one == set(TERMS_AT_PLACES) for one in lists)
 
 
 if __name__ == "__main__":
