@@ -198,7 +198,7 @@ def plan_marks(diagnosis: Diagnosis, patches: Sequence[Outline]) -> PlanMarks:
     for one in diagnosis.places:
         of_term = "" if one.term == diagnosis.place_map.term else f"{phrase('acting', one.term, one.amplitude)}: "
         angle = None if one.outline is None else one.outline.angle
-        words = of_term + phrase("place_of", one)
+        words = of_term + phrase("place_of", one.term, one.x, one.y)
         spots.append(MarkedSpot(one.x, one.y, one.length, one.width, words, angle))
     return PlanMarks(
         patches=patches,
