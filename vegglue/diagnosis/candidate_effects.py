@@ -237,10 +237,20 @@ def candidate_laws(
 
 
 def same_as_accepted(screening: LawScreening, accepted: Sequence[str]) -> NDArray[np.bool_]:
-    """Whether the law of each column is an accepted effect (l,).
+    """Whether the law of each column is an accepted effect.
 
     It leaves the same trace; or the effect is a law itself, and this is another form of it, of the same quantity or of
     one that the data cannot separate: in the form of the effect it leaves the same trace.
+
+    Parameters
+    ----------
+    screening : LawScreening
+    accepted : sequence of str
+        Names of effects.
+
+    Returns
+    -------
+    ndarray of bool (l,)
     """
     prints = screening.listed.fingerprints
     own = [some for one, some in zip(prints.candidates, prints.columns, strict=True) if one.name in accepted]

@@ -367,7 +367,23 @@ def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[SteepCellsLikeF
 
 
 def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> Iterator[object]:
-    """Canopies above the water, all experiments in one remark; dry stands; heights that differ from those measured."""
+    """Canopies above the expected water, stands that are dry, and heights that differ from those measured.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    observations : Observations
+
+    Yields
+    ------
+    StandDry
+        Of each experiment.
+    CanopyUnlikeMeasured
+        If the measured height lies outside 95 % of the prior by more than 2 standard errors and UNEVEN_CANOPY.
+    CanopyEmergent
+        All experiments in one remark, after all others.
+    """
     emergent: dict[tuple[str, Bounds], dict[str, float]] = {}
     dry = dry_outlets(case, site)
     for name in [name for name in case.experiments if name not in dry]:
@@ -396,7 +412,18 @@ def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> I
 
 
 def remarks_on_bank_law(case: Case, site: Site) -> Iterator[BankLawHeld]:
-    """Cells without plants in which 12 h / k_s of the law of the banks is held at its lower bound."""
+    """Cells without plants in which 12 h / k_s of the law of the banks is held at its lower bound.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+
+    Yields
+    ------
+    BankLawHeld
+        Of each friction class with k_s, at the upper end of its prior (quantile NEARLY_ALL) and the expected depth.
+    """
     floor = case.numerics.bank_argument_minimum
     for index, (name, friction_class) in enumerate(case.friction.classes.items()):
         if friction_class.k_s is None:

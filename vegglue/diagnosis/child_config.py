@@ -122,12 +122,34 @@ def spread_over_its_error(anomaly: LocalAnomaly) -> LocalAnomaly:
 
 
 def candidate_at(case: Case, anomaly: LocalAnomaly) -> Candidate:
-    """Something unlisted where a diagnosis found it, with the size that the diagnosis held to be plausible there."""
+    """The effect that stands for a local anomaly, at its place.
+
+    Parameters
+    ----------
+    case : Case
+    anomaly : LocalAnomaly
+
+    Returns
+    -------
+    Candidate
+        With the size that the diagnosis held to be plausible there.
+    """
     return place_candidate(effect_named(case, anomaly.effect), anomaly.shapes, anomaly.plausible)
 
 
 def with_additions(parent: Case, added: Sequence[tuple[Candidate, Mapping[str, float]]]) -> Case:
-    """The case that the child config would be read as, but for its title; no file is written."""
+    """The case that a child config would be read as, but for its title; no file is written.
+
+    Parameters
+    ----------
+    parent : Case
+    added : sequence of (Candidate, mapping of float)
+        Effects with values of their shapes [unit of each].
+
+    Returns
+    -------
+    Case
+    """
     child = parent
     for candidate, shapes in added:
         child = with_effect(child, candidate, shapes)
@@ -173,7 +195,20 @@ def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapp
 
 
 def relevelled_tree(parent: Case, relevelled: Case, target: Path) -> Tree:
-    """Keys and values of the child that `target` is to hold: the bed of a case without levels of surveyed lines."""
+    """Keys and values of the child config that holds the bed of a case without levels of surveyed lines.
+
+    Parameters
+    ----------
+    parent : Case
+    relevelled : Case
+        With that bed.
+    target : Path
+        File of the child; paths are relative to its folder.
+
+    Returns
+    -------
+    Tree
+    """
     here, layers = target.resolve().parent, list[Tree]()
     for layer in relevelled.bed:
         tree = layer.model_dump(mode="json", exclude_unset=True)

@@ -42,9 +42,14 @@ from vegglue.wording.sentences import phrase
 
 @dataclass(frozen=True)
 class HeldOutErrors:
-    """Errors at what was not seen, over those expected [-], and the ratio that errors alone exceed in 5 % of cases.
+    """Errors at held-out velocities over the expected ones.
 
-    ratio: NaN without velocities that were not seen, infinite where the model finds no flow for them.
+    Attributes
+    ----------
+    ratio : float
+        [-]; NaN without such velocities, infinite if the model finds no flow for them.
+    by_chance : float
+        Ratio that errors alone exceed in 5 % of cases [-].
     """
 
     ratio: float
@@ -105,8 +110,12 @@ def held_out_errors(base: Baseline, held_out: Model) -> HeldOutErrors:
 
 @dataclass(frozen=True)
 class UnseenErrors:
-    """Measured less predicted at stations that no calibration uses, as the calibrated ones let expect: mean and
-    standard error (station,) [unit of the station], without the error of reading.
+    """Measured less predicted at stations that no calibration uses, as the calibrated ones let expect.
+
+    Attributes
+    ----------
+    mean, error : ndarray (station,)
+        Mean and standard error, without the error of reading [unit of the station].
     """
 
     mean: Array
@@ -114,10 +123,23 @@ class UnseenErrors:
 
 
 def unseen_errors(base: Baseline, unseen: Model, there: Point) -> UnseenErrors | None:
-    """Those of a calibrated model, e of `errors_elsewhere` with all errors of model and site that stations share;
-    there: the point of the same parameters. None where no flow is found on the cells of the model's own error.
+    """Expected errors of a calibrated model at stations that no calibration uses.
 
-    The error of the grid is that at the stations; that of a discharge is no calibrated one's.
+    e of `errors_elsewhere` with all errors of model and site that stations share. The error of the grid is that
+    at the stations, and that of a discharge is independent of those that were calibrated.
+
+    Parameters
+    ----------
+    base : Baseline
+    unseen : Model
+        At these stations.
+    there : Point
+        Of `unseen`, at the parameters of the base.
+
+    Returns
+    -------
+    UnseenErrors or None
+        None if no flow is found on the cells of the model's own error.
     """
     where = with_error_there(model_that_errs(base))
     same = where.model.site.bed.shape == unseen.site.bed.shape
@@ -216,8 +238,16 @@ def largest_error_between(base: Baseline) -> float:
 
 @dataclass(frozen=True)
 class ActsElsewhere:
-    """Something at a place changes the velocity by `change` halfway between sections at x [m], and by `at_stations` at
-    most where it was measured [m/s].
+    """A local anomaly that acts mostly between the stations.
+
+    Attributes
+    ----------
+    change : float
+        Largest change of velocity halfway between sections [m/s].
+    x : float
+        Where that is [m].
+    at_stations : float
+        Largest change where velocities were measured [m/s].
     """
 
     change: float
@@ -258,8 +288,19 @@ def acts_elsewhere(before: Baseline, after: Baseline) -> ActsElsewhere | None:
 
 
 def halfway(station: pd.DataFrame, end: float) -> pd.DataFrame:
-    """The stations of velocities moved halfway to the next section of their experiment downstream, or to the end of the
-    channel [m], where none is in use: in another one a boat lies some centimetres off.
+    """The stations of velocities, moved halfway to the next section of their experiment downstream.
+
+    Parameters
+    ----------
+    station : DataFrame
+        All stations.
+    end : float
+        End of the channel, to which those of the last section are moved halfway [m].
+
+    Returns
+    -------
+    DataFrame
+        None is used. A section is one of its own experiment: in another one a boat lies some centimetres off.
     """
     velocity = station[leading_velocities(station)]
     middle = section_places(velocity)
@@ -278,7 +319,17 @@ MEASUREMENT = ["experiment", "kind", "section", "x", "y", "value"]
 
 
 def excluded_by(*found: Diagnosis) -> pd.DataFrame:
-    """The measurements that any of the diagnoses has flagged."""
+    """The measurements that any of the diagnoses has flagged.
+
+    Parameters
+    ----------
+    *found : Diagnosis
+
+    Returns
+    -------
+    DataFrame
+        With the columns of MEASUREMENT, each measurement once.
+    """
     flagged = [
         one.predictions.station.iloc[list(one.errors.flagged)][MEASUREMENT] for one in found if one.errors.flagged
     ]
@@ -413,7 +464,18 @@ def model_score_in_short(score: ModelScore) -> str:
 
 
 def model_score_json(score: ModelScore) -> dict[str, Any]:
-    """One object with every number of a model that is printed."""
+    """Every number of a model that is printed.
+
+    Parameters
+    ----------
+    score : ModelScore
+
+    Returns
+    -------
+    dict
+        Root mean square errors by kind and of held-out velocities [unit of the kind]; chi2, chances and shares [-];
+        `values`: estimate and 95 % interval of each parameter [its unit].
+    """
     return {
         "name": score.name,
         "title": score.title,

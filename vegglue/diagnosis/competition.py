@@ -159,7 +159,17 @@ MOST_MOVES, LEAST_RISE = 10, 0.3
 
 @dataclass(frozen=True)
 class Window:
-    """Places (spot,) around a refitted one: x, y [m], ln B of each, and its size there [unit of the effect]."""
+    """Places around a refitted one, to first order in the flow with it.
+
+    Attributes
+    ----------
+    x, y : ndarray (spot,)
+        Their middles [m].
+    log_factor : ndarray (spot,)
+        ln B of the same anomaly there [-].
+    gain : ndarray (spot,)
+        Its expected size there [unit of the effect].
+    """
 
     x: Array
     y: Array
@@ -169,9 +179,20 @@ class Window:
 
 @dataclass(frozen=True)
 class FoundPlace:
-    """A refit where it explains most; log_evidence: of its term over all places; errors: root mean square distance in x
-    and y of where it may lie [m], by chances that allow for traces that are not nature's; spread: the same by the
-    evidence as it is; outline: of plants that are not on the map, which have no spread.
+    """A local anomaly where it explains most.
+
+    Attributes
+    ----------
+    refit : Refit
+        Of the anomaly there.
+    log_evidence : float
+        E of its term over all places [-].
+    errors : float, float
+        Root mean square distance in x and y of where it may lie [m], by tempered probabilities.
+    spread : float, float
+        The same by the evidence as it is [m]; 0 of plants that are not on the map.
+    outline : PatchOutline or None
+        Of plants that are not on the map.
     """
 
     refit: Refit
@@ -182,7 +203,30 @@ class FoundPlace:
 
 
 def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot: int, refit: Refit) -> FoundPlace:
-    """Something refitted at a spot, moved to where it explains most."""
+    """A local anomaly that was refitted at a spot, moved to where it explains most.
+
+        ln B(x, y) = ln B_refit + b(x, y) - b(x_refit, y_refit)
+
+    It is refitted at the best place of a window until ln B rises by less than LEAST_RISE, MOST_MOVES times at most.
+
+    Parameters
+    ----------
+    search : SearchModel
+        Without the anomaly.
+    places : Places
+        The spots of its term.
+    kind : HypothesisKind
+        Of these spots.
+    spot : int
+        Where it was refitted.
+    refit : Refit
+        At that spot.
+
+    Returns
+    -------
+    FoundPlace
+        With the evidence of all places of the term: those of the last window, and spots of other sizes or farther off.
+    """
     moved, window = refit, window_around(search, places, refit)
     for _ in range(MOST_MOVES):
         best = int(np.argmax(window.log_factor))
@@ -276,8 +320,19 @@ LEAST_EXTENT = 0.7
 
 
 def drag_of_patches(search: SearchModel, height: float) -> dict[str, float]:
-    """Drag phi [-] of each patch of the map: twice h k of its plants in water as deep as they are high [m], the mean
-    over its cells and experiments.
+    """phi = 2 h k, the drag of the plants of each patch of the map, the mean over its cells and experiments.
+
+    Parameters
+    ----------
+    search : SearchModel
+        At the MAP estimate.
+    height : float
+        Depth of the water h, as deep as the plants are high [m].
+
+    Returns
+    -------
+    dict of float
+        phi [-] by the name of the patch, those with cells and drag.
     """
     model, names = search.model, [patch.name for patch in search.model.case.plants.patches]
     patch, sums = model.site.main_patch, np.zeros((2, len(names)))
@@ -299,7 +354,22 @@ def _within_places(values: Array, start: float) -> tuple[float, Parameter]:
 
 
 def fitted_extent(search: SearchModel, refit: Refit) -> tuple[dict[str, float], dict[str, float]]:
-    """Shapes of something whose place and sizes were fitted, rounded, and the standard errors of what was fitted."""
+    """Shapes of a local anomaly whose place and sizes were fitted, rounded as by `digits_of_place`.
+
+    Parameters
+    ----------
+    search : SearchModel
+        Without the anomaly.
+    refit : Refit
+        With the shapes that were fitted among its `free` ones.
+
+    Returns
+    -------
+    shapes : dict of float
+        All, the fitted ones at the MAP estimate [unit of the shape].
+    errors : dict of float
+        Standard errors of the fitted ones, a 95 % interval over 2 NORMAL95 [unit of the shape].
+    """
     model = replace(search.model, case=with_effect(search.model.case, refit.candidate, refit.shapes))
     ends = {name: interval95(model, refit.fitted, parameter) for name, parameter in refit.candidate.free.items()}
     digits = digits_of_place(ends["width"][0])
@@ -310,12 +380,26 @@ def fitted_extent(search: SearchModel, refit: Refit) -> tuple[dict[str, float], 
 def found_extent(
     search: SearchModel, places: Places, kind: HypothesisKind, spot: Refit, outline: Mapping[str, float], needed: float
 ) -> FoundPlace | None:
-    """A spot whose middle, length and width are fitted with all else, from its own and from those of an outline;
-    needed: ln E below which it is of no use [-].
+    """A local anomaly whose middle, length and width are fitted with all else.
 
         ln E = ln B + ln prior,   x, y uniform over the places, ln l and ln w normal around those of the spots
 
     B is Laplace's of all five (`refits`), so that each is charged, and the prior that of all spots of the term.
+
+    Parameters
+    ----------
+    search : SearchModel
+        Without the anomaly.
+    places : Places
+        The spots of its term.
+    kind : HypothesisKind
+        Of these spots.
+    spot : Refit
+        The anomaly with the extent of a spot, from which a fit starts.
+    outline : mapping of float
+        x, y, half length and half width [m] from which another fit starts.
+    needed : float
+        ln E below which it is of no use [-].
 
     Returns
     -------
@@ -440,7 +524,24 @@ def found_patch(
 
 
 def window_around(search: SearchModel, places: Places, refit: Refit) -> Window:
-    """Places around a refit, to first order in the flow with it."""
+    """Places around a refit, to first order in the flow with it.
+
+        b(x, y) - b(x_refit, y_refit) + ln B_refit
+
+    Parameters
+    ----------
+    search : SearchModel
+        Without the anomaly.
+    places : Places
+        The spots of its term.
+    refit : Refit
+        The anomaly at its place.
+
+    Returns
+    -------
+    Window
+        No nearer to the ends of the grid than spots of this length, or than the refit.
+    """
     point, noise, place = refit.fitted.point, search.noise, refit.shapes
     model = replace(search.model, case=with_effect(search.model.case, refit.candidate, place))
     around = places_around(model, point, places.term, place, SHARE_OF_SPACING)
@@ -471,11 +572,25 @@ START_SHARES = (1.0, 0.3)
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A hypothesis with its evidence E [-], -inf for what cannot be.
+    """A hypothesis with its evidence.
 
-    kind: effect, a term at a place, or an instrument's kind; column: of its fingerprint among those of its kind; what:
-    its refit, or the instrument; errors, spread: of x and y of a place [m], and outline, see `FoundPlace`; without: of
-    a surveyed line the model without its level.
+    Attributes
+    ----------
+    kind : str
+        "effect", a term at a place, or an instrument's kind.
+    name : str
+    log_evidence : float
+        E [-], -inf of what cannot be.
+    column : int
+        Of its fingerprint among those of its kind.
+    what : Refit or Instrument
+        Its refit, or the instrument.
+    errors, spread : float, float
+        Of x and y of a place [m], see `FoundPlace`.
+    without : Relevelled or None
+        Of a surveyed line the model without its level.
+    outline : PatchOutline or None
+        Of plants that are not on the map.
     """
 
     kind: str
@@ -586,7 +701,21 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
 
 
 def somewhere_of(screening: Screening, places: Places, ends: Sequence[tuple[int, Refit]]) -> Hypothesis | None:
-    """Something of a term where it explains most, from its refits at some spots; None if there are none."""
+    """A local anomaly of a term where it explains most, from its refits at some spots.
+
+    Parameters
+    ----------
+    screening : Screening
+    places : Places
+        The spots of the term.
+    ends : sequence of (int, Refit)
+        Spot and refit; the one of the largest ln B is moved on.
+
+    Returns
+    -------
+    Hypothesis or None
+        With E = -inf if its whole 95 % interval is impossible; None without refits.
+    """
     if not ends:
         return None
     kind, search = kind_named(screening.kinds, places.term), screening.search
@@ -599,9 +728,22 @@ def somewhere_of(screening: Screening, places: Places, ends: Sequence[tuple[int,
 
 
 def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The hypotheses with plants that are not on the map in place of a spot of drag that they lead by strong_odds; they
-    are fitted from where most drag is promised, and from the place that has most evidence. Beside them spots of other
-    terms have their extent fitted, too: else water that enters along a bank is plants, whose sizes are free.
+    """The hypotheses with plants that are not on the map in place of a spot of drag that they lead by strong_odds.
+
+    Spots of other terms then have their extent fitted, too: else water that enters along a bank is plants, whose sizes
+    are free.
+
+    Parameters
+    ----------
+    screening : Screening
+    found : sequence of Hypothesis
+        All so far. The plants are fitted from where most drag is promised, and from the place that has most evidence if
+        that is a spot away.
+
+    Returns
+    -------
+    list of Hypothesis
+        As they were if no such plants lead.
     """
     places = next((one for one in screening.fingerprints.places if one.term == "drag"), None)
     at_places = [one for one in found if isinstance(one.what, Refit) and one.kind != "effect"]
@@ -629,7 +771,20 @@ def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypoth
 
 
 def with_extent(screening: Screening, one: Hypothesis, outline: Mapping[str, float]) -> Hypothesis:
-    """A spot with its extent fitted, where that has more evidence and can be; all else, a barrier too, as it is."""
+    """`found_extent` of a spot where that has more evidence.
+
+    Parameters
+    ----------
+    screening : Screening
+    one : Hypothesis
+    outline : mapping of float
+        x, y, half length and half width [m] from which a fit starts besides that of the spot.
+
+    Returns
+    -------
+    Hypothesis
+        As it was if it is no spot, a barrier, or its fitted extent has less evidence or an impossible amplitude.
+    """
     places = next((places for places in screening.fingerprints.places if places.term == one.kind), None)
     if places is None or places.term == "barrier" or not isinstance(one.what, Refit):
         return one
@@ -661,7 +816,18 @@ def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
 
 
 def odds_against_nothing(evidence: Array) -> float:
-    """sum of e^E_j: the odds that one of them is missing, and not nothing, both as likely before [-]."""
+    """sum_j e^E_j: the odds that one of them is missing, and not nothing, both as likely before.
+
+    Parameters
+    ----------
+    evidence : ndarray (k,)
+        E [-].
+
+    Returns
+    -------
+    float
+        [-], e^LARGEST_LOG_ODDS at most.
+    """
     return float(np.exp(min(logsumexp(evidence), LARGEST_LOG_ODDS)))
 
 
@@ -683,8 +849,19 @@ def log_odds_taken(evidence: Array) -> float:
 
 
 def worth_refitting(evidence: Array, best: float) -> list[int]:
-    """Listed effects, of which the ln evidence to first order is given (candidate,), that are not far behind the best:
-    the best first, one of them at least.
+    """Listed effects whose evidence is not far behind the best: (best - E) / w(best) < REACH.
+
+    Parameters
+    ----------
+    evidence : ndarray (candidate,)
+        E to first order [-].
+    best : float
+        E of the best of all hypotheses [-].
+
+    Returns
+    -------
+    list of int
+        MOST_REFITTED at most, the best first, one of them at least.
     """
     ranked = _promising(evidence)
     return [j for j in ranked if _within_reach(float(evidence[j]), best)] or ranked[:1]
@@ -699,8 +876,21 @@ def _within_reach(evidence: float, best: float) -> bool:
 
 
 def promising_spots(screening: Screening, places: Places, best: float) -> list[int]:
-    """The best spot of each length, those within reach; none where something of the term acts already: an effect at
-    the same place has its name, and would take its place in the case.
+    """The best spot of each length that is within reach of the best hypothesis.
+
+    Parameters
+    ----------
+    screening : Screening
+    places : Places
+        The spots of one term.
+    best : float
+        E of the best of all hypotheses [-].
+
+    Returns
+    -------
+    list of int
+        Spots, by length. None where something of the term acts already: an effect at the same place has its name, and
+        would take its place in the case.
     """
     kind, case = kind_named(screening.kinds, places.term), screening.search.model.case
     effect = effect_named(case, EFFECT_AT_PLACE[places.term])

@@ -74,11 +74,27 @@ AT_EDGE = 0.2
 
 
 def misfit_zones(model: Model, noise: Noise, point: Point, excluded: Sequence[int] = ()) -> pd.DataFrame:
-    """Mean misfit with its standard error, and chi2, by experiment, section and zone (floor, bank, plants, edge), of
-    all used stations but the excluded ones.
+    """Misfit of all used stations but the excluded ones, by experiment, section and zone.
 
-    Gauges are one group; a discharge may have a section of its own. Zones of velocities across and of speeds have names
-    of their own, `floor (v)`, beside those of velocities along x.
+        mean r,   (1' C 1)^(1/2) / n,   chi2 = sum (r / sigma)^2
+
+    C is the covariance of the data, sigma their standard errors.
+
+    Parameters
+    ----------
+    model : Model
+    noise : Noise
+    point : Point
+        At which r = y - f is taken.
+    excluded : sequence of int
+        Indices among the used stations.
+
+    Returns
+    -------
+    DataFrame
+        experiment, section, zone, stations, mean and standard_error [unit of the station], chi2 [-]. Zones are floor,
+        bank, plants and edge; `floor (v)` and the like of velocities across and of speeds; the kind of other
+        measurements. Gauges are one section; a discharge may have a section of its own.
     """
     used = model.station.iloc[noise.rows]
     kinds, sections, zones = [kind_of(str(name)) for name in used["kind"]], [], []
@@ -233,12 +249,23 @@ def _measured_bed(last: Screening, found: SearchState) -> tuple[FieldMapKept | N
 
 
 def bed_of_measurements(last: Screening) -> tuple[FieldMapKept | None, tuple[BedCorrected, ...]]:
-    """The correction of a surveyed bed as a map, and where it is clear and large: one spot between two lines at most
-    and BED_CORRECTIONS in all.
+    """The correction of a surveyed bed as a map, and where it is clear and large.
 
-    Clear: evidence of field_odds for a mean error over the spot; large: 95 % of its chance lies beyond least_bed_error.
-    Of these spots goes first which has the most evidence for a local error beside all that the survey leaves open: the
-    smooth correction alone lies where the flow was measured.
+    Clear: evidence of field_odds for a mean error over a spot; large: 95 % of its chance lies beyond least_bed_error
+    times the mean depth. Of these spots goes first which has the most evidence for a local error beside all that the
+    survey leaves open: the smooth correction alone lies where the flow was measured.
+
+    Parameters
+    ----------
+    last : Screening
+        Of the last model.
+
+    Returns
+    -------
+    FieldMapKept or None
+        Correction and standard error [m]; None without a bed that is learned.
+    tuple of BedCorrected
+        One spot between two lines at most, and BED_CORRECTIONS in all.
     """
     base = last.base
     learned, of_bed = learned_bed(base), [one for one in last.fingerprints.places if one.term == "bed"]
@@ -348,17 +375,39 @@ def _verdict(
 
 
 def single_readings(noise: Noise, found: SearchState) -> list[int]:
-    """Rows of the single readings that are excluded."""
+    """Single readings that are excluded.
+
+    Parameters
+    ----------
+    noise : Noise
+    found : SearchState
+
+    Returns
+    -------
+    list of int
+        Their indices among the used stations.
+    """
     stations = [one.stations[0] for one in found.instruments if len(one.stations) == 1]
     return [int(np.flatnonzero(noise.rows == station)[0]) for station in stations]
 
 
 def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnSection | None:
-    """The first section without which another listed effect leads the accepted one by same_kind_odds, to first order.
+    """The first section without which another listed effect leads the accepted one, to first order.
 
-    None if there is no such section, if no effect was accepted first or a place beside it, and for more than
-    few_sections; a section counts once for each experiment. Scores and evidence are those of the first screening
-    without its rows.
+        (E_best - E_own) / w(E_own) > ln same_kind_odds
+
+    Scores and evidence are those of the first screening without the rows of the section.
+
+    Parameters
+    ----------
+    first : Screening
+    found : SearchState
+
+    Returns
+    -------
+    NameHangsOnSection or None
+        None if there is no such section, if no effect was accepted first or a place beside it, and for more than
+        few_sections; a section counts once for each experiment.
     """
     base, prints = first.base, first.fingerprints
     used = base.model.station.iloc[base.noise.rows]
@@ -392,10 +441,19 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
 
 
 def strained_without_a_section(base: Baseline, parameter: str) -> tuple[str, float] | None:
-    """The section without which a parameter lies nearer to the middle of its prior than far_off_prior, and how far it
-    lies then [standard deviations]; None without one.
+    """The section without which a parameter lies nearer to the middle of its prior than far_off_prior.
 
     Calibrated again without the velocities of the section that moves it there most, to first order.
+
+    Parameters
+    ----------
+    base : Baseline
+    parameter : str
+
+    Returns
+    -------
+    (str, float) or None
+        Section, and |z| of the parameter without it [standard deviations of its prior]; None without one.
     """
     noise, point = base.noise, base.fitted.point
     used, own = base.model.station.iloc[noise.rows], base.model.names.index(parameter)
@@ -416,8 +474,20 @@ def strained_without_a_section(base: Baseline, parameter: str) -> tuple[str, flo
 
 
 def as_calibrated(place: LocalAnomaly, base: Baseline) -> LocalAnomaly:
-    """The place with its amplitude in the last model, in which what was accepted after it is calibrated, too; with an
-    outline, which that model holds fixed, the interval keeps its width over the amplitude.
+    """A place with its amplitude in the last model, in which what was accepted after it is calibrated, too.
+
+    Parameters
+    ----------
+    place : LocalAnomaly
+        Of the model.
+    base : Baseline
+        The last model.
+
+    Returns
+    -------
+    LocalAnomaly
+        With amplitude and 95 % interval of `base`. With an outline, which that model holds fixed, the interval keeps
+        its width over the amplitude.
     """
     parameter = candidate_at(base.model.case, place).parameter
     value, low, high = interval95(base.model, base.fitted, parameter)
@@ -433,7 +503,19 @@ def named_places(places: Sequence[LocalAnomaly], undecided: Sequence[Rival]) -> 
 
 
 def mapped_places(case: Case, places: Sequence[tuple[float, float]]) -> Iterator[PlacesOnMap]:
-    """Where places along and across the channel [m] lie on the map; none if the case knows no map."""
+    """Where places along and across the channel lie on the map.
+
+    Parameters
+    ----------
+    case : Case
+    places : sequence of (float, float)
+        x, y [m].
+
+    Yields
+    ------
+    PlacesOnMap
+        x, y, east and north of each [m]; nothing if there are no places or the case knows no map.
+    """
     line, frame = centreline_in(case), case.frame
     if not places or (line is None and frame is None):
         return
@@ -445,8 +527,20 @@ def mapped_places(case: Case, places: Sequence[tuple[float, float]]) -> Iterator
 
 
 def measured_stretch(case: Case, station: pd.DataFrame) -> Iterator[MeasuredStretch]:
-    """The stretch with velocities and the effects that act along the channel, if it is less than SMALL_PART of it: an
-    effect is one law for the whole channel, and velocities only show it where they are.
+    """The stretch with velocities, if it is less than SMALL_PART of the channel and effects of the case act along it.
+
+    An effect is one law for the whole channel, and velocities only show it where they are.
+
+    Parameters
+    ----------
+    case : Case
+    station : DataFrame
+        All stations.
+
+    Yields
+    ------
+    MeasuredStretch
+        Ends of the stretch and length of the grid [m], and the effects.
     """
     effects = [effect_of(case, name) for name in case.effects]
     law = [one for one in effects if one.stage in ALONG_THE_CHANNEL and "search" not in one.tags]
@@ -478,8 +572,19 @@ def cells_too_coarse(noise: Noise, station: pd.DataFrame) -> Iterator[CellsTooCo
 
 
 def shear_layers(model: Model, point: Point, places: Sequence[LocalAnomaly]) -> Iterator[ShearLayer]:
-    """Places of more mixing across which the depth of the water changes by a factor of TWO_DEPTHS, in the deepest flow
-    there; where a cell is dry, no water meets.
+    """Places of more mixing across which the depth of the water changes by a factor of TWO_DEPTHS.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+        Whose flows hold the depth; at each place the experiment with the deepest water counts.
+    places : sequence of LocalAnomaly
+
+    Yields
+    ------
+    ShearLayer
+        x, y, least and largest depth within the half width of the place, or a cell [m]; dry cells do not count.
     """
     y, least = model.site.grid.y, least_depth(model)
     for one in (each for each in places if each.term == "viscosity" and each.amplitude > 0.0):
@@ -515,7 +620,20 @@ def significant_effects(last: Screening, found: SearchState, slack: float = 0.0)
 
 
 def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Misfit:
-    """chi2 before and after, and where the first model misses."""
+    """chi2 = |W (y - f)|^2 before and after, and where the first model misses.
+
+    Parameters
+    ----------
+    first, last : Screening
+    flagged : tuple of int
+        Excluded readings, indices among the used stations.
+
+    Returns
+    -------
+    Misfit
+        Degrees of freedom and p are those of the last model; the zones those of the first, under the errors of the
+        last, whose residual holds the least that is no error.
+    """
     before, after = first.base, last.base
     misfit = chi2(after.noise, after.fitted.point)
     unknown = after.noise.unknown
@@ -593,6 +711,20 @@ def _field(
 
 
 def field_goes_first(log_factor: float, gained: float) -> bool:
-    """Whether a field beats nothing, and all that was accepted, by field_odds; both as ln evidence [-]."""
+    """Whether a smooth field beats nothing, and all that was accepted, by field_odds.
+
+        (E_field - max(E, 0)) / w(E_field) > ln field_odds
+
+    Parameters
+    ----------
+    log_factor : float
+        E_field [-].
+    gained : float
+        E of all that was accepted [-].
+
+    Returns
+    -------
+    bool
+    """
     ahead = (log_factor - max(gained, 0.0)) / tempering(np.array(log_factor))
     return bool(ahead > np.log(constants().field_odds))

@@ -113,8 +113,20 @@ MOST_ACCEPTED, MOST_INSTRUMENTS = 3, 6
 
 @dataclass(frozen=True)
 class SearchBranch:
-    """What is found with one hypothesis more, what that is, the model that follows, and where they are at hand its
-    screening and what competes next.
+    """What is found with one hypothesis more.
+
+    Attributes
+    ----------
+    what : {"effect", "place", "instrument"}
+        The hypothesis.
+    found : SearchState
+        With it.
+    base : Baseline
+        The model that follows.
+    screening : Screening or None
+        Of that model, once it was screened.
+    hypotheses : sequence of Hypothesis
+        What competes next, none if no alarm is sounded.
     """
 
     what: What
@@ -259,8 +271,25 @@ def branch_with(
     """What is found with one hypothesis, and the model that follows.
 
     An instrument is excluded, and the model calibrated without what its readings share, or without the level of the
-    surveyed line; an effect or a place is taken into the model. None when there are enough, when it explains less than
-    nothing does, has so many rivals that a set says nothing, or no flow is found with it.
+    surveyed line; an effect or a place is taken into the model.
+
+    Parameters
+    ----------
+    screening : Screening
+    hypotheses : sequence of Hypothesis
+    j : int
+        Which of them.
+    found : SearchState
+        So far.
+    watch : callable
+        Is called with each phase.
+
+    Returns
+    -------
+    SearchBranch or None
+        None if MOST_ACCEPTED or MOST_INSTRUMENTS are accepted, it explains less than nothing does, has more than
+        most_groups of rivals beside what was accepted, is a reading beside an excluded one, or no flow is found with
+        it.
     """
     one, base = hypotheses[j], screening.base
     instrument = one.what if isinstance(one.what, Instrument) else None

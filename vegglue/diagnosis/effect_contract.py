@@ -127,7 +127,16 @@ class ContractRule(Enum):
 
 @dataclass(frozen=True)
 class Breach:
-    """A rule that an effect breaks; name, values and water (still, moving, backward, no) as the rule needs them."""
+    """A rule that an effect breaks.
+
+    Attributes
+    ----------
+    rule : ContractRule
+        Which also states what the others hold.
+    name : str
+    values : tuple of float
+    water : {"still", "moving", "backward", "no", ""}
+    """
 
     rule: ContractRule
     name: str = ""
@@ -153,7 +162,20 @@ class Trial:
 
 
 def trial(effect: Effect, own: Path | None = None, scale: float = 1.0) -> Trial:
-    """The channel of some scale with an effect in it; own: the file of the effect, if it is a user's."""
+    """The channel of this file with an effect in it.
+
+    Parameters
+    ----------
+    effect : Effect
+    own : Path, optional
+        The file of the effect, if it is a user's.
+    scale : float
+        Of all lengths of the channel [-].
+
+    Returns
+    -------
+    Trial
+    """
     works = {effect.name: {"values": {effect.amplitude.name: AMPLITUDE}}}
     case = Case.model_validate(channel_at(scale) | {"source": Path("contract"), "effect_file": own, "effects": works})
     site = build_site(case)
@@ -207,7 +229,22 @@ def mirrored(state: Array) -> Array:
 
 
 def answer(tried: Trial, problem: Problem, state: Array) -> tuple[Array, Array]:
-    """All that an effect can change: the residual (nx, 3, ny, m), and the readings (station, m)."""
+    """All that an effect can change.
+
+    Parameters
+    ----------
+    tried : Trial
+    problem : Problem
+        Of m members.
+    state : ndarray (nx, 3, ny, m)
+        Level and fluxes.
+
+    Returns
+    -------
+    residual : ndarray (nx, 3, ny, m)
+    readings : ndarray (station, m)
+        [m/s or m]
+    """
     return residual(problem, state), predictions_at_sensors(problem, state, tried.site.grid, tried.stations).T
 
 

@@ -47,7 +47,18 @@ FIELD_SIZES: Mapping[Term, tuple[float, ...]] = {
 
 @dataclass(frozen=True)
 class FieldHypothesis:
-    """A field of one term over bumps, its standard deviation `size` [unit of the term] and ln B against none [-]."""
+    """A smooth random field of one term.
+
+    Attributes
+    ----------
+    term : Term
+    over : GaussianBasis
+        Its basis functions.
+    size : float
+        Standard deviation [unit of the term].
+    log_factor : float
+        ln B against none [-].
+    """
 
     term: Term
     over: GaussianBasis
@@ -76,7 +87,25 @@ def field_sizes(model: Model) -> dict[Term, tuple[float, ...]]:
 
 
 def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHypothesis], CellResponses]:
-    """Every field that is tried, the one with the most evidence first, and the responses that they were made of."""
+    """Every field that is tried: each term that is not excluded, with FIELD_SHAPES and FIELD_SIZES.
+
+        ln B = ln N(r; 0, C + s^2 F F') - ln N(r; 0, C)
+
+    F are the columns of the field of standard deviation 1, C the covariance of the residual r free of the prior.
+
+    Parameters
+    ----------
+    search : SearchModel
+    half_width : float
+        Of the floor of the channel [m].
+
+    Returns
+    -------
+    list of FieldHypothesis
+        The most evidence first.
+    CellResponses
+        That they were made of.
+    """
     excluded = excluded_terms(search.model.case)
     terms = tuple(term for term in FIELD_SIZES if term not in excluded)
     responses = cell_responses(search.model, search.point, terms)

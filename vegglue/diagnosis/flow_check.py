@@ -270,9 +270,20 @@ def remarks_on_discharges(case: Case, site: Site, observations: Observations) ->
 
 
 def remarks_on_measured_discharges(case: Case, site: Site, observations: Observations) -> Iterator[DischargeUnlike]:
-    """|Q - Q_s| > SURELY_OTHERWISE (se^2 + se_s^2)^(1/2) of measured discharges Q and what all sections Q_s carry past
-    which the same water flows; none of an experiment whose velocities run the wrong way, or beside values that no flow
-    can have.
+    """|Q - Q_s| > SURELY_OTHERWISE (se^2 + se_s^2)^(1/2)
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    observations : Observations
+        Q, se: of the measured discharges.
+
+    Yields
+    ------
+    DischargeUnlike
+        If all sections past which the same water flows carry another Q_s. None of an experiment whose velocities run
+        the wrong way, or beside values that no flow can have.
     """
     table, excused = observations.table, _misdirected(case, observations)
     rows = table[table["used"] & (table["kind"] == THROUGH_SECTION) & ~table["experiment"].isin(list(excused))]
@@ -314,10 +325,21 @@ def floor_slope(site: Site) -> float:
 
 
 def even_froude(case: Case, site: Site, experiment: Experiment, slope: float) -> float:
-    """Fr = C (S/g)^(1/2) of even flow on the floor, C at its depth h = (q / (C S^(1/2)))^(2/3) [-]; 0 without a fall.
+    """Fr = C (S/g)^(1/2) of even flow on the floor, C at its depth h = (q / (C S^(1/2)))^(2/3)
 
-    q: discharge over the width of the floor, all of it, as if there were neither banks nor plants. C: `chezy` of the
-    friction class of the floor.
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    experiment : Experiment
+        Whose whole discharge over the width of the floor is q, as if there were neither banks nor plants.
+    slope : float
+        S [-].
+
+    Returns
+    -------
+    float
+        Fr [-], with C [m^(1/2)/s] of the friction class along most of the lowest line of the bed; 0 without a fall.
     """
     if slope <= 0.0:
         return 0.0

@@ -242,9 +242,24 @@ def _trial(screening: LawScreening | ProductScreening, column: int, one: LawInCa
 def product_beside(
     search: SearchModel, listed: Fingerprints, law: LawInCase, refit: Refit, watch: Watch
 ) -> ProductFound | None:
-    """The product that explains what a law leaves; None if none is needed.
+    """The product of a law with another quantity that explains what the law leaves.
 
-    search: without the law; listed: fingerprints of what is listed there; refit: of the law.
+    Parameters
+    ----------
+    search : SearchModel
+        Without the law.
+    listed : Fingerprints
+        Of what is listed there.
+    law : LawInCase
+    refit : Refit
+        Of the law.
+    watch : callable
+        Is called with each phase.
+
+    Returns
+    -------
+    ProductFound or None
+        None if errors alone leave as much, no flow is found, or the product is not likelier than all else together.
     """
     watch(Progress(SEARCHING_SECOND))
     case = with_effect(search.model.case, refit.candidate, refit.shapes)
@@ -306,7 +321,21 @@ def discover_laws(model: Model, without: Sequence[str], watch: Watch) -> Discove
 
 
 def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discovery:
-    """The same of a model that is calibrated."""
+    """The shortest laws that explain what a calibrated model leaves.
+
+    Parameters
+    ----------
+    base : Baseline
+    without : sequence of str
+        Listed effects that do not compete.
+    watch : callable
+        Is called with each phase.
+
+    Returns
+    -------
+    Discovery
+        Without laws if errors alone leave as much, or if all causes together are less likely than none.
+    """
     watch(Progress("looking for a law"))
     traces = law_fingerprints(base, tuple(without))
     if not traces.laws:
@@ -351,9 +380,23 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
 
 
 def refitted_laws(screening: LawScreening, known: float, watch: Watch) -> tuple[list[Hypothesis], Array]:
-    """The most promising quantities, each with the best of its laws that were calibrated and the evidence of all its
-    columns: as kept if calibrated, else to first order, corrected as that of the best one; and this evidence of each
-    column of the laws (l,), -inf of other quantities. known: ln evidence of the best of all else.
+    """The most promising quantities, each with the best of its laws that were calibrated.
+
+    Parameters
+    ----------
+    screening : LawScreening
+    known : float
+        ln evidence of the best of all else [-].
+    watch : callable
+        Is called with each refit.
+
+    Returns
+    -------
+    list of Hypothesis
+        Of each quantity, with the evidence of all its columns together.
+    ndarray (l,)
+        ln evidence of each column of the laws [-]: as refitted, else to first order, corrected as that of the best one
+        of its quantity was; -inf of other quantities.
     """
     evidence, prior, search = screening.kind.log_evidence, screening.kind.log_prior, screening.listed.search
     columns = {

@@ -50,9 +50,23 @@ LEVEL_POWER = 0.6
 
 @dataclass(frozen=True)
 class MeasurementPlan:
-    """One measurement that could be made: its stations and their rows of the extended table, its cost [h], where [m],
-    and in which experiment; less (station, k): columns L of a survey that takes L L' from the covariance, None of a
-    measurement of the flow.
+    """One measurement that could be made.
+
+    Attributes
+    ----------
+    name : str
+    rows : ndarray of int
+        Of its stations in the extended table.
+    stations : DataFrame
+        Empty for a survey.
+    hours : float
+        Cost [h].
+    x : float
+        Where [m].
+    experiment : str
+        In which; '' of a survey.
+    less : ndarray (station, k) or None
+        Columns L of a survey that takes L L' from the covariance [unit of the station].
     """
 
     name: str
@@ -66,7 +80,14 @@ class MeasurementPlan:
 
 @dataclass(frozen=True)
 class MeasurementWorth:
-    """A plan, and the least D^2 between each rival and any other now and with it, (rival,) [-]."""
+    """What a measurement would bring.
+
+    Attributes
+    ----------
+    plan : MeasurementPlan
+    now, then : ndarray (rival,)
+        The least D^2 between each rival and any other, now and with it [-].
+    """
 
     plan: MeasurementPlan
     now: Array
@@ -140,8 +161,19 @@ def worth_of_measurements(
 
 
 def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
-    """The model with every station that could be measured behind those that were, and the plans they make; case: the
-    model's with further experiments, each with the bed of the one it is like, which may have its own.
+    """The model with every station that could be measured behind those that were, and the plans they make.
+
+    Parameters
+    ----------
+    model : Model
+    case : Case
+        That of the model with further experiments, each with the bed of the one it is like, which may have its own.
+
+    Returns
+    -------
+    Model
+        Of that case; the further stations are not used.
+    list of MeasurementPlan
     """
     tables, plans, count = [model.station], [], len(model.station)
     velocity = model.station[velocity_rows(model.station) & model.station["used"]]
@@ -162,7 +194,23 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
 
 
 def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
-    """Lines of the bed midway between surveyed ones, and outlines of plants; none if the site states no such error."""
+    """Surveys that would take from the errors of the site.
+
+        A_l' (B_l B_l' + s^2 I)^(-1/2)
+
+    are the columns that a line of bed levels takes: A the responses of the stations to the bed's errors, B_l these
+    errors on the line, s the error of a level. Outlines of plants that are levelled in keep a fifth of their error.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+
+    Returns
+    -------
+    list of MeasurementPlan
+        Lines midway between surveyed ones, and outlines of plants; none if the site states no such error.
+    """
     case, grid, nothing = model.case, model.site.grid, np.zeros(0, dtype=int)
     found, no_station = [], model.station.iloc[:0]
     of_work = case.planned or Planned()
@@ -281,7 +329,24 @@ def with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
 
 
 def least_distances(slope: Array, traces: Array) -> Array:
-    """The least D^2 between each rival and any other, either way, (rival,); from no rival if there is only one."""
+    """The least D^2 between each rival and any other, either way.
+
+        D^2 = |(I - P) t|^2
+
+    P projects onto the slopes, with their priors, and the trace of the other rival.
+
+    Parameters
+    ----------
+    slope : ndarray (n, p)
+        Whitened [-].
+    traces : ndarray (n, rival)
+        Whitened [-].
+
+    Returns
+    -------
+    ndarray (rival,)
+        [-]; D^2 from no rival if there is only one.
+    """
     count, priors = traces.shape[1], slope.shape[1]
     if count == 1:
         return np.array([_left(slope, traces[:, 0], priors)])

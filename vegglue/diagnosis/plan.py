@@ -69,8 +69,14 @@ ALARM_DRAWS = 1000
 
 
 def needed_evidence() -> float:
-    """ln of the odds against nothing at which a diagnosis names anything [-]; alarms are sounded earlier, at 0.4 to 0.9
-    on the sites of `configs/`.
+    """ln missing_odds: the odds against nothing at which a diagnosis names anything.
+
+    Alarms are sounded earlier, at 0.4 to 0.9 on the sites of `configs/`.
+
+    Returns
+    -------
+    float
+        [-]
     """
     return float(np.log(constants().missing_odds))
 
@@ -152,11 +158,31 @@ def plan_measurements(
 
 @dataclass(frozen=True)
 class ShownByPlan:
-    """The hypotheses of a diagnosis in the middle of the priors, without a residual: kinds as in a screening, the first
-    of listed effects; level: to name anything; cosines with spots (c,) by term, and with slopes (c, p); spread (p,):
-    standard errors of z. lengths: of the traces of each effect at the shapes that it may have (t,) [standard errors per
-    unit of gain]; named (effect, lengths): chance to be named at each of NAMED_AT; relative (draws, effect): length of
-    a trace around the middle of the priors over that in the middle [-].
+    """The hypotheses of a diagnosis in the middle of the priors, without a residual.
+
+    Attributes
+    ----------
+    noise : Noise
+        Of the stations of the plan.
+    fingerprints : Fingerprints
+    kinds : tuple of HypothesisKind
+        As in a screening, the first of listed effects.
+    level : float
+        ln of the sum of Bayes factors at which anything is named [-].
+    with_places : mapping of ndarray (c,)
+        Largest |cosine| with a spot, by term [-].
+    with_slopes : ndarray (c, p)
+        Cosine with the slopes of the parameters [-].
+    visible : ndarray (c,)
+        Share of a trace that calibration leaves [-].
+    spread : ndarray (p,)
+        Standard errors of z [standard deviations of the prior].
+    lengths : tuple of ndarray (t,)
+        Of the traces of each effect at the shapes that it may have [standard errors per unit of gain].
+    named : ndarray (effect, lengths)
+        Chance to be named at each of NAMED_AT [-].
+    relative : ndarray (draws, effect)
+        Length of a trace around the middle of the priors over that in the middle [-].
     """
 
     noise: Noise
@@ -193,7 +219,16 @@ def _first_at(x: Array, chance: Array, wanted: float) -> float:
 
 
 def shown_by(wide: PlanModel) -> ShownByPlan:
-    """The screening of a diagnosis of the stations of the plan, before there is a residual."""
+    """The screening of a diagnosis of the stations of the plan, before there is a residual.
+
+    Parameters
+    ----------
+    wide : PlanModel
+
+    Returns
+    -------
+    ShownByPlan
+    """
     known, draw = wide.known, wide.draws[0]
     station = draw.model.station.iloc[known].reset_index(drop=True)
     case = draw.model.case

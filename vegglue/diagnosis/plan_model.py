@@ -65,9 +65,20 @@ TWELFTHS, MOST_ADDED_PLACES, MOST_PATCHES = 12, 20, 8
 
 @dataclass(frozen=True)
 class PlanDraw:
-    """A place of the prior on some cells: the slopes (N, p), fingerprints of one setting of each candidate (N, k), and
-    shared errors (N, q) of all rows: stations of the plan and of what could be added, and behind them the bed levels
-    of lines that could be surveyed.
+    """A place of the prior on some cells.
+
+    Rows are those of the stations of the plan and of what could be added, and behind them of the bed levels of lines
+    that could be surveyed.
+
+    Attributes
+    ----------
+    model : Model
+    point : Point
+    slope : ndarray (N, p)
+    values : ndarray (N, k)
+        Fingerprints of one setting of each candidate [unit of the row per unit of gain].
+    shared : ndarray (N, q)
+        Errors that rows share [unit of the row].
     """
 
     model: Model
@@ -81,11 +92,26 @@ class PlanDraw:
 class PlanModel:
     """All that is needed of a case before measuring.
 
-    case: on its own cells; known: rows of the stations of the plan; surveyed: those of the bed levels of its lines;
-    rows: of each piece that could be added; error (N,): standard errors; grid_error (N,), see `noise`. draws: the
-    middle of the priors on the cells of the search, with every flow that is or could be measured; then the middle and
-    places around it on the coarsest cells; errors: of all rows at each, see `errors_of`. at_plausible_size (N, c, 2),
-    see `bending_of`.
+    Attributes
+    ----------
+    case : Case
+        On its own cells.
+    known, surveyed : ndarray of int
+        Rows of the stations of the plan, and of the bed levels of its lines.
+    pieces : tuple of PlannedPiece
+        That could be added.
+    rows : tuple of ndarray of int
+        Of each of these.
+    error, grid_error : ndarray (N,)
+        Standard errors, and those of the grid, see `noise` [unit of the row].
+    candidates : tuple of Candidate
+    draws : tuple of PlanDraw
+        The middle of the priors on the cells of the search, with every flow that is or could be measured; then the
+        middle and places around it on the coarsest cells.
+    errors : tuple of (ndarray, ndarray)
+        Of all rows at each draw, see `errors_of`.
+    at_plausible_size : ndarray (N, c, 2)
+        See `bending_of`.
     """
 
     case: Case
@@ -116,8 +142,24 @@ def _water_across(model: Model, experiment: str, x: float) -> tuple[Array, Array
 def verticals_at(
     model: Model, experiment: str, x: float, spacing: float, within: tuple[float, float] | None = None
 ) -> tuple[float, ...]:
-    """y of the verticals of a transect [m] that are under water: at multiples of the spacing from the middle of the
-    channel, or from the first end of `within`, so that they are the same in all experiments.
+    """The verticals of a transect that are under water.
+
+    Parameters
+    ----------
+    model : Model
+    experiment : str
+    x : float
+        [m]
+    spacing : float
+        [m]
+    within : (float, float), optional
+        y of its ends [m], of the whole channel if not given.
+
+    Returns
+    -------
+    tuple of float
+        y [m], at multiples of the spacing from the middle of the channel, or from the first end of `within`, so that
+        they are the same in all experiments; none in less than LEAST_PLANNED_DEPTH of water.
     """
     y, depth = _water_across(model, experiment, x)
     low, high = (float(y[0]), float(y[-1])) if within is None else within
@@ -287,8 +329,22 @@ def _with_flows(model: Model, lower: Sequence[float]) -> Model:
 def stations_of(
     model: Model, planned: Planned, pieces: Sequence[PlannedPiece], at_hand: pd.DataFrame
 ) -> tuple[pd.DataFrame, list[int]]:
-    """The stations of some pieces as one table, and how many each has; a line of bed levels has none. Their errors are
-    the stated ones, else those of the same kind at hand, else the usual ones.
+    """The stations of some pieces as one table.
+
+    Parameters
+    ----------
+    model : Model
+    planned : Planned
+        Whose errors they have where stated, else those of the same kind at hand, else the usual ones.
+    pieces : sequence of PlannedPiece
+    at_hand : DataFrame
+        The used stations.
+
+    Returns
+    -------
+    DataFrame
+    list of int
+        How many each piece has; a line of bed levels has none.
     """
     middle = 0.5 * (model.case.grid.y[0] + model.case.grid.y[1])
     error: dict[str, float] = {}
@@ -466,8 +522,24 @@ def _usual_shapes(candidate: Candidate) -> dict[str, float]:
 
 
 def errors_of(error: Array, grid_error: Array, slope: Array, shared: Array) -> tuple[Array, Array]:
-    """Own variances (n,) of some rows, and what calibration and shared errors, those of the grid among them, can do
-    there (n, q); of standard errors and errors of the grid (n,), slopes (n, p) and shared errors (n, k).
+    """Variances of some rows, and what calibration and shared errors can do there.
+
+        C = diag(s^2 + (1 - c) g^2) + [c^(1/2) g, A] [c^(1/2) g, A]'
+
+    Parameters
+    ----------
+    error, grid_error : ndarray (n,)
+        s and g, standard errors and those of the grid [unit of the row].
+    slope : ndarray (n, p)
+    shared : ndarray (n, k)
+        A, errors that rows share [unit of the row].
+
+    Returns
+    -------
+    variance : ndarray (n,)
+        Of the errors that each row has of its own [unit of the row squared].
+    nuisances : ndarray (n, q)
+        The slopes, and patterns of the shared errors behind them.
     """
     correlation = constants().grid_error_correlation
     together = np.column_stack([np.sqrt(correlation) * grid_error, shared])
@@ -575,8 +647,23 @@ def bending_of(wide: PlanModel) -> Array:
 
 
 def places_of_draws(parameters: int) -> Array:
-    """The middle of the prior, and corners around it, z (DRAWS_AROUND + 1, p): of every pair of parameters, up to seven
-    of them, both are high, low or opposed equally often (Plackett and Burman 1946; not checked against it).
+    """The middle of the prior, and corners around it.
+
+    Of every pair of parameters, up to seven of them, both are high, low or opposed equally often.
+
+    Parameters
+    ----------
+    parameters : int
+        p, how many there are.
+
+    Returns
+    -------
+    ndarray (DRAWS_AROUND + 1, p)
+        z, START_SPREAD up or down [standard deviations of the prior].
+
+    References
+    ----------
+    Plackett and Burman (1946), doi:10.1093/biomet/33.4.305; not checked against it.
     """
     number = np.arange(parameters)
     corners = hadamard(DRAWS_AROUND)[:, 1 + number % (DRAWS_AROUND - 1)] * (-1.0) ** (number // (DRAWS_AROUND - 1))

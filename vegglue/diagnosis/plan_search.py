@@ -48,9 +48,28 @@ UNLIKE = 0.3
 
 @dataclass(frozen=True)
 class FirstCompetition:
-    """Hypotheses, first those of listed effects, then one of each other kind; of each column k: its owner among them,
-    only_sign, ln evidence = constant + factor T^2, units (rows, k), and scores T under errors alone (k, draws);
-    places: which of the other kinds are places; alike (effects, effects); level: of the alarm.
+    """The first competition of a diagnosis, before there is a residual.
+
+    Attributes
+    ----------
+    effects : int
+        Number of hypotheses about listed effects, which stand first; then one of each other kind.
+    places : ndarray of bool
+        Which of the other kinds are places.
+    alike : ndarray of bool (effects, effects)
+        Whether traces are similar.
+    level : float
+        ln of the sum of Bayes factors at which the diagnosis is alarmed [-].
+    owner : ndarray of int (k,)
+        Hypothesis of each column.
+    only_sign : ndarray (k,)
+        Sign with which a score counts, 0 for both.
+    constant, factor : ndarray (k,)
+        ln evidence = constant + factor T^2 [-].
+    units : ndarray (rows, k)
+        Whitened and projected fingerprints of length 1 [-].
+    scores : ndarray (k, draws)
+        T under errors alone [standard errors].
     """
 
     effects: int
@@ -235,7 +254,13 @@ NEARLY_TESTABLE, SHARE_OF_ANSWER = 4.0, 0.3
 
 @dataclass(frozen=True)
 class PlanAnswer:
-    """The answer to a question [-], the mean over all places of the priors and the least of them."""
+    """The answer to a question over all places of the priors.
+
+    Attributes
+    ----------
+    mean, least : float
+        [-]
+    """
 
     mean: float
     least: float

@@ -54,8 +54,17 @@ WORTH_FOLLOWING = 0.5
 
 @dataclass(frozen=True)
 class RefitTrial:
-    """What is to be refitted: a candidate with values of its shapes, and z (k, p + q) of the places to start from;
-    needed: ln B below which it is of no use [-].
+    """What is to be refitted.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    shapes : mapping of float
+        Values of its shapes [unit of each].
+    starts : tuple of ndarray (p + q,)
+        z to start from, the amplitude and the shapes that are fitted with it last [standard deviations of the prior].
+    needed : float
+        ln B below which it is of no use [-].
     """
 
     candidate: Candidate
@@ -66,8 +75,21 @@ class RefitTrial:
 
 @dataclass(frozen=True)
 class Refit:
-    """The search model with one effect more at its best place; log_factor: ln B against nothing missing [-]; amplitude
-    with its 95 % interval.
+    """The search model with one effect more, calibrated.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    shapes : mapping of float
+        [unit of each]
+    fitted : MapEstimate
+        Of all parameters, the amplitude among them.
+    log_factor : float
+        ln B against nothing missing [-].
+    amplitude : float
+        [unit of the effect]
+    interval95 : (float, float)
+        Of the amplitude.
     """
 
     candidate: Candidate
@@ -170,8 +192,15 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
 
 @dataclass(frozen=True)
 class Relevelled:
-    """The model calibrated without the level of a surveyed line; log_factor: ln B of an offset of that line against
-    none, by survey and flow [-]; the offset and its standard error [m].
+    """The model calibrated without the level of a surveyed line.
+
+    Attributes
+    ----------
+    base : Baseline
+    log_factor : float
+        ln B of an offset of that line against none, by survey and flow [-].
+    offset, error : float
+        The offset and its standard error [m].
     """
 
     base: Baseline

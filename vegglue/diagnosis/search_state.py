@@ -37,7 +37,16 @@ from vegglue.wording.phases import COMPARING_AGAIN
 
 @dataclass(frozen=True)
 class PriorWeight:
-    """What one finding brought and cost: the fall of chi2 with it, and the ln of its chance before the data."""
+    """What one finding brought and cost.
+
+    Attributes
+    ----------
+    name : str
+    explained : float
+        Fall of chi2 with it [-].
+    log_prior : float
+        ln of its chance before the data [-].
+    """
 
     name: str
     explained: float
@@ -46,14 +55,32 @@ class PriorWeight:
 
 @dataclass(frozen=True)
 class Undecided:
-    """Hypotheses that competed last and led to nothing, most evidence first, and the chance of each (k,) [-]."""
+    """Hypotheses that competed last and led to nothing.
+
+    Attributes
+    ----------
+    hypotheses : tuple of Hypothesis
+        The most evidence first.
+    chances : tuple of float
+        Of each [-].
+    """
 
     hypotheses: tuple[Hypothesis, ...]
     chances: tuple[float, ...]
 
 
 def rivals_in(undecided: Undecided) -> tuple[Rival, ...]:
-    """The hypotheses as values with their probabilities, the likeliest first."""
+    """Hypotheses of which none was accepted, as values.
+
+    Parameters
+    ----------
+    undecided : Undecided
+
+    Returns
+    -------
+    tuple of Rival
+        The likeliest first, with their probabilities; without what cannot be.
+    """
     rivals = []
     for one, chance in zip(undecided.hypotheses, undecided.chances, strict=True):
         if np.isinf(one.log_evidence):  # what cannot be
@@ -284,7 +311,21 @@ def undecided_of(hypotheses: Sequence[Hypothesis], followed: Sequence[str], chan
 
 
 def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
-    """The step with an accepted rival and other chances, by name; without what has become negligible."""
+    """A step with an accepted rival and other chances, without what has become negligible against the largest of them.
+
+    Parameters
+    ----------
+    step : Step
+    accepted : str
+        An effect; in a group of its own if it is in none.
+    told : mapping of float
+        Chances by name [-].
+
+    Returns
+    -------
+    Step
+        With the rivals above rival_share of the largest chance, and the accepted one, the likeliest first.
+    """
     least = constants().rival_share * max(told.values())
     possible = sorted({accepted, *(name for name in told if told[name] >= least)}, key=lambda name: -told[name])
     rivals = tuple(name for name in possible if name in step.rivals or name == accepted)
@@ -392,10 +433,22 @@ def instrument_found(screening: Screening, best: Hypothesis, one: Instrument) ->
 def rivals_among(
     names: Sequence[str], chance: Array, cosine: Array
 ) -> tuple[dict[str, float], tuple[tuple[str, ...], ...]]:
-    """The chance of each effect in the fewest groups that hold set_chance of what listed effects have together, the
-    likeliest first, and these groups.
+    """The fewest groups of effects alike that hold set_chance of what listed effects have together.
 
-    chance (k,); cosine (k, k): between projected fingerprints.
+    Parameters
+    ----------
+    names : sequence of str (k,)
+    chance : ndarray (k,)
+        Of each [-].
+    cosine : ndarray (k, k)
+        Between projected fingerprints [-].
+
+    Returns
+    -------
+    dict of float
+        Chance by name, the likeliest first [-].
+    tuple of tuple of str
+        The groups.
     """
     near = chance >= constants().rival_share * chance.max()
     alike = np.where(near & near[:, None], cosine, 0.0)
@@ -485,7 +538,19 @@ def with_rivals_again(
 
 
 def leading_refit(screening: Screening, hypotheses: Sequence[Hypothesis]) -> int:
-    """The listed effect that leads those of the trace of the most likely one, which come in this order."""
+    """The listed effect of the trace of the most likely one that leads by `evidence_under_larger_errors`.
+
+    Parameters
+    ----------
+    screening : Screening
+    hypotheses : sequence of Hypothesis
+        The most evidence first, a listed effect among them.
+
+    Returns
+    -------
+    int
+        Its index.
+    """
     first = next(one.name for one in hypotheses if one.kind == "effect")
     _, groups = _groups_of_rivals(screening, hypotheses)
     group = next((one for one in groups if first in one), (first,))
@@ -494,7 +559,19 @@ def leading_refit(screening: Screening, hypotheses: Sequence[Hypothesis]) -> int
 
 
 def refitted(hypotheses: Sequence[Hypothesis], effects: Mapping[str, CandidateEffect]) -> dict[str, CandidateEffect]:
-    """The listed effects that were refitted, with the amplitudes of their refits."""
+    """The listed effects that were refitted, with the amplitudes of their refits.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+    effects : mapping of CandidateEffect
+        By name.
+
+    Returns
+    -------
+    dict of CandidateEffect
+        By name, those that were refitted alone.
+    """
     return {
         one.name: one.what.of(effects[one.name])
         for one in hypotheses

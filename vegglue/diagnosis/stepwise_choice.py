@@ -27,9 +27,18 @@ WAYS: tuple[By, ...] = ("sections", "experiments")
 
 @dataclass(frozen=True)
 class Nominee:
-    """An effect that was named: its parameter, and the value of it that does nothing, NaN if that alone shows nothing;
-    instead_of: what is known, where this is something vaguer that may be it instead; only_in: the one experiment or
-    section in which it acts.
+    """An effect that was named.
+
+    Attributes
+    ----------
+    name, parameter : str
+        The effect, and the parameter of its amplitude.
+    off : float
+        The value that does nothing, NaN if that alone shows nothing [unit of the amplitude].
+    instead_of : str
+        What is known, if this is something vaguer that may be it instead.
+    only_in : mapping of str
+        The one section or experiment in which it acts, by "sections" or "experiments".
     """
 
     name: str
@@ -117,8 +126,16 @@ class UnclearFall:
 
 @dataclass(frozen=True)
 class Choice:
-    """stages: names in the model, from none to the last, each with all of those before; refused: why, by name; unclear:
-    by how much held-out errors fall with those of the last model whose fall is not clear.
+    """What a model keeps.
+
+    Attributes
+    ----------
+    stages : tuple of tuple of str
+        Names in the model, from none to the last, each with all of those before.
+    refused : dict
+        Why, by name.
+    unclear : mapping of UnclearFall
+        By how much held-out errors fall with those of the last model whose fall is not clear, by name.
     """
 
     stages: tuple[Names, ...]
@@ -234,9 +251,25 @@ def _known_of(
 def why_not_kept(
     before: ModelScore, after: ModelScore | None, clearly: bool, not_judging: NotJudging
 ) -> NotKept | None:
-    """Why a model is not better than one before it, None when it is: held-out errors fall by sections or by experiments
-    and rise by neither, and the misfit with all that was calibrated falls. They may rise one way if that is not clear,
-    and less than they fall the other.
+    """Why a model is not better than one before it.
+
+    Held-out errors have to fall by sections or by experiments and rise by neither, and the misfit with all that was
+    calibrated has to fall. They may rise one way if that is not clear, and less than they fall the other.
+
+    Parameters
+    ----------
+    before : ModelScore
+    after : ModelScore or None
+        None if no flow is found.
+    clearly : bool
+        Whether errors must fall by clear_fall standard errors.
+    not_judging : mapping of set of str
+        Sections and experiments that do not count.
+
+    Returns
+    -------
+    NotKept or None
+        None if it is better.
     """
     if after is None:
         return NoFlowWithIt()
@@ -271,8 +304,18 @@ Addition = tuple[Candidate, Mapping[str, float]]  # an effect, and values of its
 
 
 def found_additions(case: Case, found: Diagnosis) -> list[Addition]:
-    """Effects and places of a diagnosis in the order they were found, places spread over where they may lie; none that
-    is at work in the case already.
+    """Effects and places of a diagnosis in the order they were found.
+
+    Parameters
+    ----------
+    case : Case
+    found : Diagnosis
+
+    Returns
+    -------
+    list of (Candidate, mapping of float)
+        Each with values of its shapes [unit of each], places spread over where they may lie; none that is at work in
+        the case already.
     """
     station = found.predictions.station
     added: list[Addition] = [
@@ -344,7 +387,17 @@ def choice_among(case: Case, found: Diagnosis, base_with: Callable[[Names], Base
 
 
 def nominees(case: Case, found: Diagnosis) -> list[Nominee]:
-    """What is tried, as it is chosen from."""
+    """What `tried_additions` adds, as `chosen` takes it.
+
+    Parameters
+    ----------
+    case : Case
+    found : Diagnosis
+
+    Returns
+    -------
+    list of Nominee
+    """
     known = {candidate_at(case, place).name: name for name, place in _likelier_places(found).items()}
     named = []
     for one, _ in tried_additions(case, found):
@@ -387,7 +440,18 @@ def values_tried(case: Case, found: Diagnosis) -> dict[str, float]:
 
 
 def values_found(case: Case, found: Diagnosis) -> dict[str, float]:
-    """Parameters of the last model of a diagnosis by name, sizes of places as large as they are spread."""
+    """Parameters of the last model of a diagnosis.
+
+    Parameters
+    ----------
+    case : Case
+    found : Diagnosis
+
+    Returns
+    -------
+    dict of float
+        By name [its unit]; sizes of places are those of places spread over where they may lie.
+    """
     values = {name: three[0] for name, three in found.parameters.last.items()}
     for place in found.places:
         share = spread_over_its_error(place).plausible / place.plausible

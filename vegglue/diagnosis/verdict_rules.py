@@ -268,7 +268,20 @@ def _is_clear(instrument: FaultyInstrument) -> bool:
 
 
 def effect_found(step: Step, candidates: Iterable[CandidateEffect]) -> EffectFound:
-    """An accepted effect with what it may be instead, the likeliest first."""
+    """An accepted effect with what it may be instead.
+
+    Parameters
+    ----------
+    step : Step
+    candidates : iterable of CandidateEffect
+        The accepted one among them.
+
+    Returns
+    -------
+    EffectFound
+        Its probability is that of all effects of the same trace; the rivals are those of other traces, the likeliest
+        first.
+    """
     best = next(one for one in candidates if one.name == step.accepted)
     alike = next(group for group in step.groups if step.accepted in group)
     first = step.likelier_place
