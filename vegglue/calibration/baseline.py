@@ -57,8 +57,17 @@ _kept: OrderedDict[str, "Baseline"] = OrderedDict()
 
 @dataclass(frozen=True)
 class Baseline:
-    """A calibrated model; coarse, on_coarse: the model on cells of twice the size and its point at the same z, None if
-    the grid cannot be coarsened, or the coarse model has no steady flow.
+    """A calibrated model.
+
+    Attributes
+    ----------
+    model : Model
+    noise : Noise
+    fitted : MapEstimate
+    coarse : Model or None
+        On cells of twice the size, None if the grid cannot be coarsened.
+    on_coarse : Point or None
+        Of the coarse model at the same z, None without a steady flow there.
     """
 
     model: Model
@@ -70,7 +79,15 @@ class Baseline:
 
 @dataclass(frozen=True)
 class SearchModel:
-    """A cheap model for the search for missing effects, its noise, and its point at the MAP estimate."""
+    """A cheap model for the search for missing effects.
+
+    Attributes
+    ----------
+    model : Model
+    noise : Noise
+    point : Point
+        At the MAP estimate.
+    """
 
     model: Model
     noise: Noise
@@ -277,7 +294,19 @@ def with_own_error_again(base: Baseline, z: Array) -> Baseline:
 
 
 def with_own_error_at(noise: Noise, coarse: Model, point: Point) -> Noise:
-    """The noise with the model's own error as computed on coarse cells at a point."""
+    """The noise with the model's own error M as computed on coarse cells.
+
+    Parameters
+    ----------
+    noise : Noise
+    coarse : Model
+    point : Point
+        Of the coarse model.
+
+    Returns
+    -------
+    Noise
+    """
     return with_model_error(noise, model_error_columns(coarse, point, coarse.case.model_error))
 
 
@@ -300,8 +329,20 @@ def model_that_errs(base: Baseline) -> SearchModel:
 
 
 def with_error_there(where: SearchModel, cells: CellResponses | None = None) -> SearchModel:
-    """The model with its own error as computed at its point, see `model_error_columns`: what is known of parts of that
-    error then is no more than all of it. That of a baseline is of a point before its last fit.
+    """The model with its own error M as computed at its point, see `model_error_columns`.
+
+    What is known of parts of that error then is no more than all of it. That of a baseline is of a point before its
+    last fit.
+
+    Parameters
+    ----------
+    where : SearchModel
+    cells : CellResponses, optional
+        To the terms of `terms_that_err`, if they are known.
+
+    Returns
+    -------
+    SearchModel
     """
     columns = model_error_columns(where.model, where.point, where.model.case.model_error, cells)
     return replace(where, noise=with_model_error(where.noise, columns))
@@ -328,7 +369,18 @@ def search_model(base: Baseline) -> SearchModel:
 
 
 def coarse_search(base: Baseline) -> tuple[Model, Point] | None:
-    """The model on cells of twice the size and its point; None if missing effects are searched on the case's own."""
+    """The model on cells of twice the size on which missing effects are searched.
+
+    Parameters
+    ----------
+    base : Baseline
+
+    Returns
+    -------
+    (Model, Point) or None
+        None if they are searched on the case's own cells: the coarse ones are fewer than FEWEST_CELLS_ACROSS, or have
+        no steady flow.
+    """
     if base.coarse is None or base.on_coarse is None or cells_across(base.coarse.site) < FEWEST_CELLS_ACROSS:
         return None
     return base.coarse, base.on_coarse
@@ -419,9 +471,23 @@ MOST_PLACES, MOST_HALVINGS = 8, 4
 
 @dataclass(frozen=True)
 class CommandPlace:
-    """A model with the engine of its command, corrected at z (p,) where the command fits best; settled: whether the
-    next step would have been negligible; places: at how many the slopes of the command were taken; correction: that at
-    z; run: where the command ran in the search (k, q); failed: how many runs failed.
+    """A model with the engine of its command, corrected where the command fits best.
+
+    Attributes
+    ----------
+    model : Model
+    z : ndarray (p,)
+        That place [standard deviations of the prior].
+    settled : bool
+        Whether the next step would have been negligible.
+    places : int
+        At how many the slopes of the command were taken.
+    correction : Correction
+        At z.
+    run : ndarray (k, q)
+        Where the command ran in the search [standard deviations of the prior].
+    failed : int
+        Number of runs that failed.
     """
 
     model: Model
@@ -434,7 +500,20 @@ class CommandPlace:
 
 
 def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace:
-    """The search, from the first place of the prior where the command runs: it depends on nothing but the case.
+    """The place where the command of a case fits best.
+
+    The search starts from the first place of the prior where the command runs: it depends on nothing but the case.
+
+    Parameters
+    ----------
+    runs : CommandRuns
+    model : Model
+    watch : callable
+        Is called with each phase, and with the number of runs that are done.
+
+    Returns
+    -------
+    CommandPlace
 
     Raises
     ------

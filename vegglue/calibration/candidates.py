@@ -43,9 +43,20 @@ NOT_SEARCHED = {"search", "law"}
 class Candidate:
     """An effect and where it would act; empty tuples mean everywhere.
 
-    at: its patch or its place, as a target of `EffectIdentity`; fixed: the shapes of it; scale: a plausible size in
-    this case, None for that of the effect; above_off: whether the amplitude may only lie above off; fitted: priors of
-    shapes that are fitted with the amplitude, from their values in `fixed`.
+    Attributes
+    ----------
+    effect : Effect
+    experiments, sections, devices : tuple of str
+    at : tuple of str
+        Its patch or its place, as a target of `EffectIdentity`.
+    fixed : tuple of (str, float)
+        The shapes of that patch or place [unit of each].
+    scale : float or None
+        A plausible size in this case [unit of the amplitude], None for that of the effect.
+    above_off : bool
+        Whether the amplitude may only lie above off.
+    fitted : tuple of (str, Parameter)
+        Priors of shapes that are fitted with the amplitude, from their values in `fixed`.
     """
 
     effect: Effect
@@ -174,6 +185,16 @@ def missing_needs(case: Case, station: pd.DataFrame) -> set[Need]:
     """What effects may need and the site does not have: without it they are no candidates.
 
     Side walls are those of a laboratory, where no wind blows and no water seeps in.
+
+    Parameters
+    ----------
+    case : Case
+    station : DataFrame
+        All stations.
+
+    Returns
+    -------
+    set of Need
     """
     used = station[station["used"]]
     kinds = [kind_of(str(name)) for name in used["kind"].unique()]
@@ -228,7 +249,19 @@ def acting_in(effect: Effect, kind: str, names: tuple[str, ...]) -> Candidate:
 
 
 def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
-    """Experiments, sections with used velocities, used devices, and patches: an effect may act in one of them alone."""
+    """Places in one of which alone an effect may act.
+
+    Parameters
+    ----------
+    case : Case
+    station : DataFrame
+        All stations.
+
+    Returns
+    -------
+    dict of list of str
+        `experiment`; `section`, those with used velocities; `device`, the used ones; `patch`.
+    """
     used = station[station["used"]]
     velocity = used[velocity_rows(used)]
     return {
@@ -240,7 +273,17 @@ def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
 
 
 def candidates_in_case(case: Case) -> dict[str, Candidate]:
-    """The effects of a case as candidates, by their keys; shapes that are calibrated in the middle of their priors."""
+    """The effects of a case as candidates.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    dict of Candidate
+        By the key of the effect; shapes that are calibrated are in the middle of their priors.
+    """
     found = {}
     for key, entry in case.effects.items():
         effect = effect_of(case, key)
@@ -267,13 +310,42 @@ def patch_candidate(effect: Effect, index: int, case: Case) -> Candidate:
 def place_candidate(
     effect: Effect, place: Mapping[str, float], scale: float | None = None, above_off: bool = False
 ) -> Candidate:
-    """Something unlisted at a place, x and y among its shapes [m]; scale: a plausible size."""
+    """An unlisted object at a place.
+
+    Parameters
+    ----------
+    effect : Effect
+        That stands for it.
+    place : mapping of float
+        Its shapes, x and y [m] among them.
+    scale : float, optional
+        A plausible size [unit of the amplitude].
+    above_off : bool
+        Whether the amplitude may only lie above off.
+
+    Returns
+    -------
+    Candidate
+    """
     at = EffectIdentity.at_place(effect.name, place["x"], place["y"]).target
     return Candidate(effect, at=at, fixed=tuple(place.items()), scale=scale, above_off=above_off)
 
 
 def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, float]) -> EffectEntry:
-    """The entry of a candidate in a case; amplitude: a number or the name of a parameter, then so are `free` shapes."""
+    """The entry of a candidate in the `effects` of a case.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    amplitude : float or str
+        A number, or the name of a parameter; then the `free` shapes are parameters, too.
+    shapes : mapping of float
+        Values of shapes [unit of each], the default of others.
+
+    Returns
+    -------
+    EffectEntry
+    """
     effect, shapes = candidate.effect, {**dict(candidate.fixed), **shapes}
     free = candidate.free if isinstance(amplitude, str) else {}
     given: dict[str, Value] = {one.name: float(shapes.get(one.name, one.default)) for one in effect.shapes}
@@ -370,8 +442,17 @@ InstrumentKind = Literal["reading", "position", "probe", "gauge", "line"]
 
 @dataclass(frozen=True)
 class Instrument:
-    """One that could be off: its readings, indices of used stations; x or y: where it stood [m], NaN if everywhere;
-    line: a surveyed line of the bed, which has no readings.
+    """An instrument that could be off.
+
+    Attributes
+    ----------
+    kind : {"reading", "position", "probe", "gauge", "line"}
+    readings : tuple of int
+        Indices of used stations.
+    x, y : float
+        Where it stood [m], NaN if everywhere.
+    line : SurveyedLine or None
+        A surveyed line of the bed, which has no readings.
     """
 
     kind: InstrumentKind

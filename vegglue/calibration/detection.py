@@ -43,7 +43,20 @@ MOST_PATTERNS = 120
 
 
 def lowest(enough: Callable[[Array], Mask], low: Array, high: Array) -> Array:
-    """The value between low and high (...,) from which on a condition holds, by halving."""
+    """The value from which on a condition holds, by halving.
+
+    Parameters
+    ----------
+    enough : callable
+        Values (...,) -> whether it holds (...,).
+    low, high : ndarray (...,)
+        Between which it begins to hold.
+
+    Returns
+    -------
+    ndarray (...,)
+        To (high - low) 2^-ROOT_HALVINGS.
+    """
     for _ in range(ROOT_HALVINGS):
         middle = 0.5 * (low + high)
         reached = enough(middle)
@@ -192,8 +205,16 @@ def own_and_shared(own_variance: Array, shared: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class PossibleMeasurements:
-    """Measurements at some places, given those that are made: squares (..., c) of |S_perp| of those that are made;
-    nuisances (..., N, q) and traces (..., N, c) of each, over its own error.
+    """Measurements at some places, given those that are made.
+
+    Attributes
+    ----------
+    squares : ndarray (..., c)
+        |S_perp|^2 of each trace, of those that are made [-].
+    nuisances : ndarray (..., N, q)
+        Of each measurement, over its own error [-].
+    traces : ndarray (..., N, c)
+        Of each measurement, over its own error [1 per unit of gain].
     """
 
     squares: Array

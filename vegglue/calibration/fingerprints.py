@@ -72,9 +72,21 @@ WITHOUT_PLANTS = 0.02
 
 @dataclass(frozen=True)
 class Places:
-    """Spots of one term, or barriers: middles x, y, half lengths and half widths (spot,) [m]; plausible: size of one
-    [unit of the effect that stands for it]; fingerprints (station, spot) [unit of a station per that of the effect];
-    bare (spot,): whether no plants stand there.
+    """Spots of one term, or barriers.
+
+    Attributes
+    ----------
+    term : Unlisted
+    x, y : ndarray (spot,)
+        Middles [m].
+    length, width : ndarray (spot,)
+        Half lengths and half widths [m].
+    plausible : float
+        Size of one [unit of the effect that stands for it].
+    fingerprints : ndarray (station, spot)
+        [unit of a station per that of the effect]
+    bare : ndarray of bool (spot,)
+        Whether no plants stand there.
     """
 
     term: Unlisted
@@ -109,20 +121,38 @@ class Places:
 
 @dataclass(frozen=True)
 class Fingerprints:
-    """S = d prediction / d gain of candidates, one column for each setting of their shapes."""
+    """S = d prediction / d gain of candidates, one column for each setting of their shapes.
 
-    # point, candidates: where it is taken, and of what
+    Attributes
+    ----------
+    point : Point
+        At which S is taken.
+    candidates : list of Candidate
+    columns : list of ndarray of int
+        Of each candidate.
+    settings : list of dict of float
+        Shapes of each column [unit of each].
+    amplitudes : list of Amplitude
+        Of each column.
+    causes : list of Cause
+        Of each column.
+    values : ndarray (station, c)
+        S [m/s or m per unit of gain].
+    places : tuple of Places
+        The spots of each term.
+    lines : SurveyedLines or None
+    of_lines : ndarray (station, lines)
+        By what a measurement exceeds its prediction for each m that a line is too high [unit of the station per m].
+    """
+
     point: Point
     candidates: list[Candidate]
-    columns: list[np.ndarray]  # of each candidate
-    # settings, amplitudes, causes: of each column (c,)
+    columns: list[np.ndarray]
     settings: list[dict[str, float]]
     amplitudes: list[Amplitude]
     causes: list[Cause]
-    values: Array  # S (station, c) [m/s or m per unit of gain]
-    places: tuple[Places, ...]  # the spots of each term
-    # lines, of_lines: surveyed lines, and what a measurement exceeds its prediction by for each m that a line is too
-    # high, (station, lines) [unit of the station per m]
+    values: Array
+    places: tuple[Places, ...]
     lines: SurveyedLines | None = None
     of_lines: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
@@ -245,7 +275,17 @@ def places_of(model: Model, point: Point, half_width: float, cells: CellResponse
 
 
 def barriers(model: Model) -> GaussianBasis:
-    """Spots even across the channel, as long as their effect states and as far apart."""
+    """Spots even across the channel, as long as their effect states and as far apart.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    GaussianBasis
+        Of half length BARRIER_LENGTH depths, SPOT_CELLS cells at least.
+    """
     grid = model.site.grid
     length = max(BARRIER_LENGTH * site_scales(model.case, model.site).depth, SPOT_CELLS * grid.dx)
     x = np.linspace(grid.x[0], grid.x[-1], max(round((grid.x[-1] - grid.x[0]) / length), 1) + 1)
@@ -350,7 +390,18 @@ def least_depth(model: Model) -> float:
 
 
 def plausible_size(case: Case, term: Unlisted) -> float:
-    """Of the effect that stands for it at a place, in its unit: a multiple of a scale of the site."""
+    """A plausible size of an unlisted object: a multiple of a scale of the site.
+
+    Parameters
+    ----------
+    case : Case
+    term : Unlisted
+
+    Returns
+    -------
+    float
+        [unit of the effect that stands for it]
+    """
     of, scales = constants(), site_scales(case)
     return {
         "barrier": of.effect_sizes * effect_named(case, EFFECT_AT_PLACE["barrier"]).amplitude.scale,

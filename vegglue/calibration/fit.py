@@ -51,7 +51,18 @@ STRAIGHT_DECREASE = 1.0
 
 @dataclass(frozen=True)
 class MapEstimate:
-    """A point, its chi2 = |W (y - f)|^2 and objective = chi2 + |z|^2 [-], and the covariance of z around it (p, p)."""
+    """The parameters that fit best, z being standard normal before the data.
+
+    Attributes
+    ----------
+    point : Point
+    chi2 : float
+        |W (y - f)|^2 [-].
+    objective : float
+        chi2 + |z|^2 [-].
+    covariance : ndarray (p, p)
+        Of z around it [-].
+    """
 
     point: Point
     chi2: float
@@ -200,7 +211,18 @@ def at_point(noise: Noise, point: Point) -> MapEstimate:
 
 
 def chi2(noise: Noise, point: Point) -> float:
-    """|W (y - f)|^2 over the used stations [-]."""
+    """|W (y - f)|^2 over the used stations.
+
+    Parameters
+    ----------
+    noise : Noise
+    point : Point
+
+    Returns
+    -------
+    float
+        [-]
+    """
     return squared_misfit(noise, point.prediction)
 
 

@@ -63,8 +63,15 @@ RELATIVE_TERM: Mapping[str, Term] = {
 
 @dataclass(frozen=True)
 class LawInCase:
-    """A law, its candidate with the references to be tried, and the values of its quantity from 5 to 95 % of what its
-    term has seen [unit of the quantity].
+    """A law that has something to act on.
+
+    Attributes
+    ----------
+    law : Law
+    candidate : Candidate
+        With the references that are tried.
+    seen : (float, float)
+        The values of its quantity from 5 to 95 % of what its term has seen [unit of the quantity].
     """
 
     law: Law
@@ -73,7 +80,20 @@ class LawInCase:
 
 
 def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawInCase]:
-    """Laws that have something to act on, without those that restate a candidate effect that is `listed`."""
+    """Laws that have something to act on.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+        Of the flow.
+    listed : sequence of str
+        Candidate effects; laws that restate one are left out, as are laws of the case.
+
+    Returns
+    -------
+    list of LawInCase
+    """
     water = _water_of(model, point)
     return [
         found
@@ -84,7 +104,21 @@ def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawI
 
 
 def products_in_case(model: Model, point: Point, law: LawInCase, reference: float | None) -> list[LawInCase]:
-    """Products of a law that is in the model with other quantities; reference: of that law, if it has one."""
+    """Products of a law that is in the model with other quantities.
+
+    Parameters
+    ----------
+    model : Model
+    point : Point
+        Of the flow.
+    law : LawInCase
+    reference : float or None
+        Of that law, if it has one [unit of its quantity].
+
+    Returns
+    -------
+    list of LawInCase
+    """
     water, change = _water_of(model, point), _change_of(law.law, law.seen, reference)
     products = [_in_case(product, water, reference, change) for product in PRODUCTS[law.law.name]]
     return [product for product in products if product is not None]
@@ -180,7 +214,15 @@ def at_sections(model: Model, cells: Cells, experiment: str) -> Cells:
 
 @dataclass(frozen=True)
 class LawTraces:
-    """Answers to each cell (station, nx, ny) by term, and the flow of each experiment with the rows of its stations."""
+    """What fingerprints of laws are made of.
+
+    Attributes
+    ----------
+    responses : CellResponses
+        Of all stations to each cell.
+    flows : tuple of (ndarray of int, Cells)
+        Of each experiment the rows of its stations, and its flow.
+    """
 
     responses: CellResponses
     flows: tuple[tuple[Array, Cells], ...]
@@ -206,8 +248,21 @@ def law_traces(model: Model, point: Point) -> LawTraces:
 
 @dataclass(frozen=True)
 class LawBeyondRange:
-    """A law of the case that is used beyond the range that it was found in [unit]; share: of the cells that it acts on
-    [-], those under the measured sections if any lie there.
+    """A law of the case that is used beyond the range in which it was found.
+
+    Attributes
+    ----------
+    effect : str
+        Its key.
+    symbol, unit : str
+        Of its quantity.
+    low, high : float
+        The range [unit].
+    experiment : str
+    share : float
+        Of the cells that it acts on [-].
+    at_sections : bool
+        Whether these are those under the measured sections; all, if none lie there.
     """
 
     effect: str
@@ -266,9 +321,23 @@ LAW_SEED = 1  # of the draws of errors alone, as in `screen`
 
 @dataclass(frozen=True)
 class LawScreening:
-    """listed: the screening without laws; laws, kind: the laws and their score tests; columns: of each law, in `kind`;
-    settings: of each column; p: chance that errors alone make laws stand out as much; cosine (c + l, c + l): between
-    the projected fingerprints of all columns, listed effects first.
+    """Score tests of laws beside all that is listed.
+
+    Attributes
+    ----------
+    listed : Screening
+        Without laws.
+    laws : list of LawInCase
+    kind : HypothesisKind
+        Their score tests, of l columns.
+    columns : list of ndarray of int
+        Of each law, in `kind`.
+    settings : list of dict of float
+        Shapes of each column [unit of each].
+    p : float
+        Chance that errors alone make laws stand out as much [-].
+    cosine : ndarray (c + l, c + l)
+        Between the projected fingerprints of all columns, listed effects first [-].
     """
 
     listed: Screening
@@ -317,7 +386,15 @@ class LawScreening:
 
 @dataclass(frozen=True)
 class LawFingerprints:
-    """Fingerprints of what is listed, the laws of a case, and fingerprints of both, listed effects first."""
+    """Fingerprints of what is listed and of the laws of a case.
+
+    Attributes
+    ----------
+    listed : Fingerprints
+    laws : list of LawInCase
+    every : Fingerprints
+        Of both, listed effects first.
+    """
 
     listed: Fingerprints
     laws: list[LawInCase]
@@ -443,9 +520,23 @@ def _of_listed(full: Screening, listed: Fingerprints) -> Screening:
 
 @dataclass(frozen=True)
 class ProductScreening:
-    """full: the screening of all columns, of listed effects, of single laws and of products, in this order; kind: the
-    products; law_of, settings: of each of its columns; others: ln evidence of all else together [-]; p: chance that
-    errors alone make products stand out as much.
+    """Score tests of products of a law that is in the model.
+
+    Attributes
+    ----------
+    full : Screening
+        Of listed effects, of single laws and of products, in this order.
+    products : list of LawInCase
+    kind : HypothesisKind
+        Score tests of the products.
+    law_of : ndarray of int
+        Product of each column of `kind`.
+    settings : list of dict of float
+        Shapes of each of these columns [unit of each].
+    others : float
+        ln evidence of all else together [-].
+    p : float
+        Chance that errors alone make products stand out as much [-].
     """
 
     full: Screening

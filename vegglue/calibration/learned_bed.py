@@ -35,8 +35,17 @@ MOST_WEIGHTS, CELLS_AT_A_TIME = 2_000_000, 10_000
 
 @dataclass(frozen=True)
 class LearnedBed:
-    """Most likely correction dz (nx, ny) [m] of the bed on a grid, columns B (nx ny, k) [m] of its covariance before
-    the flow was measured, and W (k, k) [-], so that those after are B W.
+    """The correction of a surveyed bed that is likeliest after the flow was measured.
+
+    Attributes
+    ----------
+    grid : Grid
+    correction : ndarray (nx, ny)
+        dz [m].
+    before : ndarray (nx ny, k)
+        Columns B of its covariance before the flow was measured [m].
+    left : ndarray (k, k)
+        W, so that the columns after are B W [-].
     """
 
     grid: Grid
@@ -54,8 +63,16 @@ class LearnedBed:
 
 @dataclass(frozen=True)
 class BedOfSpots:
-    """Mean correction of the bed over spots (spot,) [m], its standard error, that before the flow was measured, and
-    columns (spot, k) [m] of the covariance of the means.
+    """Means of the corrected bed over spots.
+
+    Attributes
+    ----------
+    mean : ndarray (spot,)
+        [m]
+    error, before : ndarray (spot,)
+        Standard errors, and those before the flow was measured [m].
+    columns : ndarray (spot, k)
+        Of the covariance of the means [m].
     """
 
     mean: Array

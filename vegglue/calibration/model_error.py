@@ -81,7 +81,14 @@ UNKNOWN = Parameter(distribution="uniform", low=-1.0, high=1.0, unit="-")
 
 @dataclass(frozen=True)
 class CellResponses:
-    """How predictions of all stations answer to a term changed in each cell of a grid, (station, nx, ny) by term."""
+    """d prediction / d term of all stations, for a change of the term in each cell of a grid.
+
+    Attributes
+    ----------
+    grid : Grid
+    of : dict of ndarray (station, nx, ny)
+        By term [unit of each station per that of the term].
+    """
 
     grid: Grid
     of: dict[Term, NDArray[np.float32]]
@@ -121,8 +128,16 @@ def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellR
 
 @dataclass(frozen=True)
 class GaussianBasis:
-    """b_kj = exp(-((x - x_k) / l)^2 - ((y - y_j) / w)^2) over a grid: along (k, nx) and across (j, ny) [-], their
-    middles x, y [m], l and w [m].
+    """b_kj = exp(-((x - x_k) / l)^2 - ((y - y_j) / w)^2) over a grid
+
+    Attributes
+    ----------
+    x, y : ndarray (k,), (j,)
+        Middles [m].
+    length, width : float
+        l and w [m].
+    along, across : ndarray (k, nx), (j, ny)
+        The two factors at cell centres [-].
     """
 
     x: Array
@@ -262,7 +277,17 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError, cells: 
 
 
 def error_bases(model: Model) -> tuple[GaussianBasis, GaussianBasis]:
-    """Basis functions of the errors of friction and of the bed, so many half widths of the floor wide."""
+    """Basis functions of the errors of friction and of the bed.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    GaussianBasis, GaussianBasis
+        FRICTION_RADIUS and BED_RADIUS half widths of the floor wide.
+    """
     half = half_width(model.site)
     friction, bed = (gaussian_basis(model.site.grid, one * half, one * half) for one in (FRICTION_RADIUS, BED_RADIUS))
     return friction, bed
@@ -282,7 +307,21 @@ def _objects(case: Case) -> list[tuple[str, str]]:
 
 
 def survey_error_columns(model: Model, cells: CellResponses) -> Array:
-    """Columns (station, k) with R C R' = columns columns'; of each bed its own. None if no survey states its error."""
+    """R C R' = columns columns': what surveyed beds err by, at the stations.
+
+    R are the responses to the bed, C is the covariance of its error, of each bed its own.
+
+    Parameters
+    ----------
+    model : Model
+    cells : CellResponses
+        To the bed.
+
+    Returns
+    -------
+    ndarray (station, k)
+        [unit of each station]; no columns if no survey states its error.
+    """
     parts, case, grid = [np.zeros((len(model.station), 0))], model.case, model.site.grid
     with_own = {name: rows for name, rows in model.rows.items() if name in model.site.own}
     shared = [rows for name, rows in model.rows.items() if name not in with_own]
@@ -373,7 +412,17 @@ def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: C
 
 
 def beside_walls(model: Model) -> Mask:
-    """Which stations (n,) lie within a cell of a wall; where water enters through a side there is none."""
+    """Which stations lie within a cell of a side wall.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    ndarray of bool (station,)
+        False where water enters through a side, and without walls.
+    """
     width, (x, y) = model.case.grid.cell[1], model.station[["x", "y"]].to_numpy(float).T
     beside = np.zeros(y.size, dtype=bool)
     for side, end in zip(("south", "north"), model.case.grid.y, strict=True):

@@ -42,20 +42,46 @@ CORRELATION_LEVELS = LEVEL_STEP * np.arange(1, 20)
 
 @dataclass(frozen=True)
 class Noise:
-    """Measured values of the n used stations and the covariance of their errors, see the head of this file."""
+    """Measured values of the n used stations and the covariance of their errors, see the head of this file.
 
-    rows: np.ndarray  # of the used stations among all (n,)
-    value: Array  # measured (n,) [m/s or m]
-    error: Array  # standard errors as stated (n,) [m/s or m]
-    separation: Array  # d_ij / d (n, n) [-], infinite between sections
-    grid_error: Array  # g (n,) [m/s or m], zero if unknown
-    grid_correlation: float  # c [-]
-    correlation: float  # rho [-]
-    scale: float  # s [-]
-    lower: Array  # lower Cholesky factor of the covariance (n, n)
-    correlation_chances: Array  # values of rho, and the posterior probability of each (2, k)
-    model_error: Array  # M (n, n), zero if the model is taken to be right
-    unknown: Array  # O (n, k), of instruments that are off by an unknown amount [m/s or m]
+    Attributes
+    ----------
+    rows : ndarray of int (n,)
+        Of the used stations among all.
+    value, error : ndarray (n,)
+        Measured, and standard errors as stated [m/s or m].
+    separation : ndarray (n, n)
+        d_ij / d [-], infinite between sections.
+    grid_error : ndarray (n,)
+        g [m/s or m], zero if unknown.
+    grid_correlation : float
+        c [-].
+    correlation : float
+        rho [-].
+    scale : float
+        s [-].
+    lower : ndarray (n, n)
+        Lower Cholesky factor of the covariance.
+    correlation_chances : ndarray (2, k)
+        Values of rho, and the posterior probability of each [-].
+    model_error : ndarray (n, n)
+        M, zero if the model is taken to be right.
+    unknown : ndarray (n, k)
+        O, of instruments that are off by an unknown amount [m/s or m].
+    """
+
+    rows: np.ndarray
+    value: Array
+    error: Array
+    separation: Array
+    grid_error: Array
+    grid_correlation: float
+    correlation: float
+    scale: float
+    lower: Array
+    correlation_chances: Array
+    model_error: Array
+    unknown: Array
 
     def used(self, values: Array) -> Array:
         """The rows of the used stations (n, ...) of values of all stations (station, ...)."""
@@ -176,7 +202,18 @@ def with_independent_grid_errors(noise: Noise) -> Noise:
 
 
 def with_correlation(noise: Noise, correlation: float, scale: float) -> Noise:
-    """The noise with rho and s given [-], and no uncertainty of rho."""
+    """The noise with rho and s given, and no uncertainty of rho.
+
+    Parameters
+    ----------
+    noise : Noise
+    correlation, scale : float
+        rho and s [-].
+
+    Returns
+    -------
+    Noise
+    """
     certain = np.array([[correlation], [1.0]])
     return _with_cholesky(replace(noise, correlation=correlation, scale=scale, correlation_chances=certain))
 

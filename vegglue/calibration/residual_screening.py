@@ -63,21 +63,44 @@ OFF, MOST_CONDITIONAL = 0.25, 2
 
 @dataclass(frozen=True)
 class Screening:
-    """Score tests of the residual of a calibrated model against all that could be missing, or wrong with the data."""
+    """Score tests of the residual of a calibrated model against all that could be missing, or wrong with the data.
 
-    base: Baseline  # the model, with the noise as estimated here, at the place of its fit
-    search: SearchModel  # its model that is fitted again and again
-    flagged: tuple[int, ...]  # readings of instruments found to be off, indices among the used ones
-    # fingerprints, whitened_fingerprints: S of candidates, and W S (n, c)
+    Attributes
+    ----------
+    base : Baseline
+        The model, with the noise as estimated here, at the place of its fit.
+    search : SearchModel
+        Its model that is fitted again and again.
+    flagged : tuple of int
+        Readings of instruments found to be off, indices among the used ones.
+    fingerprints : Fingerprints
+        S of candidates.
+    whitened_slopes : ndarray (n, p)
+        W df/dz [-].
+    whitened_fingerprints : ndarray (n, c)
+        W S [1 per unit of gain].
+    projected : Projected
+        W S with W df/dz projected out.
+    effects : Family
+        Score tests of candidates.
+    kinds : tuple of HypothesisKind
+        Evidence of listed effects, of places by term, and of `instruments`, in this order.
+    instruments : dict of tuple of Instrument
+    errors : ndarray (draws, n)
+        Whitened errors alone [-].
+    """
+
+    base: Baseline
+    search: SearchModel
+    flagged: tuple[int, ...]
     fingerprints: Fingerprints
-    whitened_slopes: Array  # W df/dz (n, p)
+    whitened_slopes: Array
     whitened_fingerprints: Array
-    projected: score_test.Projected  # W S with W df/dz projected out
-    effects: Family  # score tests of candidates
-    # Evidence of all kinds: of listed effects, of places by term, and of `instruments`, in this order
+    projected: score_test.Projected
+    effects: Family
     kinds: tuple[HypothesisKind, ...]
     instruments: dict[str, tuple[Instrument, ...]]
-    errors: Array  # whitened errors alone (draws, n)
+    errors: Array
 
     def best_column(self, candidate: int) -> int:
         """Column of the fingerprint of a candidate with the largest |T|, among the settings of its shapes."""
@@ -338,8 +361,16 @@ def refit_start(screening: Screening, candidate: int, column: int) -> Array:
 
 @dataclass(frozen=True)
 class ConditionalScreening:
-    """From a point where one parameter is back in the middle of its prior; log_factor (c,): ln B of each column of the
-    fingerprints as predicted from there; gain (c,): size there.
+    """What candidates would bring if one parameter were back in the middle of its prior.
+
+    Attributes
+    ----------
+    point : Point
+        With that parameter there.
+    log_factor : ndarray (c,)
+        ln B of each column of the fingerprints, as predicted from there [-].
+    gain : ndarray (c,)
+        Size there [unit of the gain].
     """
 
     point: Point
@@ -380,7 +411,19 @@ def conditional_screenings(screening: Screening) -> tuple[ConditionalScreening, 
 
 
 def conditional_places(search: SearchModel) -> list[Array]:
-    """z' (p,) of each parameter that is off, furthest first; not of amplitudes of effects, see `with_rivals_again`."""
+    """z' = z - z_j V_j / V_jj: where a parameter that is off is back in the middle of its prior, and others follow it.
+
+    V is the covariance of z. Amplitudes of effects do not count, see `with_rivals_again`.
+
+    Parameters
+    ----------
+    search : SearchModel
+
+    Returns
+    -------
+    list of ndarray (p,)
+        Of MOST_CONDITIONAL parameters at most with |z_j| > OFF, furthest first.
+    """
     noise, z = search.noise, search.point.z
     of_effects = parameters_of_effects(search.model.case)
     own = [j for j, name in enumerate(search.model.names) if name not in of_effects]

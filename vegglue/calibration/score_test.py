@@ -35,9 +35,18 @@ NULL_DRAWS_TOGETHER = 250
 
 @dataclass(frozen=True)
 class Projected:
-    """Fingerprints S (rows, c) and residual r (rows,) after the calibrated slopes J have been projected out.
+    """Fingerprints S and residual r after the calibrated slopes J have been projected out.
 
-    visible: |S_perp| / |S| of each (c,) [-]; length: |S_perp| (c,), in standard errors per unit of amplitude.
+    Attributes
+    ----------
+    residual : ndarray (rows,)
+        [-]
+    fingerprints : ndarray (rows, c)
+        S_perp [1 per unit of gain].
+    length : ndarray (c,)
+        |S_perp| [standard errors per unit of gain].
+    visible : ndarray (c,)
+        |S_perp| / |S| [-].
     """
 
     residual: Array
@@ -134,8 +143,14 @@ class Family:
 
         p = (1 + #{b: T_b^2 >= T^2}) / (1 + draws)
 
-    scores: T (c,) [standard errors]; maxima: the largest T_b^2 of each draw b of errors alone (draws,). No form of the
-    tail is assumed.
+    No form of the tail is assumed.
+
+    Attributes
+    ----------
+    scores : ndarray (c,)
+        T [standard errors].
+    maxima : ndarray (draws,)
+        The largest T_b^2 of each draw b of errors alone.
     """
 
     scores: Array
@@ -319,8 +334,18 @@ def alike_groups(names: Sequence[Name], cosine: Array) -> list[list[Name]]:
 class HypothesisKind:
     """Hypotheses of one kind, whitened and projected.
 
-    log_prior (c,): ln of the chance of each column before the data; size (c,): a = s |S_perp| [-]; scores T (c,);
-    only_sign (c,): the only sign that its amplitude may have, 0 for both: a score of the other counts as 0.
+    Attributes
+    ----------
+    name : str
+    projected : Projected
+    log_prior : ndarray (c,)
+        ln of the chance of each column before the data [-].
+    size : ndarray (c,)
+        a = s |S_perp| [-].
+    only_sign : ndarray of int (c,)
+        The only sign that its amplitude may have, 0 for both: a score of the other counts as 0.
+    scores : ndarray (c,)
+        T [standard errors].
     """
 
     name: str
