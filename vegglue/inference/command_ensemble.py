@@ -53,8 +53,20 @@ class PredictionsUnchanged:
 
 @dataclass(frozen=True)
 class StationsUnchanged:
-    """Used stations, `count` of `total`, at which all members predict the same; of the first: experiment, x and y [m],
-    its prediction and the unit.
+    """Used stations at which all members predict the same.
+
+    Attributes
+    ----------
+    count, total : int
+        How many of the used ones.
+    experiment : str
+        Of the first of them.
+    first : (float, float)
+        Its x and y [m].
+    value : float
+        Its prediction [unit].
+    unit : str
+    members : int
     """
 
     count: int

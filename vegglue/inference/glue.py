@@ -31,14 +31,29 @@ LEAST_FOR_SIZE = 10
 
 @dataclass(frozen=True)
 class MemberFit:
-    """How well each member predicts the used stations."""
+    """How well each member predicts the used stations.
 
-    solved: NDArray[np.bool_]  # (member,)
+    Attributes
+    ----------
+    solved : ndarray of bool (member,)
+    best : int
+        Index of the best member.
+    sigma : dict of float
+        Standard deviation of the errors by kind of measurement [m/s or m].
+    noise : ndarray (station,)
+        That of each station, NaN if unknown.
+    efficiency : ndarray (member,)
+        Nash-Sutcliffe [-], NaN of failed members.
+    log_likelihood : ndarray (member, station)
+        NaN if not used, or failed.
+    """
+
+    solved: NDArray[np.bool_]
     best: int
-    sigma: dict[str, float]  # standard deviation of the errors by kind of measurement [m/s or m]
-    noise: Array  # (station,) that of each station, NaN unknown
-    efficiency: Array  # (member,) Nash-Sutcliffe [-], NaN for failed members
-    log_likelihood: Array  # (member, station) NaN where not used or failed
+    sigma: dict[str, float]
+    noise: Array
+    efficiency: Array
+    log_likelihood: Array
 
 
 def fit_members(prediction: Array, station: pd.DataFrame, rule: str) -> MemberFit:

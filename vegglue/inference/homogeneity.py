@@ -126,7 +126,22 @@ def transfer(model: Model, noise: Noise, joint: Point, stated: bool) -> Transfer
 
 
 def chance_of_as_much(chi2: float, freedom: int, free: float = math.inf) -> float:
-    """P(chi2 or more) [-] of so many degrees of freedom, over errors whose size is estimated from `free` others."""
+    """P(chi2_f >= chi2), or P(F_f,g >= chi2 / f) over errors whose size is estimated from g others.
+
+    Parameters
+    ----------
+    chi2 : float
+        [-]
+    freedom : int
+        f.
+    free : float
+        g, infinite if errors are known.
+
+    Returns
+    -------
+    float
+        [-]
+    """
     if math.isinf(free):
         return float(chdtrc(freedom, chi2))
     return float(fdtrc(freedom, free, chi2 / freedom))
@@ -215,7 +230,21 @@ def equal_values_test(
 
 
 def one_experiment(model: Model, noise: Noise, experiment: str) -> tuple[Model, Noise]:
-    """The model and its errors for one experiment; all parameters stay."""
+    """The model and its errors for one experiment.
+
+    Parameters
+    ----------
+    model : Model
+    noise : Noise
+    experiment : str
+
+    Returns
+    -------
+    Model
+        Of its stations alone; all parameters stay.
+    Noise
+        Of these, with the covariance that they have among all.
+    """
     here = (model.station["experiment"] == experiment).to_numpy()
     case = model.case.model_copy(update={"experiments": {experiment: model.case.experiments[experiment]}})
     kept = np.flatnonzero(here[noise.rows])

@@ -43,7 +43,16 @@ WELL_ADAPTED, LEAST_GAIN = 0.85, 1.03
 
 @dataclass(frozen=True)
 class Mixture:
-    """sum_k share_k t(centre_k, lower_k lower_k'), of FREEDOM: share (k,), centre (k, p), lower (k, p, p)."""
+    """sum_k share_k t(centre_k, lower_k lower_k'), of FREEDOM degrees of freedom
+
+    Attributes
+    ----------
+    share : ndarray (k,)
+        Of sum 1 [-].
+    centre : ndarray (k, p)
+    lower : ndarray (k, p, p)
+        Lower Cholesky factors.
+    """
 
     share: Array
     centre: Array
@@ -142,7 +151,21 @@ def pooled_weights(log_target: Array, z: Array, rounds: list[tuple[int, Mixture]
 
 
 def adapt(target: Callable[[Array], Array], start: Mixture, seed: int) -> Mixture:
-    """The start moved, reshaped and split until it resembles the density; target: z (m, p) -> log density (m,)."""
+    """A mixture moved, reshaped and split until it resembles a density.
+
+    It resembles it if WELL_ADAPTED of the draws are effective, or if a round brings less than LEAST_GAIN of the last.
+
+    Parameters
+    ----------
+    target : callable
+        z (m, p) -> log density (m,), up to a constant.
+    start : Mixture
+    seed : int
+
+    Returns
+    -------
+    Mixture
+    """
     random, p = np.random.default_rng(seed), start.centre.shape[1]
     # b < 1 with (b (2 - b))^(p / 2) = 1 - TAIL_SHARE, the effective share of draws from p^b, p normal.
     power = float(1.0 - np.sqrt(1.0 - (1.0 - TAIL_SHARE) ** (2.0 / p)))
@@ -177,7 +200,20 @@ def adapt(target: Callable[[Array], Array], start: Mixture, seed: int) -> Mixtur
 
 
 def tempered(weights: Array, wanted: float) -> Array:
-    """w^t of sum 1, with the largest t in 0 to 1 for which at least `wanted` of the draws are effective."""
+    """w^t / sum w^t with the largest t in 0 to 1 for which enough draws are effective.
+
+    Parameters
+    ----------
+    weights : ndarray (m,)
+        w, of sum 1 [-].
+    wanted : float
+        Effective draws at least.
+
+    Returns
+    -------
+    ndarray (m,)
+        [-], of sum 1.
+    """
     if effective_size(weights) >= wanted:
         return weights
     low, high = 0.0, 1.0
@@ -228,12 +264,21 @@ NO_CHANCE_DROP = 10.0
 
 @dataclass(frozen=True)
 class Emulator:
-    """values(z) = sum_b coefficient_b prod_j u_j^(powers of b),   u = lower^-1 (z - centre)."""
+    """values(z) = sum_b coefficient_b prod_j u_j^(powers of b),   u = lower^-1 (z - centre)
+
+    Attributes
+    ----------
+    centre : ndarray (p,)
+    lower : ndarray (p, p)
+    powers : tuple of tuple of int
+        Of each term b the power of each u_j.
+    coefficient : ndarray (b, n)
+    """
 
     centre: Array
     lower: Array
     powers: tuple[tuple[int, ...], ...]
-    coefficient: Array  # (b, n)
+    coefficient: Array
 
     def predict(self, z: Array) -> Array:
         """Values (m, n) at z (m, p)."""
@@ -247,8 +292,24 @@ def emulator_of_density(
 
         sum_i weight_i (l_emulated(z_i) - l(z_i))^2,   i among the runs held out, weights as in `fit_emulator`
 
-    density: z (m, p), values (m, n) -> l = ln p(z) up to a constant (m,), -inf or NaN where a run failed. A degree that
-    the runs determine and that does not bend as the model does swings beyond them, where the next are then drawn.
+    A degree that the runs determine and that does not bend as the model does swings beyond them, where the next are
+    then drawn.
+
+    Parameters
+    ----------
+    z : ndarray (m, p)
+        Of the runs.
+    values : ndarray (m, n)
+        Of each run.
+    density : callable
+        z (m, p), values (m, n) -> l = ln p(z) up to a constant (m,), -inf or NaN where a run failed.
+    centre, lower : ndarray (p,), (p, p)
+        Of the coordinates of the polynomial, see `Emulator`.
+
+    Returns
+    -------
+    Emulator
+        Of degree 2 to HIGHEST_DEGREE.
     """
     logs = density(z, values)
     known = np.isfinite(logs)
@@ -347,9 +408,21 @@ LogDensity = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True)
 class Sample:
-    """All draws z (m, p), values predicted there (m, n), NaN where that failed, and log density (m,), -inf there.
+    """All draws of importance sampling.
 
-    weights (m,): of sum 1; drawn, effective: draws and effective draws so far, after each round.
+    Attributes
+    ----------
+    z : ndarray (m, p)
+    values : ndarray (m, n)
+        Predicted there, NaN where that failed.
+    log_density : ndarray (m,)
+        ln p(z) up to a constant, -inf where that failed.
+    weights : ndarray (m,)
+        Of sum 1 [-].
+    drawn : tuple of int
+        Draws so far, after each round.
+    effective : tuple of float
+        Effective draws so far, after each round.
     """
 
     z: Array

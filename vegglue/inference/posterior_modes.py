@@ -47,14 +47,33 @@ SIZE_ESTIMATES = 2
 
 @dataclass(frozen=True)
 class TriedMembers:
-    """Members at z (m, p) and what each predicts at the stations (m, station), NaN where it failed."""
+    """Members whose predictions are known.
+
+    Attributes
+    ----------
+    z : ndarray (m, p)
+        [standard deviations of the prior]
+    prediction : ndarray (m, station)
+        [unit of each station], NaN of a member that failed.
+    """
 
     z: Array
     prediction: Array
 
 
 def members_of(ensemble: Ensemble, model: Model) -> TriedMembers:
-    """The members of an ensemble."""
+    """The members of an ensemble on the scale of the prior.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+    model : Model
+        With the priors.
+
+    Returns
+    -------
+    TriedMembers
+    """
     return TriedMembers(z_at(model.case, ensemble.parameters), ensemble.prediction)
 
 
@@ -87,7 +106,19 @@ def points_of_prior(model: Model) -> TriedMembers:
 
 
 def grids_of(model: Model) -> list[Model]:
-    """The model on the grids that fits go through, the coarsest first, and its own at last."""
+    """The model on the grids that fits go through.
+
+    Parameters
+    ----------
+    model : Model
+        On the case's own grid.
+
+    Returns
+    -------
+    list of Model
+        MOST_GRIDS at most, each of cells half as large as the one before, its own last; none of the others has fewer
+        than FEWEST_ACROSS cells across the floor.
+    """
     *coarse, own = ever_coarser(model.case, model.site)[-MOST_GRIDS:]
     places = [*((case, site) for case, site in coarse if cells_across(site) >= FEWEST_ACROSS), own]
     return [replace(model, case=case, site=site) for case, site in places]
@@ -95,8 +126,16 @@ def grids_of(model: Model) -> list[Model]:
 
 @dataclass(frozen=True)
 class FoundModes:
-    """MAP estimates on the case's own grid, the best first; starts: number of members that the search started from;
-    on_coarse: those on cells of twice the size that led there, none if there are no such cells.
+    """The modes of a posterior.
+
+    Attributes
+    ----------
+    fits : tuple of MapEstimate
+        On the case's own grid, the best first.
+    starts : int
+        Number of members that the search started from.
+    on_coarse : tuple of MapEstimate
+        Those on cells of twice the size that led there, none if there are no such cells.
     """
 
     fits: tuple[MapEstimate, ...]
@@ -113,7 +152,25 @@ class FoundModes:
 def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch) -> FoundModes:
     """The modes of the posterior under given errors. If none is refined on finer cells, the members start there.
 
-    InputError if no steady flow is found from any of the members.
+    Parameters
+    ----------
+    model : Model
+        On the case's own grid.
+    noise : Noise
+    tried : TriedMembers
+        Of whose best the search starts.
+    watch : callable
+        Is called with each fit.
+
+    Returns
+    -------
+    FoundModes
+        One at least.
+
+    Raises
+    ------
+    InputError
+        If no steady flow is found from any of the members.
     """
     starts, grids = starting_points(noise, tried.z, tried.prediction), grids_of(model)
 
@@ -139,9 +196,25 @@ def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch) ->
 
 
 def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:
-    """The best members (k, p), more than START_DISTANCE apart, by |W (y - f)|^2 + |z|^2; z (m, p), prediction (m, n).
+    """The members of the least |W (y - f)|^2 + |z|^2, more than START_DISTANCE apart.
 
-    InputError if no member has a prediction at all used stations.
+    Parameters
+    ----------
+    noise : Noise
+    z : ndarray (m, p)
+        [standard deviations of the prior]
+    prediction : ndarray (m, station)
+        [unit of each station]
+
+    Returns
+    -------
+    ndarray (k, p)
+        MOST_STARTS at most of the best BEST_MEMBERS, the best first.
+
+    Raises
+    ------
+    InputError
+        If no member has a prediction at all used stations.
     """
     residual = noise.value - prediction[:, noise.rows]
     known = np.flatnonzero(np.isfinite(residual).all(axis=1))
@@ -202,10 +275,20 @@ def _apart(ends: list[MapEstimate]) -> list[MapEstimate]:
 
 @dataclass(frozen=True)
 class ModesAndErrors:
-    """Modes under the final errors, the best first; starts: number of members that the search started from.
+    """The modes of a posterior under the final errors.
 
-    standardised: T_i of each used station (n,), see `standardised_residual`; grid_error_known: whether the noise holds
-    the error of the grid.
+    Attributes
+    ----------
+    model : Model
+    noise : Noise
+    fits : tuple of MapEstimate
+        The best first.
+    starts : int
+        Number of members that the search started from.
+    standardised : ndarray (n,)
+        T_i of each used station, see `standardised_residual`.
+    grid_error_known : bool
+        Whether the noise holds the error of the grid.
     """
 
     model: Model
@@ -277,7 +360,20 @@ def modes_and_errors(model: Model, tried: TriedMembers, rule: str, watch: Watch)
 
 
 def standardised_residual(noise: Noise, point: Point) -> Array:
-    """T_i = e_i' M r / (e_i' M e_i)^(1/2) (n,): M is C^-1 with the slopes projected out; standard normal, each."""
+    """T_i = e_i' M r / (e_i' M e_i)^(1/2),   M = C^-1 with the slopes projected out
+
+    Parameters
+    ----------
+    noise : Noise
+        C is the covariance of its errors.
+    point : Point
+        Of the residual r and the slopes.
+
+    Returns
+    -------
+    ndarray (n,)
+        [standard errors], each standard normal under the null.
+    """
     inverse = np.linalg.solve(noise.lower.T, np.linalg.solve(noise.lower, np.eye(noise.rows.size)))
     slope = noise.used(point.slope)
     pulled = inverse @ slope

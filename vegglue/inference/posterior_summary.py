@@ -187,8 +187,17 @@ def on_flat_scale(case: Case, theta: dict[str, Array]) -> Array:
 
 
 def prior_mass_near_bounds(prior: Parameter) -> Array:
-    """Mass of the prior itself within NEAR_BOUND of its range of its low and high bound (2,) [-]: NEAR_BOUND of a flat
-    one, and more of one that ends where it is largest; NaN without both bounds.
+    """Mass of the prior within NEAR_BOUND of its range of either bound.
+
+    Parameters
+    ----------
+    prior : Parameter
+
+    Returns
+    -------
+    ndarray (2,)
+        Low and high [-]: NEAR_BOUND of a flat prior, and more of one that ends where it is largest; NaN without both
+        bounds.
     """
     low, high = _on_flat_scale(quantile(prior, (0.0, 1.0)), prior)
     if not np.isfinite(high - low):
@@ -201,9 +210,22 @@ def prior_mass_near_bounds(prior: Parameter) -> Array:
 def predictive_distribution(
     sample: WeightedSample, noise: Array, seed: int, factor: Array | None = None
 ) -> PredictiveDistribution:
-    """Bands at all stations, and draws of equal weight, f(theta) + e: e = noise * normal, or factor @ normal.
+    """Bands at all stations, and draws of f(theta) + e of equal weight.
 
-    noise: standard deviation of the errors (station,); factor: L with L L' their covariance (station, station).
+        e = noise * normal,   or   L normal with L L' the covariance of the errors
+
+    Parameters
+    ----------
+    sample : WeightedSample
+    noise : ndarray (station,)
+        Standard deviation of the errors [unit of each station].
+    seed : int
+    factor : ndarray (station, station), optional
+        L.
+
+    Returns
+    -------
+    PredictiveDistribution
     """
     prediction, weights, random = sample.prediction, sample.weights, np.random.default_rng(seed)
     draws = systematic_draws(weights, CHAINS * DRAWS_PER_CHAIN, random).reshape(CHAINS, DRAWS_PER_CHAIN)
@@ -276,7 +298,26 @@ def correct_phi_for_canopy(
 
 
 def corrected_canopy(theta: dict[str, Array], case: Case, weights: Array) -> CorrectedCanopy | None:
-    """phi of the vegetation type that `canopy_correction` names, for all members; None without that key."""
+    """phi of the vegetation type that `canopy_correction` names, see `correct_phi_for_canopy`.
+
+    Parameters
+    ----------
+    theta : dict of ndarray (m,)
+        Parameters of all members [unit of each].
+    case : Case
+    weights : ndarray (m,)
+        [-]
+
+    Returns
+    -------
+    CorrectedCanopy or None
+        None without that key.
+
+    Raises
+    ------
+    InputError
+        If that phi is no parameter.
+    """
     wanted = case.canopy_correction
     if wanted is None:
         return None

@@ -155,7 +155,18 @@ def refinable(case: Case) -> bool:
 
 
 def solved_for(model: Model, noise: Noise) -> Model:
-    """The model with its flows solved as exactly as measurements resolve, see DRAWN_WITHIN, or as the case states."""
+    """The model with its flows solved as exactly as measurements resolve.
+
+    Parameters
+    ----------
+    model : Model
+    noise : Noise
+
+    Returns
+    -------
+    Model
+        With a tolerance of DRAWN_WITHIN of the least standard error, or that of the case if it is larger.
+    """
     own = model.case.numerics
     tolerance = max(own.tolerance, DRAWN_WITHIN * float(noise.data_error.min()))
     numerics = own.model_copy(update={"tolerance": tolerance})
@@ -163,7 +174,21 @@ def solved_for(model: Model, noise: Noise) -> Model:
 
 
 def log_posterior(noise: Noise, z: Array, prediction: Array) -> Array:
-    """ln p(z | y) up to a constant (m,); z (m, p), prediction (m, station), NaN without a flow."""
+    """ln p(z | y) = -|W (y - f(z))|^2 / 2 - |z|^2 / 2, up to a constant
+
+    Parameters
+    ----------
+    noise : Noise
+    z : ndarray (m, p)
+        [standard deviations of the prior]
+    prediction : ndarray (m, station)
+        f [unit of each station], NaN without a flow.
+
+    Returns
+    -------
+    ndarray (m,)
+        [-]; -inf without a prediction at all used stations.
+    """
     known = np.isfinite(prediction[:, noise.rows]).all(axis=1)
     logs = np.full(len(z), -np.inf)
     left = noise.value - prediction[np.ix_(known, noise.rows)]

@@ -120,7 +120,19 @@ def solve_ensemble(
 
 
 def ensemble_hash(case: Case, given: PriorSample | None = None) -> str:
-    """Hash of what an ensemble depends on; of members that were given, their parameters too."""
+    """SHA-256 of what an ensemble depends on.
+
+    Parameters
+    ----------
+    case : Case
+    given : PriorSample, optional
+        Members that are not drawn from the priors, whose parameters count, too.
+
+    Returns
+    -------
+    str
+        Hexadecimal.
+    """
     own = simulation_hash(case)
     if given is None:
         return own
@@ -148,7 +160,22 @@ def refuse_too_many(case: Case, observations: Observations) -> None:
 
 
 def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[StartFrom, list[np.ndarray]]:
-    """Where members come from, and the members of each chunk; those that are few come from coarser cells."""
+    """Where members start from, and the members of each chunk, which lie near each other.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    points : ndarray (m, p)
+        Of the members in the unit cube of the priors.
+
+    Returns
+    -------
+    mapping of LinearisedMember or None
+        By experiment; empty for SPARSE_MEMBERS at most, which start from coarser cells.
+    list of ndarray of int
+        Members of each chunk.
+    """
     size = chunk_size(len(points), len(case.experiments))
     start_from = linearised_medians(case, site) if len(points) > SPARSE_MEMBERS else {}
     slopes = [one.slopes for one in start_from.values() if one is not None]
@@ -156,7 +183,18 @@ def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[Start
 
 
 def chunk_size(members: int, experiments: int) -> int:
-    """Members of a chunk at most; it depends on nothing but the size of the ensemble and the number of experiments."""
+    """Members of a chunk at most.
+
+    It depends on nothing but the size of the ensemble and the number of experiments.
+
+    Parameters
+    ----------
+    members, experiments : int
+
+    Returns
+    -------
+    int
+    """
     if members <= SPARSE_MEMBERS:
         return min(-(-members // 2), SPARSE_CHUNK if experiments == 1 else 2 * SPARSE_CHUNK)
     return min(max(-(-members // FEWEST_CHUNKS), CLUSTER_SIZE), LARGEST_CHUNK)
@@ -274,9 +312,22 @@ def _solve_numbered(
 def solve_chunk(
     case: Case, site: Site, observations: Observations, sample: PriorSample, start_from: StartFrom | None = None
 ) -> Rows:
-    """The rows of the ensemble file for the members of a sample, every experiment of the case, and as `fields`
-    (member, experiment, quantity, x, y) what is kept of their flow. start_from: where members come from, coarser cells
-    if not given.
+    """The rows of the ensemble file for the members of a sample, in every experiment of the case.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    observations : Observations
+    sample : PriorSample
+        Of the members.
+    start_from : mapping, optional
+        Where members come from by experiment; coarser cells if not given.
+
+    Returns
+    -------
+    dict of ndarray (member, ...)
+        By variable of the file, and as `fields` (member, experiment, quantity, x, y) what is kept of their flow.
     """
     solve = partial(solve_in_experiment, case, site, observations, start_from)
     return _rows_of_chunk(case, observations, [solve(experiment, sample) for experiment in case.experiments])
@@ -290,8 +341,24 @@ def solve_in_experiment(
     experiment: str,
     sample: PriorSample,
 ) -> Rows:
-    """What `_rows_of_chunk` takes of one experiment: predictions (member, station of the experiment), section flows
-    (member, section), fields (member, quantity, x, y), and the rest as it is stored.
+    """The rows of the members of a sample in one experiment.
+
+    Parameters
+    ----------
+    case : Case
+    site : Site
+    observations : Observations
+    start_from : mapping or None
+        Where members come from by experiment; coarser cells if None.
+    experiment : str
+    sample : PriorSample
+        Of the members.
+
+    Returns
+    -------
+    dict of ndarray (member, ...)
+        `prediction` (member, station of the experiment) [unit of each station], `section_flow` (member, section)
+        [m3/s], `fields` (member, quantity, x, y), and the rest as it is stored.
     """
     began = time.perf_counter()
     problem = build_problem(case, site, experiment, sample.theta)

@@ -41,14 +41,32 @@ class NamedParameter:
 
 @dataclass(frozen=True)
 class EnsembleWeighed:
+    """Members of an ensemble as a likelihood has weighed them.
+
+    Attributes
+    ----------
+    members, failed : int
+    likelihood : str
+    used, stations : int
+        Number of used stations, and of all.
+    sizes : tuple of (Kind, float)
+        Error of each kind of measurement [unit of the kind].
+    best_member : bool
+        Whether that is the RMSE of the best member; else it is known.
+    threshold : float
+        Smallest efficiency of a member with weight [-], -inf if there is none.
+    weighed : int
+        Number of members with weight.
+    """
+
     members: int
     failed: int
     likelihood: str
     used: int
     stations: int
     sizes: Sizes
-    best_member: bool  # sigma is the RMSE of the best member, else it is known
-    threshold: float  # smallest efficiency of a member with weight, -inf: none
+    best_member: bool
+    threshold: float
     weighed: int
 
 
@@ -99,8 +117,18 @@ class ErrorsEstimated:
 
 @dataclass(frozen=True)
 class ErrorsStated:
+    """Standard errors as stated, and what the covariance makes of them.
+
+    Attributes
+    ----------
+    stated, sizes : tuple of (Kind, float)
+        Before and after [unit of the kind].
+    grid_error : float
+        [m/s], NaN if the cells cannot be doubled.
+    """
+
     stated: Sizes
-    grid_error: float  # NaN if the cells cannot be doubled
+    grid_error: float
     sizes: Sizes
 
 
@@ -138,7 +166,18 @@ class WeightTailHeavy:
 
 @dataclass(frozen=True)
 class ParameterEstimated:
-    """power: median and standard deviation of its log10, None of a parameter that has none."""
+    """A parameter that is narrower than its prior.
+
+    Attributes
+    ----------
+    parameter : NamedParameter
+    median, sd, low, high : float
+        Median, standard deviation and 95 % interval [its unit].
+    share : float
+        Width over that of the prior [-].
+    power : (float, float) or None
+        Median and standard deviation of its log10, None of a parameter that has none.
+    """
 
     parameter: NamedParameter
     median: float
@@ -209,7 +248,17 @@ class BestMemberFit:
 
 @dataclass(frozen=True)
 class MisfitTested:
-    """chi2 of a refined posterior; outcome: untested, unexplained, hardly-explained, too-small or explained."""
+    """chi2 of a refined posterior.
+
+    Attributes
+    ----------
+    chi2 : float
+        [-]
+    freedom : int
+    p : float
+        P(chi2_f >= chi2) [-].
+    outcome : {"untested", "unexplained", "hardly-explained", "too-small", "explained"}
+    """
 
     chi2: float
     freedom: int
@@ -228,7 +277,17 @@ class StationsLeftOut:
 
 @dataclass(frozen=True)
 class GroupsLeftOutScore:
-    """Sections and experiments left out in turn; scores are ln densities of a station in its errors."""
+    """Sections and experiments left out in turn.
+
+    Attributes
+    ----------
+    groups : int
+        How many.
+    worst : str
+        The one with the lowest score.
+    score, median : float
+        Its score, and the median of all: mean ln density of a station in its errors [-].
+    """
 
     groups: int
     worst: str
@@ -251,7 +310,18 @@ class BandCoverage:
 
 @dataclass(frozen=True)
 class StationsStandOut:
-    """Stations whose residual is no chance; the one that stands out most, by so many of its errors."""
+    """Stations whose residual is no chance.
+
+    Attributes
+    ----------
+    count : int
+    experiment, section : str
+        Of the one that stands out most.
+    x, y : float
+        [m]
+    errors : float
+        Its residual [standard errors].
+    """
 
     count: int
     experiment: str
@@ -268,8 +338,23 @@ class NothingToCompare:
 
 @dataclass(frozen=True)
 class ParameterBetweenExperiments:
-    """Values of one parameter from each experiment alone, (experiment, value, standard error); reference: chi2 of the
-    source, None without; outcome: one-value, hardly-one-value or differs.
+    """Values of one parameter from each experiment alone.
+
+    Attributes
+    ----------
+    parameter : NamedParameter
+    logarithmic : bool
+        Whether values are log10 of the parameter.
+    values : tuple of (str, float, float)
+        Experiment, value and standard error.
+    chi2 : float
+        About the weighted mean [-].
+    freedom : int
+    p : float
+        [-]
+    reference : float or None
+        chi2 of the source, None without [-].
+    outcome : {"one-value", "hardly-one-value", "differs"}
     """
 
     parameter: NamedParameter
@@ -290,7 +375,21 @@ class ParametersAlike:
 
 @dataclass(frozen=True)
 class MisfitOfExperiments:
-    """chi2 together and alone (NaN: not found) over so many stations, by experiment."""
+    """Misfit with one value of each parameter for all experiments, and with values of their own.
+
+    Attributes
+    ----------
+    experiments : tuple of (str, float, float, int)
+        Experiment, chi2 together and alone (NaN: not found) [-], and number of stations.
+    scale : float
+        Of the standard errors [-].
+    gain : float
+        Fall of chi2 with values of their own [-].
+    more : int
+        Parameters more.
+    p : float
+        That errors alone gain as much [-].
+    """
 
     experiments: tuple[tuple[str, float, float, int], ...]
     scale: float
@@ -348,8 +447,19 @@ def posterior_statements(
 ) -> list[object]:
     """All that a posterior states.
 
-    In this order: members, weights, each parameter, correlations, the fit, stations left out, whether the experiments
-    agree, the corrected canopy. others: the reference table of the case, by key; symbols: of parameters, by name.
+    Parameters
+    ----------
+    posterior : Posterior
+    others : mapping, optional
+        The reference table of the case, by key.
+    symbols : mapping of str, optional
+        Of parameters, by name.
+
+    Returns
+    -------
+    list
+        In this order: members, weights, each parameter, correlations, the fit, stations left out, whether the
+        experiments agree, the corrected canopy, and at which discharge measurements would test a surrogate.
     """
     return [
         *sample_statements(posterior, symbols),
@@ -393,7 +503,21 @@ def measurement_error(posterior: Posterior, kind: str) -> float:
 
 
 def sample_statements(posterior: Posterior, symbols: Mapping[str, str] | None = None) -> Iterator[object]:
-    """How the members were made and weighed, and under which errors."""
+    """How the members were made and weighed, and under which errors.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    symbols : mapping of str, optional
+        Of parameters, by name.
+
+    Yields
+    ------
+    EnsembleWeighed
+        Alone, without a refinement.
+    SearchSummary, SurrogateLearned, ModeFound, ErrorsEstimated, ErrorsStated, ErrorsScaled, ErrorsCorrelated
+        With one; modes if there is more than one.
+    """
     settings, sample, refined = posterior.settings, posterior.sample, posterior.refinement
     sizes = _sizes_of(posterior.fit.sigma)
     if refined is None:
@@ -477,7 +601,22 @@ def off_its_prior(posterior: Posterior, name: str) -> bool:
 
 
 def parameter_statements(posterior: Posterior, name: str, symbols: Mapping[str, str] | None = None) -> Iterator[object]:
-    """What is known of a parameter, the bounds it presses against, and whether it lies off its prior."""
+    """What is known of a parameter, the bounds it presses against, and whether it lies off its prior.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    name : str
+    symbols : mapping of str, optional
+        Of parameters, by name.
+
+    Yields
+    ------
+    ParameterEstimated or ParameterNotIdentified
+    ParameterAtBound
+        Of each such bound.
+    ParameterOffPrior
+    """
     marginals, parameter = posterior.marginals, parameter_of(posterior, name, symbols)
     low, high = (float(value) for value in marginals.quantiles[name][[0, -1]])
     share = marginals.width_ratio[name]
@@ -619,8 +758,24 @@ def stations_standing_out(posterior: Posterior) -> Iterator[StationsStandOut]:
 def transfer_statements(
     posterior: Posterior, others: Mapping[str, object], symbols: Mapping[str, str] | None = None
 ) -> Iterator[object]:
-    """Whether one value of each parameter fits all experiments: each parameter, that of the largest chi2 first, then
-    the misfits, under which errors, and what follows. others: the reference table of the case, by key.
+    """Whether one value of each parameter fits all experiments.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    others : mapping
+        The reference table of the case, by key.
+    symbols : mapping of str, optional
+        Of parameters, by name.
+
+    Yields
+    ------
+    ParameterBetweenExperiments
+        That of the largest chi2 first.
+    ParametersAlike
+        The others.
+    MisfitOfExperiments, ErrorsOfComparison
+    CalibrationTransfers or CalibrationDiffers
     """
     transfer = posterior.transfer
     if transfer is None:

@@ -66,27 +66,46 @@ JITTER = 1e-9
 
 @dataclass(frozen=True)
 class Difference:
-    """d of m runs, see the head of this file."""
+    """d of m runs, see the head of this file.
 
-    # names, station: parameters of the command, and the stations (n rows)
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters of the command (q).
+    station : DataFrame
+        The stations (n rows).
+    centre, lower : ndarray (q,), (q, q)
+        u = lower^-1 (z - centre), z (q,) those of the command.
+    u : ndarray (m, q)
+        Places of the runs.
+    length, nugget : float
+        l and t^2.
+    factor : ndarray (m, m)
+        Lower Cholesky factor of K.
+    projected : ndarray (m, q + 1)
+        factor^-1 H.
+    inner : ndarray (q + 1, q + 1)
+        Lower Cholesky factor of its square.
+    trend : ndarray (q + 1, n)
+        B.
+    weights : ndarray (m, n)
+        K^-1 (D - H B).
+    directions, size : ndarray (r, used stations), (r,)
+        Whitened by C, S = directions' diag(size) directions.
+    """
+
     names: tuple[str, ...]
     station: pd.DataFrame
-    # centre, lower: u = lower^-1 (z - centre), z (q,) those of the command
     centre: Array
     lower: Array
-    # u, length, nugget: places of the runs (m, q), l and t^2
     u: Array
     length: float
     nugget: float
-    # factor, projected, inner: lower Cholesky factor of K (m, m), factor^-1 H (m, q + 1), and that of its square (q +
-    # 1, q + 1)
     factor: Array
     projected: Array
     inner: Array
-    # trend, weights: B (q + 1, n) and K^-1 (D - H B) (m, n)
     trend: Array
     weights: Array
-    # directions, size: whitened by C, S = directions' diag(size) directions: (r, used stations) and (r,)
     directions: Array
     size: Array
 
@@ -222,7 +241,18 @@ def _residuals_along(difference: Difference, u: Array, left: Array) -> tuple[Arr
 
 @dataclass(frozen=True)
 class CommandToLearn:
-    """A command, where it has run (m, q) [standard deviations of the prior], runs that failed, and most runs."""
+    """A command, and where it has run.
+
+    Attributes
+    ----------
+    runs : CommandRuns
+    run : ndarray (m, q)
+        [standard deviations of the prior]
+    failed : int
+        Runs that failed.
+    most : int
+        Runs at most.
+    """
 
     runs: CommandRuns
     run: Array
@@ -232,8 +262,16 @@ class CommandToLearn:
 
 @dataclass(frozen=True)
 class Learned:
-    """A surrogate: its modes, with its engine and its mean error in the noise; ln p(z | y) of z (k, p) and predictions
-    (k, station) up to a constant; and what it rests on.
+    """A surrogate of a command.
+
+    Attributes
+    ----------
+    base : ModesAndErrors
+        Its modes, with its engine and its mean error in the noise.
+    density : callable
+        z (k, p), predictions (k, station) -> ln p(z | y) up to a constant (k,).
+    result : Surrogate
+        What it rests on.
     """
 
     base: ModesAndErrors

@@ -222,10 +222,23 @@ def pareto_shape(weights: Array) -> float:
 
 
 def pareto_smoothed(log_weights: Array) -> tuple[Array, float]:
-    """Weights (m,) of sum 1, the largest replaced by quantiles of the Pareto distribution fitted to them; and k-hat.
+    """Weights of which the largest are replaced by quantiles of the Pareto distribution fitted to them.
 
-    Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html. With fewer than 5 large weights nothing is replaced:
-    k-hat is then NaN, or infinite if their effective number is below 5.
+    Parameters
+    ----------
+    log_weights : ndarray (m,)
+        Up to a constant [-].
+
+    Returns
+    -------
+    weights : ndarray (m,)
+        Of sum 1 [-]; with fewer than 5 large weights nothing is replaced.
+    k : float
+        k-hat [-]; then NaN, or infinite if their effective number is below 5.
+
+    References
+    ----------
+    Vehtari et al. (2024), https://jmlr.org/papers/v25/19-556.html.
     """
     weights = np.exp(log_weights - np.max(log_weights))
     order = np.argsort(weights, kind="stable")
@@ -283,7 +296,15 @@ def stations_by_kind(station: pd.DataFrame) -> dict[str, NDArray[np.intp]]:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Log predictive density of what was left out [-], and k-hat of the weights that leave it out."""
+    """What is predicted of measurements that are left out.
+
+    Attributes
+    ----------
+    score : float
+        Log predictive density [-].
+    k : float
+        k-hat of the weights that leave them out [-].
+    """
 
     score: float
     k: float
@@ -291,7 +312,17 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class StationScores:
-    """Each station (n,) given all others: log predictive density, k-hat, and the share of its prediction below it."""
+    """Each station given all others.
+
+    Attributes
+    ----------
+    score : ndarray (n,)
+        Log predictive density [-].
+    k : ndarray (n,)
+        k-hat of the weights that leave it out [-].
+    below : ndarray (n,)
+        Share of its prediction below it [-].
+    """
 
     score: Array
     k: Array
