@@ -28,6 +28,7 @@ from vegglue.calibration.residual_screening import (
 from vegglue.calibration.score_test import HypothesisKind, alarm_p
 from vegglue.case.config import load_case
 from vegglue.case.schema import EffectEntry
+from vegglue.decision_constants import constants
 from vegglue.effects.definition import Amplitude
 from vegglue.engine.interface import Point
 
@@ -106,6 +107,18 @@ def test_a_barrier_is_among_what_is_missing_but_leaves_the_errors_as_they_are() 
     of_each = [_plausible(noise, one, instruments_of(STATION)) for one in (prints, spots)]
     assert np.array_equal(*of_each)
     assert "barrier" in [one.name for one in screening.kinds]
+
+
+def test_an_offset_is_as_large_as_the_errors_of_its_own_readings() -> None:
+    """A gauge of 2 mm was allowed six times the median of all errors, 6 cm, for 1 cm/s of the velocities."""
+    gauged = ((STATION["section"] == "A") & (STATION["y"] == 0.0)).to_numpy()
+    worse = (STATION["y"] == 5.0).to_numpy()
+    errors = np.select([gauged, worse], [0.002, 0.03], 0.01)
+    station = STATION.assign(kind=np.where(gauged, "level", "velocity"), standard_error=errors, value=0.0)
+    instruments, none = instruments_of(station), screened(np.zeros(len(station)), effects=0).fingerprints
+    plausible = _plausible(noise_of(station), replace(none, places=()), instruments)
+    for offset in (constants().gauge_offset * 0.002 * gauged, constants().probe_offset * 0.03 * worse):
+        assert np.isclose(plausible, offset[:, None]).all(axis=0).any()
 
 
 def test_every_kind_is_as_likely_before() -> None:

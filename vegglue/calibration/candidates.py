@@ -8,7 +8,7 @@ An instrument is found by its offset. A probe may be off by a factor, too: once 
 """
 
 import itertools
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -477,6 +477,24 @@ def plausible_offset(kind: InstrumentKind) -> float:
     of = constants()
     of_probe = {"position": of.probe_offset, "probe": of.probe_offset}
     return {"reading": of.reading_offset, "gauge": of.gauge_offset, "line": of.line_offset, **of_probe}[kind]
+
+
+def median_errors(instruments: Sequence[Instrument], error: Array) -> Array:
+    """What `plausible_offset` is a multiple of: the median standard error of the readings of each instrument.
+
+    Parameters
+    ----------
+    instruments : sequence of Instrument
+        k of them.
+    error : ndarray (n,)
+        Standard errors of the used stations [unit of each].
+
+    Returns
+    -------
+    ndarray (k,)
+        [unit of its readings]; of surveyed lines 1 m.
+    """
+    return np.array([1.0 if one.line else np.median(error[list(one.readings)]) for one in instruments])
 
 
 def instruments_of(used: pd.DataFrame) -> dict[InstrumentKind, tuple[Instrument, ...]]:

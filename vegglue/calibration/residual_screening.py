@@ -22,6 +22,7 @@ from vegglue.calibration.candidates import (
     Instrument,
     InstrumentKind,
     instruments_of,
+    median_errors,
     offset_columns,
     plausible_offset,
     start_with,
@@ -289,8 +290,7 @@ def kinds_of_instruments(
     """
     kinds = []
     for name, of_kind in projected.items():
-        of = [1.0 if i.line else np.median(noise.error[list(i.readings)]) for i in instruments[name]]
-        plausible = plausible_offset(name) * np.array(of)
+        plausible = plausible_offset(name) * median_errors(instruments[name], noise.error)
         known = np.array([i.line is None and set(i.readings) <= set(flagged) for i in instruments[name]])
         prior = np.full(plausible.size, 1.0 / (GROUPS * len(projected) * plausible.size))
         kinds.append(kind_of_hypotheses(name, of_kind, np.where(known, 0.0, plausible), prior))
@@ -310,8 +310,9 @@ def _plausible(
     spots = [one for one in fingerprints.places if one.term != "barrier"]
     parts += [noise.used(one.fingerprints) * (of_spots * one.plausible) for one in spots]
     for name in ("position", "probe", "gauge"):
-        columns = offset_columns(instruments[name], noise.rows.size)
-        parts.append(columns * (plausible_offset(name) * float(np.median(noise.error))))
+        some = instruments[name]
+        sizes = plausible_offset(name) * median_errors(some, noise.error)
+        parts.append(offset_columns(some, noise.rows.size) * sizes)
     if fingerprints.lines is not None:
         parts.append(plausible_offset("line") * noise.used(fingerprints.of_lines))
     return np.hstack(parts)

@@ -15,7 +15,14 @@ import numpy as np
 from scipy.special import ndtri
 
 from vegglue.arrays import Array
-from vegglue.calibration.candidates import Candidate, cause_of, instruments_of, offset_columns, plausible_offset
+from vegglue.calibration.candidates import (
+    Candidate,
+    cause_of,
+    instruments_of,
+    median_errors,
+    offset_columns,
+    plausible_offset,
+)
 from vegglue.calibration.detection import PLANNED_POWER, detected_length, detection_chance, single_threshold
 from vegglue.calibration.fingerprints import Fingerprints, consecutive_columns, places_of
 from vegglue.calibration.model_error import EFFECT_AT_PLACE
@@ -389,7 +396,7 @@ def _instruments(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedInstrument
         of_kind = next((some for name, some in instruments.items() if name == kind.name), None)
         if not of_kind:
             continue
-        error = np.array([np.median(shown.noise.error[list(one.readings)]) for one in of_kind])
+        error = median_errors(of_kind, shown.noise.error)
         threshold = single_threshold(kind.size, kind.log_prior, shown.level)
         threshold = np.maximum(threshold, constants().instrument_errors)
         smallest = detected_length(threshold) / np.maximum(kind.projected.length, 1e-300) / error
