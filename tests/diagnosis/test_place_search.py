@@ -19,6 +19,7 @@ from vegglue.case.parameter_space import z_of
 from vegglue.decision_constants import constants, using
 from vegglue.diagnosis.competition import (
     Hypothesis,
+    Window,
     cannot_be,
     chances_of,
     found_place,
@@ -88,6 +89,26 @@ def test_something_between_the_spots_is_found_where_it_lies(drag: float) -> None
     assert away(dict(found.refit.shapes)) < 0.35
     assert found.refit.amplitude * drag > 0.0
     assert abs(found.refit.shapes["x"] - 14.3) < 2.0 * found.spread[0] + 0.1
+
+
+@pytest.mark.parametrize(("across", "kept"), [(1, 4.0 + 9 / 2), (9, 81.0 - 25.0 + 81 / 4)])  # a barrier, a spot
+def test_a_window_counts_by_the_places_that_it_has_seen_again(
+    monkeypatch: pytest.MonkeyPatch, across: int, kept: float
+) -> None:
+    """Where ln B is the same everywhere, places half as far apart count half each along every axis that they span."""
+    steps = np.arange(9.0)
+    x, y = (one.ravel() for one in np.meshgrid(steps, steps[:across]))
+    zero, one, spot = np.zeros(x.size), np.ones(x.size), int(x.size // 2)
+    places = Places("barrier" if across == 1 else "drag", x, y, one, one, 1.0, zero[None])
+    near = Window(0.5 * (x + x[spot]), 0.5 * (y + y[spot]), zero, zero)
+    monkeypatch.setattr("vegglue.diagnosis.competition.window_around", lambda *_: near)
+    prior = 1.0 / x.size
+    logs = zero + np.log(prior)
+    kind: Any = SimpleNamespace(scores=zero, size=zero, log_evidence=logs, log_prior=logs)
+    refit: Any = SimpleNamespace(log_factor=0.0, shapes=places.shapes(spot))
+    nothing: Any = None
+    found = found_place(nothing, places, kind, spot, refit)
+    assert found.log_evidence == pytest.approx(np.log(kept * prior))
 
 
 def test_nothing_more_is_looked_for_where_something_acts_already() -> None:

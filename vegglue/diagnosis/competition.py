@@ -250,8 +250,10 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
     far = ~((places.length == places.length[spot]) & within)
     # Elsewhere first-order evidence promises as much too much as at the spot that was refitted.
     kept = refit.log_factor - float(log_factors(kind.scores, kind.size)[spot])
+    # A barrier has its places along the channel alone, and so has all else in a flume as narrow as a spot.
+    axes = sum(float(np.ptp(coordinate)) > 0.0 for coordinate in (window.x, window.y))
     weight = np.concatenate(
-        [kind.log_evidence[far] + kept, window.log_factor + kind.log_prior[spot] + 2.0 * np.log(SHARE_OF_SPACING)]
+        [kind.log_evidence[far] + kept, window.log_factor + kind.log_prior[spot] + axes * np.log(SHARE_OF_SPACING)]
     )
     away = np.stack([
         np.concatenate([places.x[far], window.x]) - moved.shapes["x"],
