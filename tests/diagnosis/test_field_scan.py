@@ -115,6 +115,17 @@ def test_the_map_is_the_mean_of_the_field_after_the_data() -> None:
     assert np.median([abs(mapped.value[cell] - truth[cell]) for cell in SEEN]) < 0.15
 
 
+def test_a_field_is_charged_for_those_alone_that_compete() -> None:
+    """Between walls water that enters was counted, too: all other fields were less likely by a quarter."""
+    search = searched(seen_in(smooth_field()))
+    walls = CASE_OF_TWINS.friction.model_copy(update={"walls": FrictionClass(law="manning", n=0.01)})
+    case = search.model.case.model_copy(update={"friction": walls})
+    within = replace(search, model=replace(search.model, case=case))
+    (open_air, *_), (between, *_) = (fields_by_evidence(one, 1.5)[0] for one in (search, within))
+    assert open_air.term == between.term == "friction"
+    assert between.log_factor - open_air.log_factor == pytest.approx(np.log(4 / 3))
+
+
 def test_the_field_is_known_better_where_it_is_seen() -> None:
     search = searched(seen_in(smooth_field()))
     one = hypothesis()

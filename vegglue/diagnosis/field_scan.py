@@ -125,7 +125,7 @@ def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHy
 
 
 def fields_by_evidence(search: SearchModel, half_width: float) -> tuple[list[FieldHypothesis], CellResponses]:
-    """The best field of each term; all terms, shapes and sizes are as likely before.
+    """The best field of each term; all terms that compete, shapes and sizes are as likely before.
 
     Parameters
     ----------
@@ -141,11 +141,10 @@ def fields_by_evidence(search: SearchModel, half_width: float) -> tuple[list[Fie
     """
     fields, responses = scanned_fields(search, half_width)
     found = []
-    for term, sizes in FIELD_SIZES.items():
+    competing = dict.fromkeys(one.term for one in fields)
+    for term in competing:
         of_term = [one for one in fields if one.term == term]
-        if not of_term:
-            continue
-        prior = -np.log(GROUPS * len(FIELD_SIZES) * len(FIELD_SHAPES) * len(sizes))
+        prior = -np.log(GROUPS * len(competing) * len(of_term))
         total = float(np.logaddexp.reduce([one.log_factor for one in of_term])) + prior
         found.append(replace(of_term[0], log_factor=total))
     return sorted(found, key=lambda one: -one.log_factor), responses
