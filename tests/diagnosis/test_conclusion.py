@@ -16,6 +16,7 @@ from vegglue.calibration.baseline import Baseline
 from vegglue.calibration.candidates import with_effect
 from vegglue.calibration.fingerprints import least_depth
 from vegglue.calibration.fit import fit
+from vegglue.calibration.model_error import gaussian_basis
 from vegglue.calibration.noise import noise_of, with_correlation, with_grid_error
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.case.channel_geometry import site_scales
@@ -37,6 +38,7 @@ from vegglue.diagnosis.conclusion import (
     shear_layers,
     significant_effects,
 )
+from vegglue.diagnosis.field_scan import FieldHypothesis, FieldMap
 from vegglue.diagnosis.search_state import SearchState, Undecided
 from vegglue.effects.definition import Amplitude
 from vegglue.engine.interface import flow_at_centres
@@ -247,3 +249,26 @@ def test_a_fault_of_the_probes_near_the_inflow_may_be_an_inflow_that_develops() 
     assert found.depths == pytest.approx(found.distance / depth)
     far = model.station.assign(x=model.station["x"] + 100.0 * depth)
     assert list(inflow_develops(replace(model, station=far), [f"probe_gain[{near}]"])) == []
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.5, "inflow"), (3.0, "bed")])
+def test_no_more_water_enters_over_a_field_than_flows(monkeypatch: pytest.MonkeyPatch, share: float, kept: str) -> None:
+    """Water that enters, in m/s, was compared with a discharge in m3/s: no field of it was ever impossible."""
+    model, point = coarse_twin()
+    grid, discharge = model.site.grid, site_scales(model.case, model.site).discharge
+    area = grid.dx * grid.x.size * grid.dy * grid.y.size
+    value = np.full((grid.x.size, grid.y.size), share * discharge / area)
+    over = gaussian_basis(grid, 1.5, 1.5)
+    fields = [FieldHypothesis("inflow", over, 1e-3, 50.0), FieldHypothesis("bed", over, 0.05, 50.0)]
+    maps = {
+        "inflow": FieldMap(value, 0.1 * value, (share * discharge, 0.1 * discharge)),
+        "bed": FieldMap(0.1 * np.ones_like(value), 0.01 * np.ones_like(value), (0.1 * area, 0.01 * area)),
+    }
+    monkeypatch.setattr(conclusion, "fields_by_evidence", lambda *_: (fields, SimpleNamespace(grid=grid)))
+    monkeypatch.setattr(conclusion, "map_of_field", lambda _search, _responses, one: maps[one.term])
+    search: Any = SimpleNamespace(model=model, point=point)
+    screening: Any = SimpleNamespace(search=search, base=SimpleNamespace(model=model))
+    misfit: Any = SimpleNamespace(p=0.0)
+    found, _ = conclusion._field(screening, screening, SearchState(), misfit)
+    assert found is not None
+    assert found.term == kept

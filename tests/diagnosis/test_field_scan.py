@@ -115,6 +115,18 @@ def test_the_map_is_the_mean_of_the_field_after_the_data() -> None:
     assert np.median([abs(mapped.value[cell] - truth[cell]) for cell in SEEN]) < 0.15
 
 
+def test_the_total_is_the_integral_of_the_map_and_as_uncertain_as_its_bumps() -> None:
+    """c' (1 + F' (C + J J')^-1 F)^-1 c, c the areas of the bumps."""
+    search, one = searched(seen_in(smooth_field())), hypothesis()
+    mapped = map_of_field(search, responses(), one)
+    assert mapped.total[0] == pytest.approx(float(mapped.value.sum()) * GRID.dx * GRID.dy)
+    columns = one.size * field_columns(responses(), one.term, one.over)
+    known = np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ np.linalg.solve(parts(search)[0], columns))
+    variance = (one.over.along**2).sum(axis=0).mean() * (one.over.across**2).sum(axis=0).mean()
+    areas = one.size / np.sqrt(variance) * one.over.areas(GRID).ravel()
+    assert mapped.total[1] == pytest.approx(np.sqrt(areas @ known @ areas), rel=1e-4)
+
+
 def test_a_field_is_charged_for_those_alone_that_compete() -> None:
     """Between walls water that enters was counted, too: all other fields were less likely by a quarter."""
     search = searched(seen_in(smooth_field()))

@@ -676,7 +676,8 @@ def _field(
 ) -> tuple[FieldFound, FieldMapKept] | tuple[None, None]:
     """A smooth field of one term and its map, where it explains the misfit of the first model better than all that was
     accepted, or closes a misfit in which nothing was; None where there is nothing to explain, or where a place of the
-    same term explains it with fewer numbers. A field that cannot be where it is clearest is passed over.
+    same term explains it with fewer numbers. A field that cannot be where it is clearest, or by which more water enters
+    than flows, is passed over.
     """
     if found.implausible or (not (found.accepted or found.undecided) and misfit.p >= constants().poor_fit_chance):
         return None, None
@@ -704,8 +705,10 @@ def _field(
             x=float(grid.x[i]),
             y=float(grid.y[j]),
         )
-        half, possible = NORMAL95 * most.error, possible_change(search.model, search.point, best.term, most.x, most.y)
-        if not cannot_be((most.value - half, most.value + half), possible):
+        # Water that enters is limited as a discharge, by all that enters over the field.
+        value, error = mapped.total if best.term == "inflow" else (most.value, most.error)
+        half, possible = NORMAL95 * error, possible_change(search.model, search.point, best.term, most.x, most.y)
+        if not cannot_be((value - half, value + half), possible):
             return most, FieldMapKept(grid.x, grid.y, mapped.value, mapped.error)
     return None, None
 

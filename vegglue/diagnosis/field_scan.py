@@ -68,10 +68,13 @@ class FieldHypothesis:
 
 @dataclass(frozen=True)
 class FieldMap:
-    """The field (nx, ny) [unit of its term] at cell centres, and its standard error."""
+    """The field (nx, ny) [unit of its term] at cell centres, and its standard error; total: its integral over the grid,
+    and standard error [unit of its term times m2].
+    """
 
     value: Array
     error: Array
+    total: tuple[float, float]
 
 
 def field_sizes(model: Model) -> dict[Term, tuple[float, ...]]:
@@ -155,7 +158,7 @@ def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypoth
 
         value = sum_k a_k phi_k,   var = phi' phi - |L^-1 F phi|^2,   L L' = F F' + C + J J'
 
-    Before the data a ~ N(0, 1).
+    Before the data a ~ N(0, 1). The integral is that of phi in its place.
 
     Parameters
     ----------
@@ -174,13 +177,19 @@ def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypoth
     columns = search.noise.used(field_columns(responses, one.term, one.over)) * one.size
     factor = scipy.linalg.cho_factor(whole + columns @ columns.T, lower=True)
     shape = (one.over.x.size, one.over.y.size)
-    sizes = (columns.T @ scipy.linalg.cho_solve(factor, residual)).reshape(shape)
+    of_bumps = columns.T @ scipy.linalg.cho_solve(factor, residual)
+    sizes, areas = of_bumps.reshape(shape), one.over.areas(responses.grid).ravel()
     of_cells = np.einsum("nab,ai,bj->nij", columns.reshape(-1, *shape), along, across, optimize=True)
     white = scipy.linalg.solve_triangular(factor[0], of_cells.reshape(len(columns), -1), lower=True)
     before = (along**2).sum(axis=0)[:, None] * (across**2).sum(axis=0)[None]
     variance = before - (white**2).sum(axis=0).reshape(before.shape)
-    unit = one.size / scale
-    return FieldMap(unit * (along.T @ sizes @ across), unit * np.sqrt(np.maximum(variance, 0.0)))
+    seen = scipy.linalg.solve_triangular(factor[0], columns @ areas, lower=True)
+    unit, of_total = one.size / scale, max(float(areas @ areas - seen @ seen), 0.0)
+    return FieldMap(
+        value=unit * (along.T @ sizes @ across),
+        error=unit * np.sqrt(np.maximum(variance, 0.0)),
+        total=(float(unit * areas @ of_bumps), float(unit * np.sqrt(of_total))),
+    )
 
 
 def free_of_prior(search: SearchModel) -> tuple[Array, Array]:
