@@ -8,7 +8,7 @@ import yaml
 from reach import write_reach
 
 from vegglue.case.bed import read_raster
-from vegglue.case.channel_geometry import channel_geometry
+from vegglue.case.channel_geometry import channel_geometry, site_scales
 from vegglue.case.config import load_case
 from vegglue.case.grid import Grid
 from vegglue.case.gridded_site import Site, build_site, cells_at, in_experiment, rims
@@ -261,3 +261,23 @@ def test_the_rim_of_a_hollow_beside_the_inflow(rows: list[list[float]], expected
     nowhere = np.full(bed.shape, -1)
     site = Site(Grid(np.arange(3.0), np.arange(4.0), 1.0, 1.0), bed, nowhere + 1, ("bed",), nowhere, 0.0 * bed)
     assert rims(site, "west", 0, 4)[:, 0] == pytest.approx(expected)
+
+
+def test_scales_of_a_site_are_those_of_its_priors() -> None:
+    """A case with another prior of a parameter, or least argument of the logarithm, was given those of the first."""
+    case = load_case(CONFIGS / "twin.yaml")
+    first = site_scales(case)
+    taller = case.parameters["canopy_height"].model_copy(update={"mean": 1.0})
+    priors = {**case.parameters, "canopy_height": taller}
+    assert site_scales(case.model_copy(update={"parameters": priors})).canopy > first.canopy + 0.2
+    assert site_scales(case.model_copy(update={"parameters": dict(case.parameters)})) is first
+    # A floor so rough that its Chézy coefficient is the least one.
+    rough = case.parameters["k_s"].model_copy(update={"low": 20.0, "high": 30.0})
+    of_floor = case.friction.model_copy(update={"default": "bank"})
+    floor = case.model_copy(update={"friction": of_floor, "parameters": {**case.parameters, "k_s": rough}})
+    cases = [
+        floor.model_copy(update={"numerics": case.numerics.model_copy(update={"bank_argument_minimum": least})})
+        for least in (2.0, 4.0)
+    ]
+    shear = [site_scales(one).shear_velocity for one in cases]
+    assert shear[0] > 1.5 * shear[1]

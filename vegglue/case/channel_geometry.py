@@ -240,7 +240,7 @@ TAIL = 1e-3
 LEAST_STREAM = 0.1
 # Cases whose scales are kept: one, its children and those of held-out experiments.
 SCALES_KEPT = 16
-_kept: OrderedDict[tuple[int, ...], tuple[tuple[object, ...], SiteScales]] = OrderedDict()
+_kept: OrderedDict[tuple[float, ...], tuple[tuple[object, ...], SiteScales]] = OrderedDict()
 
 
 def site_scales(case: Case, site: Site | None = None) -> SiteScales:
@@ -248,7 +248,7 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
 
     With a water surface parallel to the floor, as `expected_depth` has it, and S the slope of the bed if Manning's n or
     the roughness between the ends of its prior can balance it, else S = (U / (C h^(1/2)))^2 of the middle of the prior.
-    Kept for the parts of the case on which they depend, which its children and its coarser grids share.
+    Kept for the parts of the case and the priors on which they depend, which its children and its coarser grids share.
 
     Parameters
     ----------
@@ -256,8 +256,13 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
     site : Site, optional
         On its grid, if it is at hand.
     """
-    parts = (case.bed, case.experiments, case.friction, case.plants, case.eddy_viscosity)
-    key = tuple(map(id, parts))
+    of_floor, stands = case.friction.classes[case.friction.default], case.plants.stands.values()
+    values = [of_floor.coefficient, case.eddy_viscosity, *(one.canopy_height for one in stands)]
+    for setting in case.experiments.values():
+        values += [setting.level, *setting.discharge.values()]
+    priors = [case.parameters[value] for value in values if isinstance(value, str)]
+    parts = (case.bed, case.experiments, case.friction, case.plants, case.eddy_viscosity, *priors)
+    key = (case.numerics.bank_argument_minimum, *map(id, parts))
     if kept := _kept.get(key):
         return kept[1]
     site = build_site(case) if site is None else site
@@ -282,7 +287,6 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
     width = half_width(site)
     depth = float(np.mean(depths)) if depths else width
     speed = max(float(np.mean(speeds)) if speeds else 1.0, 1e-3 * (GRAVITY * depth) ** 0.5)
-    of_floor = case.friction.classes[case.friction.default]
     slopes = []
     for share in (0.0, 0.5, 1.0):
         coefficient = value_at(case, of_floor.coefficient, share)
@@ -296,7 +300,7 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
     slope = fall if slopes[0] <= fall <= slopes[2] else slopes[1]
     surveys = [layer.survey for layer in case.bed if layer.survey is not None]
     of_points = [sum(one.chance * one.point_error for one in survey.covariances) for survey in surveys]
-    heights = [middle_value(case, one.canopy_height) for one in case.plants.stands.values()]
+    heights = [middle_value(case, one.canopy_height) for one in stands]
     patches = [site.patch == index for index in np.unique(site.patch[site.patch >= 0])]
     lengths = [float(one.any(axis=1).sum() * site.grid.dx) for one in patches]
     widths = [float(one.any(axis=0).sum() * site.grid.dy) for one in patches]
