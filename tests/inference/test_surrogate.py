@@ -1,6 +1,7 @@
 """A posterior of a command by few runs: the process that is learned, what fails, what is kept, and what is reported."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,10 +10,15 @@ from reach import COARSE, write_reach
 
 import vegglue
 from vegglue.calibration.noise import noise_of
+from vegglue.case.parameter_space import z_at
+from vegglue.engine.interface import predict
 from vegglue.engine.model import model_of
 from vegglue.errors import InputError
-from vegglue.inference.surrogate import Difference, gaussian_process
+from vegglue.inference.importance_sampling import mixture_at_modes
+from vegglue.inference.posterior_modes import modes_and_errors, points_of_prior
+from vegglue.inference.surrogate import CommandToLearn, Difference, gaussian_process, learn
 from vegglue.measurements.observations import read_observations
+from vegglue.progress import silent
 
 NAMES = ("n_b", "phi")
 
@@ -77,6 +83,33 @@ def test_slopes_are_those_of_its_mean(tmp_path: Path) -> None:
     elsewhere = model.station.assign(x=model.station["x"] + 0.25)
     assert not found.at(model.__class__(case, model.site, elsewhere, model.engine), here)[0].any()
     assert value.any()
+
+
+def test_first_runs_that_fail_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One whose kept result was gone and that failed again was dropped, and one run more was made."""
+    case = vegglue.load_case(
+        write_reach(tmp_path, COARSE, ("experiment: June}", "experiment: June, standard_error: 0.02}"))
+    )
+    model = model_of(case, read_observations(case))
+    asked: list[int] = []
+
+    def predictions(*arguments: Any) -> tuple[np.ndarray, list[str]]:
+        """Those of the built-in engine and some more; the fourth run fails."""
+        asked.append(len(arguments[3]))
+        z = z_at(case, {name: np.array([one[name] for one in arguments[3]]) for name in model.names})
+        found = predict(model, [base.fits[0].point], z) + 0.01 * np.sin(z[:, :1])
+        found[3:4] = np.nan
+        return found, [""] * len(z)
+
+    monkeypatch.setattr("vegglue.inference.surrogate.command_predictions", predictions)
+    base = modes_and_errors(model, points_of_prior(model), "known", silent)
+    best = base.fits[0]
+    run = best.point.z + 0.5 * np.random.default_rng(1).standard_normal((12, best.point.z.size))
+    start = mixture_at_modes(best.point.z[None], best.covariance[None], np.zeros(1))
+    runs: Any = None
+    found = learn(CommandToLearn(runs, run, 2, 14), base, start, silent)
+    assert asked == [12]
+    assert (found.result.runs, found.result.failed) == (14, 3)
 
 
 def test_it_needs_an_engine(tmp_path: Path) -> None:

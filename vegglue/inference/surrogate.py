@@ -314,9 +314,10 @@ def learn(command: CommandToLearn, base: ModesAndErrors, start: Mixture, watch: 
         found, _ = command_predictions(command.runs, bare.case, model.station, thetas, watch, why)
         return found - predict(bare, [middle], z)
 
-    z, d = command.run, difference_at(command.run)
-    z, d = z[np.isfinite(d).all(axis=1)], d[np.isfinite(d).all(axis=1)]
-    lost, failed, settled, last = np.zeros((0, len(own))), command.failed, 0, float("nan")
+    first = difference_at(command.run)
+    ran = np.isfinite(first).all(axis=1)
+    z, d, lost = command.run[ran], first[ran], command.run[~ran]
+    failed, settled, last = command.failed + len(lost), 0, float("nan")
     drawn: Sample | None = None
     built_in = np.zeros((0, len(model.station)))  # F at the draws
     while True:
