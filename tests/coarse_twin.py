@@ -4,10 +4,11 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from built_models import model_of
 
 from vegglue.case.config import load_case
 from vegglue.engine.interface import Model, Point, linearise
-from vegglue.engine.model import coarser, model_of
+from vegglue.engine.model import coarser
 from vegglue.measurements.observations import read_observations
 
 CASE = load_case(Path(__file__).parents[1] / "configs" / "twin.yaml")

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from built_models import model_of
 from coarse_twin import coarse_twin
 from linear_baseline import CASE_OF_TWINS, at_best, stations_of
 from scipy.special import ndtr
@@ -16,7 +17,6 @@ from vegglue.calibration import baseline
 from vegglue.calibration.baseline import MOST_KEPT, PRIOR_POINTS, START_SPREAD, Baseline, kept_baseline, places_of_prior
 from vegglue.case.config import load_case
 from vegglue.engine.interface import Model, Point
-from vegglue.engine.model import model_of
 from vegglue.measurements.observations import read_observations
 
 

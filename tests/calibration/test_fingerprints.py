@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from built_models import model_of
 from coarse_twin import CASE, coarse_twin
 
 from vegglue.calibration.baseline import SearchModel
@@ -28,7 +29,7 @@ from vegglue.case.site_schema import FrictionClass
 from vegglue.effects.grammar import LAWS
 from vegglue.effects.library import library
 from vegglue.engine.interface import Model, Point, flow_at_centres, linearise, relinearised, responses
-from vegglue.engine.model import coarser, model_of
+from vegglue.engine.model import coarser
 from vegglue.flow.local_changes import Term
 from vegglue.measurements.observations import read_observations
 from vegglue.workflow.case_run import CaseRun

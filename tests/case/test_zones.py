@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from built_models import model_of
 
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import build_site
 from vegglue.case.schema import Case
 from vegglue.case.zones import centres_within, inflow_cells, ranges_without_cells
 from vegglue.engine.interface import Model
-from vegglue.engine.model import coarser, model_of
+from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.flow.problem_setup import build_problem
 from vegglue.inference.solve_ensemble import solve_ensemble

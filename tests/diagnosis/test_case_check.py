@@ -5,6 +5,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import pytest
+from built_models import model_of
 from field_folders import CHANNEL, JUNE, folder_of
 from sound_case import ROWS, SOUND, found_in, odd, read_case
 
@@ -17,7 +18,6 @@ from vegglue.diagnosis.case_check import check_case, critical_remarks
 from vegglue.diagnosis.channel_check import BankLawHeld, CanopyUnlikeMeasured, MembersNoPowerOfTwo, StationUnused
 from vegglue.diagnosis.flow_check import ComponentsExchanged, FlowUpstream, LevelsRiseDownstream
 from vegglue.diagnosis.station_check import PointsOutsideWater, StationsOnLand, StationsOnPatchEdge
-from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.measurements import kinds, plausibility, section_discharge
 from vegglue.measurements.kinds import Unused

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from built_models import model_of
 from reach import COARSE, write_reach
 
 from vegglue.calibration.baseline import baseline
@@ -21,7 +22,6 @@ from vegglue.diagnosis.comparison import held_out_rmse, model_score
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.diagnosis.next_measurement import worth_of_measurements
 from vegglue.engine.interface import linearise, responses
-from vegglue.engine.model import model_of
 from vegglue.flow.sensor import FlowFields
 from vegglue.inference.glue import glue
 from vegglue.inference.refine import refine

@@ -6,13 +6,14 @@ from typing import cast
 
 import numpy as np
 import pytest
+from built_models import model_of
 
 from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
 from vegglue.engine.interface import Model, linearise
-from vegglue.engine.model import coarser, model_of
+from vegglue.engine.model import coarser
 from vegglue.engine.newton import SteadyFlow, predict_near
 from vegglue.flow.jacobian import Factors
 from vegglue.measurements.observations import read_observations

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from built_models import model_of
 from field_folders import CHANNEL, JUNE, field_folder, folder_of, import_of, imported, refusal, refusal_of
 from reach import Say, here
 
@@ -16,7 +17,6 @@ import vegglue
 from vegglue.case.config import load_case
 from vegglue.case.site_schema import Frame
 from vegglue.engine.interface import linearise
-from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.importers.file_options import FileOptions
 from vegglue.importers.import_notes import UnreadFiles

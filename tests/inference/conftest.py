@@ -1,10 +1,10 @@
 """A refined posterior of the short reach of docs/own_case.md, made as a user would; no test changes it."""
 
 import pytest
+from built_models import model_of
 from refined_reach import FEW_MEMBERS, STATED_ERRORS, SolvedReach, solved_reach
 
 from vegglue.calibration.noise import Noise
-from vegglue.engine.model import model_of
 from vegglue.inference.posterior_modes import members_of, modes_and_errors
 from vegglue.inference.refine import refine
 from vegglue.parallel import at_most

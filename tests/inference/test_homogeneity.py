@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.stats
+from built_models import model_of
 from reach import COARSE, write_reach
 from refined_reach import FEW_MEMBERS, STATED_ERRORS, SolvedReach
 
@@ -15,7 +16,6 @@ from vegglue.calibration.noise import covariance_of, noise_of, with_correlation
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.engine.interface import linearise
-from vegglue.engine.model import model_of
 from vegglue.inference.homogeneity import chance_of_as_much, equal_values_test, one_experiment, transfer, without_prior
 from vegglue.inference.statements import (
     CalibrationDiffers,

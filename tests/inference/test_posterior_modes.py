@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from built_models import model_of
 from reach import COARSE, write_reach
 from refined_reach import FEW_MEMBERS, STATED_ERRORS, SolvedReach
 
@@ -14,7 +15,6 @@ from vegglue.case.config import load_case
 from vegglue.case.parameter_space import z_at
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Engine, Point, linearise
-from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.inference.posterior_modes import (
     distinct_modes,

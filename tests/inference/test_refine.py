@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy.stats
+from built_models import model_of
 from posteriors import assert_same
 from reach import COARSE, Say, write_reach
 from refined_reach import FEW_MEMBERS, SolvedReach, solved_reach
@@ -15,7 +16,6 @@ from refined_reach import FEW_MEMBERS, SolvedReach, solved_reach
 from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.case.parameter_space import sample_prior, theta_at, z_at
 from vegglue.engine.interface import linearise, predict
-from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.flow.status import FAILED
 from vegglue.inference.refine import log_posterior, refinable, refine, solved_for

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from built_models import model_of
 from reach import COARSE, write_reach
 
 import vegglue
 from vegglue.calibration.noise import noise_of
 from vegglue.case.parameter_space import z_at
 from vegglue.engine.interface import predict
-from vegglue.engine.model import model_of
 from vegglue.errors import InputError
 from vegglue.inference.importance_sampling import mixture_at_modes
 from vegglue.inference.posterior_modes import modes_and_errors, points_of_prior

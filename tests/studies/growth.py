@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from built_models import model_of
 
 from vegglue.calibration.fit import fit
 from vegglue.calibration.model_error import cell_responses
@@ -24,7 +25,7 @@ from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.size_limits import factor_bytes
 from vegglue.engine.interface import Point, linearise, predict
-from vegglue.engine.model import ever_coarser, model_of
+from vegglue.engine.model import ever_coarser
 from vegglue.measurements.observations import read_observations
 from vegglue.parallel import at_most
 

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 from bench import timed
+from built_models import model_of
 
 from vegglue.case.config import load_case
 from vegglue.engine.interface import linearise
-from vegglue.engine.model import model_of
 from vegglue.engine.newton import centre_flow, problem_at
 from vegglue.flow.equations import residual
 from vegglue.flow.starts import backwater

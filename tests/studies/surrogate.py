@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from built_models import model_of
 from commands import by_server, served
 from reach import write_reach
 
@@ -23,7 +24,6 @@ import vegglue
 from vegglue.case.parameter_space import theta_at, z_at
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, linearise, predict
-from vegglue.engine.model import model_of
 from vegglue.engine.newton import NEWTON
 from vegglue.inference import refine as refine_module
 from vegglue.inference.refine import refine

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from built_models import model_of
 
 from vegglue.case.config import load_case
 from vegglue.case.schema import Case
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.engine.interface import linearise
-from vegglue.engine.model import model_of
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.measurements.observations import read_observations
 

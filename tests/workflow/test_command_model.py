@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from built_models import model_of
 from commands import SMOOTH, commanded
 from reach import COARSE
 
@@ -19,7 +20,7 @@ from vegglue.case.schema import Case
 from vegglue.engine.command import command_runs
 from vegglue.engine.corrected import Correction, corrected, correction_at
 from vegglue.engine.interface import Model, Point, linearise, linearise_around, predict, responses
-from vegglue.engine.model import coarser, model_of
+from vegglue.engine.model import coarser
 from vegglue.errors import InputError
 from vegglue.measurements.observations import read_observations
 from vegglue.progress import silent

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
+from built_models import model_of
 from reach import COARSE, write_reach
 
 from vegglue.case.config import load_case
-from vegglue.engine.model import model_of
 from vegglue.measurements.observations import read_observations
 from vegglue.workflow.hidden_effect import candidate_of
 

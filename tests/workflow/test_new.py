@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from built_models import model_of
 from reach import Say
 
 import vegglue
 from vegglue.case.gridded_site import build_site
 from vegglue.diagnosis.case_check import check_case
 from vegglue.engine.interface import linearise
-from vegglue.engine.model import model_of
 from vegglue.errors import InputError, StorageError
 from vegglue.measurements.observations import read_observations
 from vegglue.workflow.new import Reach

@@ -8,10 +8,8 @@ from vegglue.case.schema import Case
 from vegglue.case.zones import ranges_without_cells
 from vegglue.compilation import is_kept
 from vegglue.engine.first_compilation import compile_beside
-from vegglue.engine.interface import Engine, Model
-from vegglue.engine.newton import NEWTON
+from vegglue.engine.interface import Model
 from vegglue.flow.kernels import rates
-from vegglue.measurements.observations import Observations
 from vegglue.wording.phases import COMPILING
 
 
@@ -31,23 +29,6 @@ def with_compilation(phase: str) -> str:
 FEWEST_CELLS = 6
 # Length over width of cells above which a coarser grid has wider ones only: across the flow is where the error is.
 LONG_CELL = 2.0
-
-
-def model_of(case: Case, observations: Observations, engine: Engine = NEWTON) -> Model:
-    """The case on its grid, read where it was measured.
-
-    Parameters
-    ----------
-    case : Case
-    observations : Observations
-    engine : Engine
-        How flows are computed, by the built-in solver if not given.
-
-    Returns
-    -------
-    Model
-    """
-    return Model(case, build_site(case), observations.table, engine)
 
 
 def coarser(model: Model) -> Model | None:
