@@ -117,15 +117,31 @@ class FrictionClassUnused:
 
 @dataclass(frozen=True)
 class SurveyLeftOut:
-    """How well each of `count` surveyed lines (or points) is predicted from all others: r.m.s. of errors, of stated
-    ones, and of straight lines between the neighbours [m]; offset: by how much the line at x [m] that is furthest off
-    lies too high, with its standard error [m].
+    """How well each surveyed line (or point) is predicted from all others.
+
+    Attributes
+    ----------
+    count : int
+    error, stated, straight : float
+        Root mean square of errors, of stated ones, and of those of straight lines between the neighbours [m].
+    most : float
+        Largest error of a line over its stated one [-].
+    most_at : float
+        x of that line [m].
+    x : float
+        Of the line that is furthest off [m].
+    offset, offset_error : float
+        By how much it lies too high, and its standard error [m].
+    suspect : bool
+        Whether errors alone hardly put a line so far off.
     """
 
     count: int
     error: float
     stated: float
     straight: float
+    most: float
+    most_at: float
     x: float
     offset: float
     offset_error: float
@@ -339,8 +355,8 @@ def remarks_on_survey(case: Case) -> Iterator[SurveyLeftOut]:
     """How well each survey of the bed predicts its own lines."""
     for layer in beds_of(case):
         if layer.survey is not None and (found := layer.survey.left_out) is not None:
-            off = found.offset_at, found.offset, found.offset_error
-            yield SurveyLeftOut(found.count, found.error, found.stated, found.straight, *off, stands_out(found))
+            worst, off = (found.most, found.most_at), (found.offset_at, found.offset, found.offset_error)
+            yield SurveyLeftOut(found.count, found.error, found.stated, found.straight, *worst, *off, stands_out(found))
 
 
 def remarks_on_assumed_errors(case: Case) -> Iterator[ErrorsAssumed]:
