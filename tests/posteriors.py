@@ -75,7 +75,7 @@ def a_posterior(canopy: bool) -> Posterior:
     )  # fmt: skip
     fit = GoodnessOfFit(
         used=1, chi2=np.nan, sigma=per_kind, rmse=per_kind, best_rmse=per_kind, noise=np.array([0.02, np.nan]),
-        residual=random.random(2), best_residual=random.random(2),
+        residual=random.random(2),
     )  # fmt: skip
     predicted = PredictiveDistribution(random.random((5, 2)), random.random((5, 2)), draws, predictive)
     return Posterior(

@@ -11,7 +11,6 @@ from vegglue.case.schema import Case
 from vegglue.diagnosis.effect_contract import (
     AMPLITUDE,
     CHANNEL,
-    CHANNEL_SCALES,
     ContractRule,
     breaches,
     moving_water,
@@ -28,6 +27,9 @@ from vegglue.flow.problem import ALONG, take
 from vegglue.flow.problem_setup import build_problem, share_under_water
 from vegglue.flow.starts import backwater
 
+# Length of the channel over that of a brook at which every shipped effect is tried [-]: a flume of 3 cm of water, a
+# brook, a river of 10 m.
+CHANNEL_SCALES = {"flume": 0.04, "brook": 1.0, "river": 15.0}
 # Weather and the turn of the earth are as large at every site.
 OF_THE_PLANET = ("wind", "turning_earth")
 

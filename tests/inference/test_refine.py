@@ -161,7 +161,7 @@ def test_errors_are_taken_from_the_residual(tmp_path: Path) -> None:
     posterior = refine(ensemble, model_of(case, observations))
     assert posterior.refinement is not None
     assert posterior.refinement.error_model.errors == "estimated"
-    left = posterior.fit.best_residual
+    left = posterior.station["value"].to_numpy() - posterior.sample.prediction[posterior.sample.best]
     assert posterior.fit.sigma["velocity"] == pytest.approx(math.sqrt(np.mean(left**2) * 15 / 13), rel=0.05)
     kinds = {type(one) for one in posterior_statements(posterior)}
     assert ErrorsEstimated in kinds

@@ -47,7 +47,7 @@ def test_nested_fields_lie_flat_in_the_file(tmp_path: Path) -> None:
         "parameter", "member", "station", "level", "log_parameter", "other_parameter", "side", "kind", "chain", "draw",
         "unit", "theta", "weights", "efficiency", "log_likelihood", "prediction", "median", "sd", "quantiles",
         "prior_quantiles", "log10_median", "log10_sd", "correlation", "width_ratio", "identified", "bounds",
-        "bound_mass", "bound_hit", "sigma", "rmse", "best_rmse", "noise", "residual", "best_residual", "model_band",
+        "bound_mass", "bound_hit", "sigma", "rmse", "best_rmse", "noise", "residual", "model_band",
         "total_band", "draws", "predictive",
     }  # fmt: skip
     assert canopy == {"member", "level", "phi", "quantiles"}

@@ -1,6 +1,5 @@
 """A command that sleeps: its posterior by few runs beside that of all runs; what fails and what is kept."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +48,7 @@ def test_runs_are_kept_and_failures_counted(tmp_path: Path) -> None:
     kept = read_posterior(tmp_path / "runs" / brook.case.name / "posterior.h5")
     assert kept.settings.method == "surrogate"
     assert kept.surrogate is not None
-    np.testing.assert_array_equal(kept.surrogate.station_error, one.station_error)
-    assert replace(kept.surrogate, station_error=one.station_error) == one
+    assert kept.surrogate == one
     kinds = [type(statement) for statement in posterior_statements(kept)]
     assert {SurrogateLearned, ValidationProposed} <= set(kinds)
     assert (one.validation_low, one.validation_high) == (1.0, 4.0)

@@ -31,9 +31,6 @@ from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import predictions_at_sensors
 from vegglue.flow.starts import backwater
 
-# Length of the channel over that of a brook at which every shipped effect is tried [-]: a flume of 3 cm of water, a
-# brook, a river of 10 m.
-CHANNEL_SCALES = {"flume": 0.04, "brook": 1.0, "river": 15.0}
 # Column of cells from which on water is made faster, and how many upstream of it may feel that.
 CHANGED, FELT_AFAR = 20, 4
 # What a faulty function of an effect may raise.
@@ -266,7 +263,7 @@ def breaches(effect: Effect, own: Path | None = None, scale: float = 1.0) -> lis
     own : Path, optional
         The file of the effect, if it is a user's.
     scale : float
-        Of the channel, see `CHANNEL_SCALES` [-].
+        Of all lengths of the channel [-].
 
     Returns
     -------

@@ -110,7 +110,7 @@ class Engine:
         (model, points, causes) -> df / d(amplitude - off)^power at off (points, n, causes).
     responses_to_cells
         (model, point, experiment, terms) -> df / d term (n, nx, ny) by term for a change in each cell, of the stations
-        of the experiment, some rows of them at a time; terms: of `flow.local_changes.TERMS`.
+        of the experiment, some rows of them at a time; terms: of `flow.local_changes.Term`.
     flow_at_centres
         (model, point, experiment) -> depth and velocities of a point.
     relinearised
@@ -284,8 +284,7 @@ def responses_to_cells(model: Model, point: Point, experiment: str, terms: Seque
     model : Model
     point : Point
     experiment : str
-    terms : sequence of str
-        Of `flow.local_changes.TERMS`.
+    terms : sequence of Term
 
     Yields
     ------

@@ -19,7 +19,6 @@ from vegglue.flow.problem import Problem, take
 # friction: k -> k (1 + a) [-]; drag: k -> k + a [1/m]; bed: z_b -> z_b + a [m]; inflow: a enters [m/s]; viscosity:
 # nu -> nu + a [m2/s]; mixing: nu -> nu (1 + a) [-]; advection: h U U -> h U U (1 + a) [-].
 Term = Literal["friction", "drag", "bed", "inflow", "viscosity", "mixing", "advection"]
-TERMS: tuple[Term, ...] = ("friction", "drag", "bed", "inflow", "viscosity", "mixing", "advection")
 
 
 def with_changed_term(problem: Problem, geometry: ChannelGeometry, term: Term, change: Array) -> Problem:
@@ -29,8 +28,7 @@ def with_changed_term(problem: Problem, geometry: ChannelGeometry, term: Term, c
     ----------
     problem, geometry
         Of one member, and what effects see of its channel.
-    term
-        One of TERMS.
+    term : Term
     change
         (nx, ny, m) [unit of the term].
 

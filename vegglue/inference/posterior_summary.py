@@ -257,7 +257,6 @@ def goodness_of_fit(
         best_rmse={kind: root_mean_square(best_residual[rows]) for kind, rows in kinds.items()},
         noise=noise,
         residual=residual,
-        best_residual=best_residual,
     )
 
 

@@ -355,7 +355,6 @@ def learn(command: CommandToLearn, base: ModesAndErrors, start: Mixture, watch: 
             last = root_mean_square(noise.whiten(off[:, noise.rows].T).ravel())
         z, d = np.concatenate([z, chosen[there]]), np.concatenate([d, new[there]])
     columns = noise.lower @ (difference.directions.T * np.sqrt(error @ weights))
-    at_all = noise.among_all(np.sqrt(np.sum(columns**2, axis=1)), len(model.station))
     under = with_more_error(noise, columns)
     ends = [fit_from(surrogate, under, one.point.z, one.point) for one in base.fits]
     fits = tuple(distinct_modes([end for end in ends if end is not None]))
@@ -363,7 +362,7 @@ def learn(command: CommandToLearn, base: ModesAndErrors, start: Mixture, watch: 
         sum(middle_value(case, one) for one in setting.discharge.values()) for setting in case.experiments.values()
     ]
     beyond = (0.5 * min(flows), 2.0 * max(flows)) if case.validation is None else (np.nan, np.nan)
-    result = Surrogate(len(z) + failed, failed, int(settled > SETTLED_FOR), *apart, last, *beyond, at_all)
+    result = Surrogate(len(z) + failed, failed, int(settled > SETTLED_FOR), *apart, last, *beyond)
     return Learned(replace(base, model=surrogate, noise=under, fits=fits), density, result)
 
 

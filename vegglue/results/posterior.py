@@ -217,9 +217,7 @@ class GoodnessOfFit:
     rmse: ByKind
     best_rmse: ByKind
     noise: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # standard deviation of a residual, NaN if unknown
-    # residual, best_residual: y - f of the median prediction, and of the best member
-    residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
-    best_residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
+    residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # y - f of the median prediction
 
 
 @dataclass(frozen=True)
@@ -296,7 +294,6 @@ class Surrogate:
     # validation_low, validation_high: discharges at which measurements would test it [m3/s]; NaN if the case has any
     validation_low: float
     validation_high: float
-    station_error: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # of the surrogate, counted in the errors
 
 
 @dataclass(frozen=True)
