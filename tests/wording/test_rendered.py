@@ -409,10 +409,11 @@ def plan() -> str:
     )  # fmt: skip
     about = replace(found, question=OneEffect("streamlining", -0.5, "-"), answer=0.3, further=(), extended=None)
     between = replace(about, question=TwoEffects("elder", "viscosity"), proposed=True, at_hand=12)
-    return "\n\n".join(
+    shown = "\n\n".join(
         printed(lambda one=one, details=details: show_plan(one, details, "vegglue plan brook.yaml --details"))
         for one, details in ((found, False), (about, False), (between, True))
     )
+    return "\n".join([shown, *(phrase("files_of_plan", "runs/brook/plan", planned) for planned in (True, False))])
 
 
 def senses() -> str:

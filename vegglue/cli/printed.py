@@ -115,7 +115,7 @@ def show(case: Case, runs: Path, result: Any, details: bool = False, more: str =
             print(f"Last config: {shown_path(result.cases[-1].source)}")
         case FieldPlan():
             show_plan(result, details, more)
-            print(phrase("files_of_plan", folder / "plan"))
+            print(phrase("files_of_plan", folder / "plan", bool(result.pieces)))
         case Comparison():
             show_ladder(result)
             print(f"Drawn in {folder / 'ladder.png'}")
