@@ -245,19 +245,24 @@ def shown_by(wide: PlanModel) -> ShownByPlan:
     point = Point(draw.point.z, draw.point.prediction[known], draw.point.slope[known], flows)
     noise = with_grid_error(noise_of(station), wide.grid_error[known] / constants().grid_error_share)
     noise = with_model_error(noise, _after_survey(draw.shared, known, wide.surveyed, wide.error))
-    numbers = [len(one.settings()) for one in wide.candidates]
-    drawn = [SETTINGS_BETWEEN if number > 1 else 0 for number in numbers]
-    settings = [(one, shapes) for one in wide.candidates for shapes in one.settings()]
+    tried = [one.settings() for one in wide.candidates]
+    drawn = [SETTINGS_BETWEEN if len(settings) > 1 else 0 for settings in tried]
+    columns, others = consecutive_columns([len(settings) for settings in tried]), consecutive_columns(drawn)
+    settings = [(one, shapes) for one, of_it in zip(wide.candidates, tried, strict=True) for shapes in of_it]
     between = [
         (one, one.drawn_shapes(np.random.default_rng((j, k))))
         for j, one in enumerate(wide.candidates) for k in range(drawn[j])
     ]  # fmt: skip
     causes = [cause_of(draw.model.case, one, shapes) for one, shapes in (*settings, *between)]
-    values = responses(replace(draw.model, station=station), point, causes)
+    values = np.empty((len(station), len(causes)))
+    usual = np.array([own[len(own) // 2] for own in columns])  # the middle one of each, as in the search
+    new = np.setdiff1d(np.arange(len(causes)), usual)
+    values[:, usual] = draw.values[known]
+    values[:, new] = responses(replace(draw.model, station=station), point, [causes[k] for k in new])
     prints = Fingerprints(
         point=point,
         candidates=list(wide.candidates),
-        columns=consecutive_columns(numbers),
+        columns=columns,
         settings=[shapes for _, shapes in settings],
         amplitudes=[one.amplitude for one, _ in settings],
         causes=causes[: len(settings)],
@@ -287,8 +292,8 @@ def shown_by(wide: PlanModel) -> ShownByPlan:
         str(term): np.abs(units.T @ one.units).max(axis=1, initial=0.0) for term, one in in_places.items()
     }
     whole = np.maximum(np.linalg.norm(white, axis=0), 1e-300), np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
-    truths = [against(values[:, len(settings) + others if others.size else own])
-              for others, own in zip(consecutive_columns(drawn), prints.columns, strict=True)]  # fmt: skip
+    truths = [against(values[:, len(settings) + further if further.size else own])
+              for further, own in zip(others, columns, strict=True)]  # fmt: skip
     competition = first_competition(kinds, prints.columns, list(in_places), errors, level)
     return ShownByPlan(
         noise=noise,
