@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vegglue.arrays import Array
 from vegglue.case.channel_geometry import expected_depth
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds
@@ -384,30 +383,23 @@ def remarks_on_unmoved_heights(case: Case, observations: Observations) -> Iterat
         middle = lowest.groupby("x")[["z", "bed"]].median()
         if len(lowest) < FEWEST:
             continue
-        fall = float(middle["bed"].iloc[0] - middle["bed"].iloc[-1])
-        if _keeps_its_level(lowest["z"].to_numpy(), middle, fall):
+        z, fall = lowest["z"].to_numpy(), float(middle["bed"].iloc[0] - middle["bed"].iloc[-1])
+        scatter = OF_A_NORMAL * float(np.median(np.abs(z - np.median(z))))
+        if fall < max(LEAST_FALL, OVER_THE_SCATTER * scatter):
+            continue
+        # The median of dz / dbed between any two sections shows whether z stays or falls with the bed.
+        pair = np.array(np.triu_indices(len(middle), 1))
+        level, bed = (np.diff(middle[name].to_numpy(float)[pair], axis=0)[0] for name in ("z", "bed"))
+        far = np.abs(bed) > HALFWAY * fall
+        if float(np.median(level[far] / bed[far])) < HALFWAY:
             first, last = float(middle.index[0]), float(middle.index[-1])
             found.setdefault(file, []).append((experiment, float(lowest["z"].median()), first, last, fall))
     for file, ones in found.items():
         _, _, first, last, fall = ones[0]
         known = [one.columns["z"] for one in case.imported or () if one.name == file.name and "z" in one.columns]
         heading = known[0] if known else ""
-        names_, z = tuple(one[0] for one in ones), tuple(one[1] for one in ones)
-        yield HeightsTakenForLevels(file.name, names_, z, first, last, fall, heading)
-
-
-def _keeps_its_level(z: Array, middle: pd.DataFrame, fall: float) -> bool:
-    """Whether the lowest points z (vertical,) [m] stay where they are while the bed falls.
-
-    middle: z and bed of the sections, downstream; the median of dz / dbed between any two shows which of both holds.
-    """
-    scatter = OF_A_NORMAL * float(np.median(np.abs(z - np.median(z))))
-    if fall < max(LEAST_FALL, OVER_THE_SCATTER * scatter):
-        return False
-    one, other = np.triu_indices(len(middle), 1)
-    level, bed = (np.diff(middle[name].to_numpy(float)[np.array([one, other])], axis=0)[0] for name in ("z", "bed"))
-    far = np.abs(bed) > HALFWAY * fall
-    return float(np.median(level[far] / bed[far])) < HALFWAY
+        experiments, middles = tuple(one[0] for one in ones), tuple(one[1] for one in ones)
+        yield HeightsTakenForLevels(file.name, experiments, middles, first, last, fall, heading)
 
 
 def remarks_on_errors_across_plants(case: Case, observations: Observations) -> Iterator[ErrorsAcrossPlants]:

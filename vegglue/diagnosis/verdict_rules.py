@@ -233,32 +233,27 @@ def _silent(inputs: VerdictInputs, plain: Verdict) -> Verdict:
     named = inputs.instruments if all_clear else ()
     if inputs.misfit.p < constants().poor_fit_chance:
         return replace(plain, reasons=(verdict.MisfitUnexplained(),))
-    if unearned := _unearned(inputs):
-        return replace(plain, reasons=(unearned,), instruments=named)
+    errors, used, unearned = inputs.errors, inputs.model_error, list[Reason]()
+    if errors.clearly_larger:
+        unearned.append(verdict.ErrorsLargerThanStated(errors.scale))
+    if errors.correlation > constants().largest_correlation:
+        unearned.append(verdict.CorrelatedErrors(errors.correlation))
+    if inputs.neighbours:
+        unearned.append(verdict.NeighboursExcluded())
+    if used is not None and used.asks_for_more:
+        unearned.append(verdict.ModelErrorExceeded(used.needed, used.friction))
+    if inputs.held_out == math.inf:
+        unearned.append(verdict.NoFlowHeldOut())
+    elif inputs.held_out > max(constants().held_out_ratio, inputs.by_chance):
+        unearned.append(verdict.HeldOutMissed(inputs.held_out))
+    if unearned:
+        return replace(plain, reasons=(unearned[0],), instruments=named)
     if inputs.between > constants().held_out_ratio:
         kind: VerdictKind = "instrument" if all_clear else "cannot-tell"
         return replace(plain, kind=kind, reasons=(verdict.UncertainBetweenSections(inputs.between),), instruments=named)
     if plain.tested.testable < constants().testable_share * max(len(inputs.candidates), 1):
         return replace(plain, reasons=(verdict.FewTestable(),))
     return replace(plain, kind="instrument" if clear else "nothing-missing", instruments=clear, clears_the_model=True)
-
-
-def _unearned(inputs: VerdictInputs) -> Reason | None:
-    """Why it cannot be concluded that nothing is missing, None when it can."""
-    errors, used = inputs.errors, inputs.model_error
-    if errors.clearly_larger:
-        return verdict.ErrorsLargerThanStated(errors.scale)
-    if errors.correlation > constants().largest_correlation:
-        return verdict.CorrelatedErrors(errors.correlation)
-    if inputs.neighbours:
-        return verdict.NeighboursExcluded()
-    if used is not None and used.asks_for_more:
-        return verdict.ModelErrorExceeded(used.needed, used.friction)
-    if inputs.held_out == math.inf:
-        return verdict.NoFlowHeldOut()
-    if inputs.held_out > max(constants().held_out_ratio, inputs.by_chance):
-        return verdict.HeldOutMissed(inputs.held_out)
-    return None
 
 
 def _is_clear(instrument: FaultyInstrument) -> bool:

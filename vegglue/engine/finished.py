@@ -33,15 +33,6 @@ MOST_APART, MOST_LEVEL_APART, MOST_AREA_APART = 0.15, 0.05, 0.15
 SHALLOW = 0.1
 
 
-def _their_flows(model: Model) -> "dict[str, TheirFlow]":
-    """The flow of the finished run in each experiment of a model. Raises InputError."""
-    from vegglue.measurements.their_flow import read_their_flow  # late: few cases wait for its trees of places
-
-    result = model.case.finished_result
-    assert result is not None
-    return {name: read_their_flow(result.files[name]) for name in model.case.experiments}
-
-
 def their_predictions(station: pd.DataFrame, flows: "dict[str, TheirFlow]", grid: Grid) -> Array:
     """Readings of the stations in the flow of the finished run (n,) [unit of each], NaN where it is dry.
 
@@ -67,18 +58,6 @@ def their_predictions(station: pd.DataFrame, flows: "dict[str, TheirFlow]", grid
         readings["discharge"] = of_sections
         found[rows] = np.array([readings[kind][at] for at, kind in enumerate(kinds[rows])])
     return found
-
-
-def _their_place(model: Model) -> Array:
-    """z_0 (q,) of the model without effects: the parameters of the finished run, 0 where it states none."""
-    result = model.case.finished_result
-    assert result is not None
-    return np.array(
-        [
-            z_of(prior, result.parameters[name]) if name in result.parameters else 0.0
-            for name, prior in without_effects(model).case.parameters.items()
-        ]
-    )
 
 
 @dataclass(frozen=True)
@@ -108,10 +87,17 @@ def compared_flows(model: Model) -> ComparedFlows:
     Raises
     ------
     InputError
-        If a station in use lies where their flow is dry, or the built-in engine finds no flow.
+        If a flow cannot be read, a station in use lies where theirs is dry, or the built-in engine finds none.
     """
-    bare, z, flows = without_effects(model), _their_place(model), _their_flows(model)
-    own = linearise(bare, z)
+    from vegglue.measurements.their_flow import read_their_flow  # late: few cases wait for its trees of places
+
+    bare, result = without_effects(model), model.case.finished_result
+    assert result is not None
+    flows = {name: read_their_flow(result.files[name]) for name in model.case.experiments}
+    # The parameters of the finished run, in the middle of their priors where it states none.
+    stated = result.parameters
+    z = [z_of(prior, stated[name]) if name in stated else 0.0 for name, prior in bare.case.parameters.items()]
+    own = linearise(bare, np.array(z))
     if own is None:
         raise InputError(
             f"{model.case.name}: the built-in engine finds no flow with the parameters of `finished_result`; see "

@@ -111,16 +111,15 @@ def _under_effects(case: Case, site: Site, experiment: str, theta: Theta) -> dic
     position = np.zeros((len(cells), longest, 1))
     for inflow, some in enumerate(cells):
         position[inflow, : some.size, 0] = (np.arange(some.size) + 0.5) / some.size * 2.0 - 1.0
-    values = _boundary_values(
-        effects,
-        BoundaryValues(
-            discharge=np.array([value_of(setting.discharge[name], theta, members) for name in case.inflows]),
-            level=value_of(setting.level, theta, members),
-            spread=np.ones((len(cells), longest, 1)),
-            lateral=np.zeros(members),
-            position=position,
-        ),
+    stated = BoundaryValues(
+        discharge=np.array([value_of(setting.discharge[name], theta, members) for name in case.inflows]),
+        level=value_of(setting.level, theta, members),
+        spread=np.ones((len(cells), longest, 1)),
+        lateral=np.zeros(members),
+        position=position,
     )
+    neutral = {name: getattr(stated, name) for name in REPLACED["boundary"]}
+    values = BoundaryValues(**applied(effects, "boundary", stated, neutral), position=position)
     bed_rise, entering = EMPTY, EMPTY
     if geometry is not None:
         bed_rise, entering = _site_changes(effects, geometry, values.lateral)
@@ -160,12 +159,6 @@ def _under_effects(case: Case, site: Site, experiment: str, theta: Theta) -> dic
         "effects": effects,
         "geometry": geometry,
     }
-
-
-def _boundary_values(effects: tuple[ActiveEffect, ...], boundary: BoundaryValues) -> BoundaryValues:
-    """What enters and leaves after the effects of the stage boundary."""
-    neutral = {name: getattr(boundary, name) for name in REPLACED["boundary"]}
-    return BoundaryValues(**applied(effects, "boundary", boundary, neutral), position=boundary.position)
 
 
 def _site_changes(effects: tuple[ActiveEffect, ...], geometry: ChannelGeometry, lateral: Array) -> tuple[Array, Array]:

@@ -268,15 +268,6 @@ def slope_of_friction(problem: Problem, state: Array) -> Array:
     return np.asarray(friction_slope(state, depth, rate, side_fluxes(problem, depth)[0]))
 
 
-def _face_depths(problem: Problem, state: Array) -> Array:
-    """Depths [m] of the faces of velocities (nx, 3, ny, m); infinite for levels and on the sides of the grid."""
-    level = np.ascontiguousarray(state[:, LEVEL])
-    _, along, across, _ = all_depths(problem, level)
-    found = np.full_like(state, np.inf)
-    found[:-1, ALONG], found[:, ACROSS, 1:] = along[1:-1], across[:, 1:-1]
-    return found
-
-
 def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
     """h_c and u d(rho)/dz of one member: depths of its faces, and how its velocities answer to levels there.
 
@@ -290,7 +281,10 @@ def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
     (nx, 3, ny) [m], (nx, 3, ny) [1/s]
         The former infinite for levels and on the sides of the grid.
     """
-    thick = np.ascontiguousarray(_face_depths(problem, state)[..., 0])
+    _, along, across, _ = all_depths(problem, np.ascontiguousarray(state[:, LEVEL]))
+    faces = np.full_like(state, np.inf)
+    faces[:-1, ALONG], faces[:, ACROSS, 1:] = along[1:-1], across[:, 1:-1]
+    thick = np.ascontiguousarray(faces[..., 0])
     return thick, answers(state, *problem.wetting, thick)
 
 

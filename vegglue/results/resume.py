@@ -193,7 +193,13 @@ class EnsembleWriter:
             raise ValueError(f"chunk {chunk}: expected fields, got none")
         if set(rows) != set(ROWS):
             raise ValueError(f"chunk {chunk}: expected the rows {sorted(ROWS)}, got {sorted(rows)}")
-        sorted_rows = {name: _fitted(rows[name], group[name].dtype)[order] for name in ROWS if group[name].size}
+        sorted_rows = dict[str, np.ndarray]()
+        for name in (one for one in ROWS if group[one].size):
+            values, dtype = rows[name], group[name].dtype
+            if dtype.kind == "S":  # text, cut to its room without splitting a character
+                cut = [str(text).encode()[: dtype.itemsize].decode(errors="ignore").encode() for text in values]
+                values = np.array(cut, dtype)
+            sorted_rows[name] = np.asarray(values, dtype)[order]
         sorted_fields = [] if fields is None else [fields.astype(np.float32)[order]]
         with failed_writes_told(self.path, WRITTEN_STAYS):
             for name, values in sorted_rows.items():  # h5py cannot select members of nothing: a case without stations
@@ -323,11 +329,3 @@ def _digest(arrays: Sequence[np.ndarray]) -> int:
     for values in arrays:
         found = zlib.crc32(np.ascontiguousarray(values).tobytes(), found)
     return found
-
-
-def _fitted(values: Any, dtype: np.dtype) -> np.ndarray:
-    """Values as a dataset of this type holds them; text cut to its room without splitting a character."""
-    if dtype.kind != "S":
-        return np.asarray(values, dtype)
-    room = dtype.itemsize
-    return np.array([str(text).encode()[:room].decode(errors="ignore").encode() for text in values], dtype)
