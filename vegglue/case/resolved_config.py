@@ -16,6 +16,7 @@ from vegglue.case.safe_yaml import yaml_of
 from vegglue.case.schema import Case
 from vegglue.case.text_files import write_text
 from vegglue.errors import InputError, path_from, shown_path
+from vegglue.wording.remedies import KNOWN_BY_THESE
 
 # Keys that a finished ensemble does not depend on, as pydantic wants those to leave out.
 NOT_SIMULATED = dict.fromkeys(
@@ -108,7 +109,6 @@ def _files_in(folder: Path) -> list[Path]:
     return sorted(file for file in folder.rglob("*") if file.is_file() and file.parent.name != "__pycache__")
 
 
-HEADING = "# By these vegglue knows what it wrote; what was edited since is replaced with --force only.\n"
 LINE = re.compile(r"^# sha256 ([0-9a-f]{16}) of (.+)\n", re.MULTILINE)
 
 
@@ -124,7 +124,7 @@ def write_made(texts: Mapping[Path, str], advice: str, force: bool = False) -> N
         write_text(table, texts[table], advice)
     stamped = {path.name: texts[path] for path in (config, *tables)}
     lines = "".join(f"# sha256 {_short(text)} of {name}\n" for name, text in stamped.items())
-    write_text(config, texts[config] + HEADING + lines, advice)
+    write_text(config, texts[config] + KNOWN_BY_THESE + lines, advice)
 
 
 def refuse_not_made(texts: Mapping[Path, str], advice: str, force: bool = False) -> None:
@@ -146,7 +146,7 @@ def refuse_not_made(texts: Mapping[Path, str], advice: str, force: bool = False)
             continue
         except OSError:
             there = ""  # not readable: not what vegglue wrote
-        body, heading, lines = there.rpartition(HEADING)
+        body, heading, lines = there.rpartition(KNOWN_BY_THESE)
         there = body if heading and not LINE.sub("", lines) else there
         if there != text and stated.get(path.name) != _short(there):
             raise InputError(

@@ -35,6 +35,7 @@ from vegglue.engine.interface import Model, Point, linearise_from, responses
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL, kind_of, velocity_rows
 from vegglue.measurements.observations import section_places, station_table
 from vegglue.wording.numbers import in_digits
+from vegglue.wording.sentences import phrase
 
 # How near to a line of bed levels a new one is the same [m], and hours of work by which outlines of plants are taken
 # with a total station. Chosen.
@@ -229,7 +230,7 @@ def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
             # A_l' (B_l B_l' + s^2 I)^(-1/2) of the answers A = F.
             lower = np.linalg.cholesky(at @ at.T + of_work.errors.survey**2 * np.eye(len(at)))
             less = answers @ scipy.linalg.solve_triangular(lower, at, lower=True).T
-            name = f"a surveyed line of the bed at x = {x:.0f} m"
+            name = phrase("possible_measurement", "line", f"{x:.0f}")
             hours = of_work.costs.survey_line
             found.append(MeasurementPlan(name, nothing, no_station, hours, float(x), "", less))
     if case.model_error.edges and case.plants.patches:
@@ -237,7 +238,7 @@ def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
         sides = site_error_columns(model, point, ModelError(edges=case.model_error.edges), drag)
         # Corners that are levelled in leave a fifth of the error, and a 25th of its square.
         less = np.sqrt(1.0 - 0.2**2) * sides
-        name = "the outlines of the plants, by total station"
+        name = phrase("possible_measurement", "outlines")
         found.append(MeasurementPlan(name, nothing, no_station, OUTLINES, float(grid.x.mean()), "", less))
     return found
 
@@ -270,12 +271,12 @@ def _ideas(
             found.append(([experiment], float(x), np.sort(there.astype(float))))
     taken = [(x, there) for _, x, there in sorted(found, key=lambda one: one[1])]
     new = [float(x) for x in places if taken and min(abs(x - there) for there, _ in taken) > near]
-    sections = [(f"a section at x = {x:.0f} m ({usual})", usual, x, y, 0.0) for x in new]
+    sections = [(phrase("possible_measurement", "section", f"{x:.0f}", usual), usual, x, y, 0.0) for x in new]
     for x, here in taken:
-        at = f"the section at x = {round(x, 2):g} m"
-        sections.append((f"{at} again ({usual})", usual, x, here, 0.0))
-        others = [name for name in model.case.experiments if name not in at_hand]
-        sections += [(f"{at} {experiment}", experiment, x, here, costs.discharge) for experiment in others]
+        at = f"{round(x, 2):g}"
+        sections.append((phrase("possible_measurement", "again", at, usual), usual, x, here, 0.0))
+        for other in (name for name in model.case.experiments if name not in at_hand):
+            sections.append((phrase("possible_measurement", "at-flow", at, other), other, x, here, costs.discharge))
     ideas = []
     for name, experiment, x, verticals, more in sections:  # verticals that the water covers, see `expected_depth`
         site, grid = in_experiment(model.site, experiment), model.site.grid
@@ -286,9 +287,10 @@ def _ideas(
             ideas.append((name, experiment, x, wet, STREAMWISE, hours))
     across = y if y.size else np.array(model.case.grid.y)
     middle = np.array([float(0.5 * (across[0] + across[-1]))])
-    return ideas + [
-        (f"a gauge at x = {x:.0f} m ({usual})", usual, float(x), middle, WATER_LEVEL, costs.gauge) for x in places[::2]
-    ]
+    for x in places[::2]:
+        name = phrase("possible_measurement", "gauge", f"{x:.0f}", usual)
+        ideas.append((name, usual, float(x), middle, WATER_LEVEL, costs.gauge))
+    return ideas
 
 
 def with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
@@ -322,7 +324,7 @@ def with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
         level = floor + depth * factor**LEVEL_POWER
         digits = max(1 - math.floor(math.log10(depth * factor**LEVEL_POWER)), 0) if depth > 0.0 else 2
         discharge = {inflow: float(q) * factor for inflow, q in one.discharge.items()}
-        plan = f"at {in_digits(factor * totals[name])} m3/s (level at the outlet about {level:.{digits}f} m)"
+        plan = phrase("possible_flow", in_digits(factor * totals[name]), f"{level:.{digits}f}")
         more[plan] = one.model_copy(update={"discharge": discharge, "level": level})
     unseen = {name: one for name, one in more.items() if name not in case.experiments}
     return case.model_copy(update={"experiments": {**case.experiments, **unseen}})

@@ -220,7 +220,7 @@ def bed_picture(run: Run, diagnosis: Diagnosis) -> Iterator[Picture]:
     """The map of what measurements change a surveyed bed by, if its survey states an error."""
     mapped = diagnosis.bed_map
     if mapped is not None:
-        drawn = DrawnField(mapped.x, mapped.y, mapped.value, mapped.error, "change of the bed level", "m")
+        drawn = DrawnField(mapped.x, mapped.y, mapped.value, mapped.error, phrase("label", "bed change"), "m")
         figure = draw_field_map(drawn, replace(plan_marks(diagnosis, outlines(run.case)), spots=[]))
         yield published_picture(run, figure, "learned-bed", "caption_bed")
 

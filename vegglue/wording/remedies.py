@@ -14,3 +14,5 @@ ANOTHER_NAME = "give another place by --folder"
 ANOTHER_RUNS = "expected a folder that can be made there; give another one by --runs"
 ROOM_FOR_TEMPORARY = "free some room in the folder for temporary files"
 KEEP_FIELDS = "state in `simulate.fields` where they are to be kept and run {}"
+# Above the hashes in a config that was made.
+KNOWN_BY_THESE = "# By these vegglue knows what it wrote; what was edited since is replaced with --force only.\n"
