@@ -73,22 +73,28 @@ def test_cells_finer_than_the_bed_varies_have_its_error_from_places_between(surv
     assert np.linalg.norm(stated) == pytest.approx(np.linalg.norm(dense), rel=0.01)
 
 
+def learned_from(before: Baseline, true: np.ndarray) -> tuple[np.ndarray, LearnedBed]:
+    """Responses to the bed (station, cells), and what is learned of one off by `true` (cells,) [m], to first order."""
+    model, point = before.model, before.fitted.point
+    cells = cell_responses(model, point, ("bed",)).of["bed"].reshape(len(model.station), -1)
+    value = point.prediction + cells @ true
+    changed = replace(before, model=replace(model, station=model.station.assign(value=value)), coarse=None)
+    found = learned_bed(replace(changed, on_coarse=None, noise=replace(before.noise, value=value[before.noise.rows])))
+    assert found is not None
+    return cells, found
+
+
 def test_the_flow_finds_a_bed_that_was_drawn(surveyed: tuple[Model, Point]) -> None:
     """Of a bed drawn from the covariance, velocities recover part, with an error as stated."""
     model, _ = surveyed
     before = baseline(model)
     columns = bed_error_columns(model.case, model.site.grid)
     true = columns @ np.random.default_rng(3).standard_normal(columns.shape[1])
-    answers = cell_responses(model, before.fitted.point, ("bed",)).of["bed"].reshape(len(model.station), -1) @ true
-    value = before.fitted.point.prediction + answers
-    changed = replace(before, model=replace(model, station=model.station.assign(value=value)), coarse=None)
-    changed = replace(changed, on_coarse=None, noise=replace(before.noise, value=value[before.noise.rows]))
-    found = learned_bed(changed)
-    assert found is not None
+    cells, found = learned_from(before, true)
     left = true - found.correction.ravel()
     assert np.sum(left**2) < np.sum(true**2)
     assert np.mean(np.abs(left) <= 2.5 * found.error.ravel() + 1e-3) > 0.9
-    cells = cell_responses(model, before.fitted.point, ("bed",)).of["bed"].reshape(len(model.station), -1)
+    answers = cells @ true
     better = answers - cells @ found.correction.ravel()
     assert np.sum(better**2) < 0.7 * np.sum(answers**2)
 
@@ -120,12 +126,7 @@ def test_a_spot_is_off_by_the_mean_over_it_with_its_error_and_evidence(surveyed:
     weight /= weight.sum()
     at_spot = weight @ columns
     true = -0.1 * columns @ at_spot / (at_spot @ at_spot)
-    answers = cell_responses(model, before.fitted.point, ("bed",)).of["bed"].reshape(len(model.station), -1) @ true
-    value = before.fitted.point.prediction + answers
-    changed = replace(before, model=replace(model, station=model.station.assign(value=value)), coarse=None)
-    changed = replace(changed, on_coarse=None, noise=replace(before.noise, value=value[before.noise.rows]))
-    found = learned_bed(changed)
-    assert found is not None
+    _, found = learned_from(before, true)
     there, elsewhere = (bed_of_spots(found, *places[:, j : j + 1]) for j in range(2))
     assert there.before[0] == pytest.approx(np.linalg.norm(at_spot), rel=1e-6)
     assert there.mean[0] == pytest.approx(float(weight @ found.correction.ravel()), rel=1e-6)
