@@ -19,47 +19,77 @@ UNIT_OF_FIELD = {"friction": "-", "bed": "m", "viscosity": "m2/s", "inflow": "m/
 
 @dataclass(frozen=True)
 class PatchOutline:
-    """Plants that are not on the map, as a rectangle."""
+    """Plants that are not on the map, as a rectangle.
 
-    # angle, height, proportional: inclination to x [deg], height of the plants [m] and how they act where they stand
-    # out of the water, the shapes of the effect beside those of a spot
+    Attributes
+    ----------
+    angle, height, proportional : float
+        Inclination to x [deg], height of the plants [m] and how they act where they stand out of the water, the
+        shapes of the effect beside those of a spot.
+    length_error, width_error, angle_error : float
+        Standard errors of half length, half width [m] and inclination [deg].
+    like : str
+        The patch of the map whose drag is the plausible size.
+    """
+
     angle: float
     height: float
     proportional: float
-    # length_error, width_error, angle_error: standard errors of half length, half width [m] and inclination [deg]
     length_error: float
     width_error: float
     angle_error: float
-    like: str  # the patch of the map whose drag is the plausible size
+    like: str
 
 
 @dataclass(frozen=True)
 class LocalAnomaly:
-    """A place where something unlisted changes a term of the equations."""
+    """A place where something unlisted changes a term of the equations.
 
-    # x, y, length, width: middle, half length and half width of the spot, or of the outline [m]
+    Attributes
+    ----------
+    x, y, length, width : float
+        Middle, half length and half width of the spot, or of the outline [m].
+    term, effect : str
+        The term, or barrier, and the effect that stands for the place in the library.
+    amplitude : float
+        Its size [unit].
+    interval95 : (float, float)
+        Of the amplitude [unit].
+    unit : str
+    score : float
+        Of its fingerprint [standard errors].
+    experiments : tuple of str
+        Those that point at it.
+    odds : dict of float
+        Over the best hypothesis of each other kind, by its name [-].
+    plausible : float
+        A plausible size there [unit].
+    x_error, y_error : float
+        Standard errors over all spots that could be it [m].
+    x_spread, y_spread : float
+        The same if traces are nature's own, over which `extend` spreads it [m]; 0 with an outline.
+    outline : PatchOutline or None
+        Of plants that are not on the map; None for a spot.
+    """
+
     x: float
     y: float
     length: float
     width: float
-    # term, effect: the term, or barrier, and the effect that stands for the place in the library
     term: str
     effect: str
-    # amplitude, interval95, unit: size with its 95 % interval
     amplitude: float
     interval95: tuple[float, float]
     unit: str
-    score: float  # of its fingerprint [standard errors]
-    experiments: tuple[str, ...]  # those that point at it
-    odds: dict[str, float]  # over the best hypothesis of each other kind, by its name [-]
-    plausible: float  # a plausible size there [unit]
-    # x_error, y_error: standard errors over all spots that could be it [m]
+    score: float
+    experiments: tuple[str, ...]
+    odds: dict[str, float]
+    plausible: float
     x_error: float = 0.0
     y_error: float = 0.0
-    # x_spread, y_spread: the same if traces are nature's own, over which `extend` spreads it [m]; 0 with an outline
     x_spread: float = 0.0
     y_spread: float = 0.0
-    outline: PatchOutline | None = None  # of plants that are not on the map; None for a spot
+    outline: PatchOutline | None = None
 
     @property
     def nearest_odds(self) -> tuple[tuple[str, float], ...]:
@@ -79,44 +109,81 @@ class LocalAnomaly:
 
 @dataclass(frozen=True)
 class PlaceMap:
-    """Scores of a spot of one term everywhere, in the model as it was."""
+    """Scores of a spot of one term everywhere, in the model as it was.
 
-    term: str  # of the first place that was found, drag without any and for an obstacle across the channel
-    # x, y: middles of spots (spot,) [m]; those of one length stand together, in the order of x
+    Attributes
+    ----------
+    term : str
+        Of the first place that was found, drag without any and for an obstacle across the channel.
+    x, y : ndarray (spot,)
+        Middles of spots [m]; those of one length stand together, in the order of x.
+    score : ndarray (spot,)
+        [standard errors]
+    """
+
+    term: str
     x: Array
     y: Array
-    score: Array  # (spot,) [standard errors]
+    score: Array
 
 
 @dataclass(frozen=True)
 class FaultyInstrument:
-    """An instrument found to be off, whose readings are excluded."""
+    """An instrument found to be off, whose readings are excluded.
 
-    kind: str  # a reading, a position, a probe, a gauge, or a surveyed line of the bed
-    # x, y: where it stood [m], NaN if at several places
+    Attributes
+    ----------
+    kind : str
+        A reading, a position, a probe, a gauge, or a surveyed line of the bed.
+    x, y : float
+        Where it stood [m], NaN if at several places.
+    stations : tuple of int
+        Rows of its readings.
+    offset : float
+        Excess of its readings [unit].
+    interval95 : (float, float)
+        Of the offset [unit].
+    unit : str
+        Of its kind.
+    log_factor : float
+        ln of the Bayes factor against none [-].
+    factor : float
+        Reading over true value [-], NaN if that explains the readings no better than an offset.
+    """
+
+    kind: str
     x: float
     y: float
-    stations: tuple[int, ...]  # rows of its readings
-    # offset, interval95, unit: excess of its readings with the 95 % interval [unit of its kind]
+    stations: tuple[int, ...]
     offset: float
     interval95: tuple[float, float]
     unit: str
-    log_factor: float  # ln of the Bayes factor against none [-]
-    # Reading over true value [-], NaN if that explains the readings no better than an offset
+    log_factor: float
     factor: float = float("nan")
 
 
 @dataclass(frozen=True)
 class FieldFound:
-    """A smooth field of a term that would close the misfit."""
+    """A smooth field of a term that would close the misfit.
+
+    Attributes
+    ----------
+    term : str
+    size : float
+        Standard deviation [unit of the term].
+    length, width : float
+        Half length and half width of its Gaussian basis functions [m].
+    log_factor : float
+        ln of its Bayes factor against none [-].
+    value, error, x, y : float
+        Value and standard error [unit of the term] at the place [m] of highest significance.
+    """
 
     term: str
-    size: float  # standard deviation [unit of the term]
-    # length, width: half length and half width of its Gaussian basis functions [m]
+    size: float
     length: float
     width: float
-    log_factor: float  # ln of its Bayes factor against none [-]
-    # value, error, x, y: value and standard error [unit of the term] at the place [m] of highest significance
+    log_factor: float
     value: float
     error: float
     x: float
@@ -125,32 +192,49 @@ class FieldFound:
 
 @dataclass(frozen=True)
 class FieldMapKept:
-    """The smooth field of a term over the grid on which it was computed."""
+    """The smooth field of a term over the grid on which it was computed.
 
-    # x, y: cell centres, (nx,) and (ny,) [m]
+    Attributes
+    ----------
+    x, y : ndarray (nx,), (ny,)
+        Cell centres [m].
+    value, error : ndarray (nx, ny)
+        Value and standard error [unit of the term].
+    """
+
     x: Array
     y: Array
-    # value, error: value and standard error (nx, ny) [unit of the term]
     value: Array
     error: Array
 
 
 @dataclass(frozen=True)
 class CandidateLaw:
-    """A law of the grammar, to first order."""
+    """A law of the grammar, to first order.
 
-    # name, title, equation: of the law in the library
+    Attributes
+    ----------
+    name, title, equation : str
+        Of the law in the library.
+    term, quantity : str
+        What it changes and with what, in words.
+    reference : float or None
+        r [unit of the quantity]; None for a law that has none.
+    scale, strength : float
+        A plausible strength a, and the one found [-].
+    chance : float
+        Probability among all that was compared [-].
+    """
+
     name: str
-    # term, quantity: what it changes and with what, in words
     term: str
     quantity: str
     title: str
     equation: str
-    reference: float | None  # r [unit of the quantity]; None for a law that has none
-    # scale, strength: a plausible strength a, and the one found [-]
+    reference: float | None
     scale: float
     strength: float
-    chance: float  # probability among all that was compared [-]
+    chance: float
 
     @property
     def shapes(self) -> dict[str, float]:
@@ -160,15 +244,30 @@ class CandidateLaw:
 
 @dataclass(frozen=True)
 class CandidateLaws:
-    """Laws that are significant in what is left, whatever was accepted."""
+    """Laws that are significant in what is left, whatever was accepted.
 
-    p: float  # chance that errors alone make laws as significant [-]
-    tried: int  # their number
-    chance: float  # probability of all together among all that was compared [-]
-    laws: tuple[CandidateLaw, ...]  # those that hold 95 % of it, the most probable first
-    calibrated: bool = False  # whether the probabilities are those of calibrated laws, else to first order
-    # Whether laws are significant beside the accepted effects, too: calibrated together with these. Else these and the
-    # laws explain the same.
+    Attributes
+    ----------
+    p : float
+        Chance that errors alone make laws as significant [-].
+    tried : int
+        Their number.
+    chance : float
+        Probability of all together among all that was compared [-].
+    laws : tuple of CandidateLaw
+        Those that hold 95 % of it, the most probable first.
+    calibrated : bool
+        Whether the probabilities are those of calibrated laws, else to first order.
+    needed : bool
+        Whether laws are significant beside the accepted effects, too: calibrated together with these. Else these
+        and the laws explain the same.
+    """
+
+    p: float
+    tried: int
+    chance: float
+    laws: tuple[CandidateLaw, ...]
+    calibrated: bool = False
     needed: bool = True
 
     @property
@@ -190,13 +289,22 @@ class CandidateLaws:
 
 @dataclass(frozen=True)
 class ModelErrorUsed:
-    """The model's own error."""
+    """The model's own error.
 
-    # friction, bed: relative error of friction [-] and error of the bed [m] as allowed
+    Attributes
+    ----------
+    friction, bed : float
+        Relative error of friction [-] and error of the bed [m] as allowed.
+    needed : float
+        The share of both that is most likely for the last residual [-].
+    log_ratio : float
+        ln of its likelihood ratio against what is allowed [-].
+    """
+
     friction: float
     bed: float
-    needed: float  # the share of both that is most likely for the last residual [-]
-    log_ratio: float  # ln of its likelihood ratio against what is allowed [-]
+    needed: float
+    log_ratio: float
 
     @property
     def asks_for_more(self) -> bool:
@@ -213,18 +321,32 @@ NEVER = 1e100
 
 @dataclass(frozen=True)
 class AmplitudeEstimate:
-    """How large an effect is, in the unit of its amplitude."""
+    """How large an effect is, in the unit of its amplitude.
 
-    # value, interval95: from its own refit if `refitted`, else to first order; with its prior
+    Attributes
+    ----------
+    value : float
+        From its own refit if `refitted`, else to first order; with its prior [unit].
+    interval95 : (float, float)
+        95 % interval of the value [unit].
+    unit : str
+    off, scale : float
+        Value at which the effect is off, and a plausible distance from it [unit].
+    refitted : bool
+    objective : float
+        Least |W (y - f)|^2 + |z|^2 with the effect [-], predicted if it was not refitted.
+    support : (float, float)
+        Range within which the amplitude must lie [unit].
+    """
+
     value: float
     interval95: tuple[float, float]
     unit: str
-    # off, scale: value at which the effect is off, and a plausible distance from it
     off: float
     scale: float
     refitted: bool
-    objective: float  # least |W (y - f)|^2 + |z|^2 with the effect [-], predicted if it was not refitted
-    support: tuple[float, float] = (-np.inf, np.inf)  # range within which the amplitude must lie
+    objective: float
+    support: tuple[float, float] = (-np.inf, np.inf)
 
     @property
     def relative_size(self) -> float:
@@ -234,22 +356,42 @@ class AmplitudeEstimate:
 
 @dataclass(frozen=True)
 class ScoreTest:
-    """Score of an effect, and how often errors alone reach it."""
+    """Score of an effect, and how often errors alone reach it.
 
-    score: float  # T [standard errors]
-    # Chance that errors alone make any effect score as high [-], counted among bootstrap draws and never below one over
-    # their number; see `calibration/score_test`
+    Attributes
+    ----------
+    score : float
+        T [standard errors].
+    p_family : float
+        Chance that errors alone make any effect score as high [-], counted among bootstrap draws and never below
+        one over their number; see `calibration/score_test`.
+    """
+
+    score: float
     p_family: float
 
 
 @dataclass(frozen=True)
 class Detectability:
-    """Whether these data could show an effect."""
+    """Whether these data could show an effect.
 
-    visibility: float  # share of its fingerprint that calibration cannot mimic [-]
-    smallest: float  # distance of the amplitude from off that is detected 19 times of 20 [unit of the amplitude]
-    testable: bool  # whether that is less than twice a plausible one, and within its support
-    # confounder, cosine: the parameter whose slope is most like the fingerprint, and the cosine between both [-]
+    Attributes
+    ----------
+    visibility : float
+        Share of its fingerprint that calibration cannot mimic [-].
+    smallest : float
+        Distance of the amplitude from off that is detected 19 times of 20 [unit of the amplitude].
+    testable : bool
+        Whether that is less than twice a plausible one, and within its support.
+    confounder : str
+        The parameter whose slope is most like the fingerprint.
+    cosine : float
+        Between both [-].
+    """
+
+    visibility: float
+    smallest: float
+    testable: bool
     confounder: str
     cosine: float
 
@@ -266,11 +408,22 @@ class Detectability:
 
 @dataclass(frozen=True)
 class CandidateEffect:
-    """One effect in the light of the data, in the last model in which it was tested."""
+    """One effect in the light of the data, in the last model in which it was tested.
+
+    Attributes
+    ----------
+    name : str
+    title : str
+    shapes : dict of float
+        Shapes by name at which it scores best.
+    amplitude : AmplitudeEstimate
+    test : ScoreTest
+    detectability : Detectability
+    """
 
     name: str
     title: str
-    shapes: dict[str, float]  # shapes by name at which it scores best
+    shapes: dict[str, float]
     amplitude: AmplitudeEstimate
     test: ScoreTest
     detectability: Detectability
@@ -283,34 +436,62 @@ def effects_among(candidate_effects: Sequence[CandidateEffect]) -> int:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another explanation with its probability."""
+    """Another explanation with its probability.
+
+    Attributes
+    ----------
+    name : str
+    kind : str
+        `effect`, a term at a place, or the kind of an instrument.
+    probability : float
+        [-]
+    x, y : float
+        Of a place or an instrument [m], NaN otherwise.
+    amplitude : float
+        Of what is at a place [unit of the term], NaN otherwise.
+    """
 
     name: str
-    kind: str  # `effect`, a term at a place, or the kind of an instrument
-    probability: float  # [-]
-    # x, y: of a place or an instrument [m], NaN otherwise
+    kind: str
+    probability: float
     x: float = float("nan")
     y: float = float("nan")
-    amplitude: float = float("nan")  # of what is at a place [unit of the term], NaN otherwise
+    amplitude: float = float("nan")
 
 
 @dataclass(frozen=True)
 class Step:
-    """One round of the search."""
+    """One round of the search.
 
-    accepted: str  # name of the effect that was accepted
-    # rivals, chances: the effects that together hold 95 % of the probability, and the probability of each among all of
-    # every kind [-]
+    Attributes
+    ----------
+    accepted : str
+        Name of the effect that was accepted.
+    rivals : tuple of str
+        The effects that together hold 95 % of the probability.
+    chances : tuple of float
+        Of each among all of every kind [-].
+    groups : tuple of tuple of str
+        Rivals that the data cannot separate.
+    chi2_before, chi2_after : float
+        [-]
+    p_family : float
+        Chance that errors alone sound the alarm as loudly [-], counted, see `score_test.alarm_p`.
+    others : dict of float
+        Probability of the best of each other kind by its name, unless negligible [-].
+    places : dict of LocalAnomaly
+        Those of the others that are something at a place.
+    """
+
+    accepted: str
     rivals: tuple[str, ...]
     chances: tuple[float, ...]
-    groups: tuple[tuple[str, ...], ...]  # rivals that the data cannot separate
-    # chi2_before, chi2_after: [-]
+    groups: tuple[tuple[str, ...], ...]
     chi2_before: float
     chi2_after: float
-    p_family: float  # chance that errors alone sound the alarm as loudly [-], counted, see `score_test.alarm_p`
-    # Probability of the best of each other kind by its name, unless negligible [-]
+    p_family: float
     others: dict[str, float] = field(default_factory=dict)
-    places: dict[str, LocalAnomaly] = field(default_factory=dict)  # those of the others that are something at a place
+    places: dict[str, LocalAnomaly] = field(default_factory=dict)
 
     @property
     def chance(self) -> dict[str, float]:

@@ -30,14 +30,25 @@ from vegglue.wording.sentences import phrase, tagged
 
 @dataclass(frozen=True)
 class Misfit:
-    """chi2 = |W (y - f)|^2 of the first and of the last model."""
+    """chi2 = |W (y - f)|^2 of the first and of the last model.
 
-    # chi2_first, chi2: [-]
+    Attributes
+    ----------
+    chi2_first, chi2 : float
+        [-]
+    freedom : int
+        Degrees of freedom of the last.
+    p : float
+        Chance of a chi2 as large under errors alone [-].
+    zones : DataFrame
+        Mean misfit of the first model by experiment, section and zone [errors of the last].
+    """
+
     chi2_first: float
     chi2: float
-    freedom: int  # degrees of freedom of the last
-    p: float  # chance of a chi2 as large under errors alone [-]
-    zones: pd.DataFrame  # mean misfit of the first model by experiment, section and zone [errors of the last]
+    freedom: int
+    p: float
+    zones: pd.DataFrame
 
     @property
     def worst(self) -> tuple[pd.Series, float] | None:
@@ -60,32 +71,60 @@ class Misfit:
 
 @dataclass(frozen=True)
 class FirstScreening:
-    """Score tests of the first model."""
+    """Score tests of the first model.
 
-    threshold: float  # score that errors alone reach at the false-alarm rate of effects [standard errors]
-    scores: dict[str, float]  # by name [standard errors]
-    # compared, cosine: the strongest effects (c,), and the cosines between their fingerprints (c, c) [-]
+    Attributes
+    ----------
+    threshold : float
+        Score that errors alone reach at the false-alarm rate of effects [standard errors].
+    scores : dict of float
+        By name [standard errors].
+    compared : tuple of str
+        The strongest effects, c of them.
+    cosine : ndarray (c, c)
+        Between their fingerprints [-].
+    """
+
+    threshold: float
+    scores: dict[str, float]
     compared: tuple[str, ...]
     cosine: Array
 
 
 @dataclass(frozen=True)
 class ParameterEstimates:
-    """Calibrated parameters by name."""
+    """Calibrated parameters by name.
 
-    first: dict[str, float]  # of the first model
-    last: dict[str, tuple[float, float, float]]  # of the last model: value and 95 % interval
+    Attributes
+    ----------
+    first : dict of float
+        Of the first model.
+    last : dict of (float, float, float)
+        Of the last model: value and 95 % interval.
+    """
+
+    first: dict[str, float]
+    last: dict[str, tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
 class Predictions:
-    """Predictions at the stations."""
+    """Predictions at the stations.
 
-    station: pd.DataFrame  # the table of stations
-    # first, last: of the first and of the last model (station,) [unit of the kind]
+    Attributes
+    ----------
+    station : DataFrame
+        The table of stations.
+    first, last : ndarray (station,)
+        Of the first and of the last model [unit of the kind].
+    error : ndarray (station,)
+        Standard errors of the readings, NaN if not used.
+    """
+
+    station: pd.DataFrame
     first: Array
     last: Array
-    error: Array  # standard errors of the readings (station,), NaN if not used
+    error: Array
 
     @property
     def table(self) -> pd.DataFrame:

@@ -46,11 +46,20 @@ COMPRESSED_AT_ONCE = 2**20  # [bytes]
 
 @dataclass(frozen=True)
 class FieldWindow:
-    """Columns of the grid around a range along x."""
+    """Columns of the grid around a range along x.
 
-    range: tuple[float, float]  # from where to where [m]
-    columns: slice  # of the grid
-    # x, y: cell centres (columns,) and (ny,) [m]
+    Attributes
+    ----------
+    range : (float, float)
+        From where to where [m].
+    columns : slice
+        Of the grid.
+    x, y : ndarray (columns,), (ny,)
+        Cell centres [m].
+    """
+
+    range: tuple[float, float]
+    columns: slice
     x: Array
     y: Array
 
@@ -190,20 +199,44 @@ STATION_UNITS = dict.fromkeys(("x", "y", "depth"), "m") | dict.fromkeys(("value"
 
 @dataclass(frozen=True)
 class Header:
-    """What is known of an ensemble before its first member is solved."""
+    """What is known of an ensemble before its first member is solved.
 
-    parameters: Mapping[str, np.ndarray]  # (member,) each
-    units: Mapping[str, str]  # of the parameters
-    station: pd.DataFrame  # all rows of observations.table
+    Attributes
+    ----------
+    parameters : mapping of ndarray (member,)
+        By name [unit of each].
+    units : mapping of str
+        Of the parameters.
+    station : DataFrame
+        All rows of observations.table.
+    experiments : tuple of str
+    sections : tuple of (str, float)
+        Name, x [m].
+    chunks : int
+        How many fixed sets of members the run is cut into.
+    cut : str
+        Hash of these sets.
+    config : str
+        Resolved YAML.
+    config_hash : str
+    seed : int
+    version : str
+    window : FieldWindow or None
+        Where fields are kept.
+    """
+
+    parameters: Mapping[str, np.ndarray]
+    units: Mapping[str, str]
+    station: pd.DataFrame
     experiments: tuple[str, ...]
-    sections: tuple[tuple[str, float], ...]  # name, x [m]
-    chunks: int  # how many fixed sets of members the run is cut into
-    cut: str  # hash of these sets
-    config: str  # resolved YAML
+    sections: tuple[tuple[str, float], ...]
+    chunks: int
+    cut: str
+    config: str
     config_hash: str
     seed: int
     version: str
-    window: FieldWindow | None = None  # where fields are kept
+    window: FieldWindow | None = None
 
     @property
     def members(self) -> int:

@@ -33,13 +33,24 @@ KeptFlags = Annotated[np.ndarray, PlainValidator(lambda kept: np.array(TypeAdapt
 
 @dataclass(frozen=True)
 class InSample:
-    """Errors at what the calibration used."""
+    """Errors at what the calibration used.
 
-    rmse: dict[str, KeptNumber]  # root mean square error by kind [its unit], NaN if not measured
-    # chi2, stations: of independent errors [-], over so many stations
+    Attributes
+    ----------
+    rmse : dict of float
+        Root mean square error by kind [its unit], NaN if not measured.
+    chi2 : float
+        Of independent errors [-].
+    stations : int
+        Over how many.
+    noise_floor : float
+        Root mean square measurement error of a velocity [m/s].
+    """
+
+    rmse: dict[str, KeptNumber]
     chi2: KeptNumber
     stations: int
-    noise_floor: KeptNumber  # root mean square measurement error of a velocity [m/s]
+    noise_floor: KeptNumber
 
     @property
     def velocity(self) -> float:
@@ -50,60 +61,104 @@ class InSample:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Errors of each used station when its section, or its experiment, is left out of the calibration."""
+    """Errors of each used station when its section, or its experiment, is left out of the calibration.
 
-    # sections, experiments: (n,) [unit of the kind], NaN if nothing could be left out
+    Attributes
+    ----------
+    sections, experiments : ndarray (n,)
+        [unit of the kind], NaN if nothing could be left out.
+    velocity : ndarray of bool (n,)
+        Which are velocities along x, or of any direction if there is none along x.
+    clusters : tuple of (str, str)
+        Experiment and section of each.
+    """
+
     sections: KeptErrors
     experiments: KeptErrors
-    velocity: KeptFlags  # which are velocities along x, or of any direction if there is none along x (n,)
-    clusters: tuple[tuple[str, str], ...]  # experiment and section of each
+    velocity: KeptFlags
+    clusters: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class PredictiveScores:
-    """How well held-out velocities are predicted with their spread; NaN if nothing could be left out."""
+    """How well held-out velocities are predicted with their spread; NaN if nothing could be left out.
 
-    log_score: KeptNumber  # mean log predictive density by sections [-]
-    # inside50, inside95: share within the 50 % and the 95 % band [-]
+    Attributes
+    ----------
+    log_score : float
+        Mean log predictive density by sections [-].
+    inside50, inside95 : float
+        Share within the 50 % and the 95 % band [-].
+    """
+
+    log_score: KeptNumber
     inside50: KeptNumber
     inside95: KeptNumber
 
 
 @dataclass(frozen=True)
 class ModelScore:
-    """The errors of one model of a comparison."""
+    """The errors of one model of a comparison.
 
-    # name, title, effects: of the case
+    Attributes
+    ----------
+    name, title : str
+        Of the case.
+    effects : tuple of str
+        Of the case.
+    values : dict of (float, float, float)
+        Parameters with their 95 % intervals.
+    in_sample : InSample
+    held_out : HeldOut
+    predictive : PredictiveScores
+    homogeneity : dict of float
+        Chance that a parameter is the same in all experiments, by name [-].
+    validation : float
+        Root mean square error of velocities that no calibration used [m/s], NaN without them.
+    validation_inside95 : float
+        Share of them within the 95 % band, of a bed whose survey states its error [-]; else NaN.
+    """
+
     name: str
     title: str
     effects: tuple[str, ...]
-    values: dict[str, tuple[KeptNumber, KeptNumber, KeptNumber]]  # parameters with their 95 % intervals
+    values: dict[str, tuple[KeptNumber, KeptNumber, KeptNumber]]
     in_sample: InSample
     held_out: HeldOut
     predictive: PredictiveScores
-    homogeneity: dict[str, KeptNumber]  # chance that a parameter is the same in all experiments, by name [-]
-    validation: KeptNumber  # root mean square error of velocities that no calibration used [m/s], NaN without them
-    # Share of them within the 95 % band, of a bed whose survey states its error [-]; else NaN
+    homogeneity: dict[str, KeptNumber]
+    validation: KeptNumber
     validation_inside95: KeptNumber = math.nan
 
 
 @dataclass(frozen=True)
 class ComparedModel:
-    """One model of a stored comparison."""
+    """One model of a stored comparison.
 
-    # name, config, config_hash: of the case
+    Attributes
+    ----------
+    name, config, config_hash : str
+        Of the case.
+    added : tuple of str
+        Effects that the model before has not.
+    parameters : int
+        Their number.
+    in_sample, held_out_sections, held_out_experiments, unseen : float
+        Root mean square errors of velocities along x [m/s], NaN if there are none.
+    noise_floor : float
+        Measurement error [m/s].
+    """
+
     name: str
     config: str
     config_hash: str
-    added: tuple[str, ...]  # effects that the model before has not
-    parameters: int  # their number
-    # in_sample, held_out_sections, held_out_experiments, unseen: root mean square errors of velocities along x [m/s],
-    # NaN if there are none
+    added: tuple[str, ...]
+    parameters: int
     in_sample: KeptNumber
     held_out_sections: KeptNumber
     held_out_experiments: KeptNumber
     unseen: KeptNumber
-    noise_floor: KeptNumber  # measurement error [m/s]
+    noise_floor: KeptNumber
 
 
 @dataclass(frozen=True)
@@ -199,15 +254,28 @@ KeptSubject = PlainValidator(lambda kept: TypeAdapter(SUBJECTS[kept["kind"]]).va
 
 @dataclass(frozen=True)
 class ProposedMeasurement:
-    """A measurement that could separate rivals."""
+    """A measurement that could separate rivals.
 
-    name: str  # in words
-    # experiment, x, stations: in which experiment, at which place [m], and how many
+    Attributes
+    ----------
+    name : str
+        In words.
+    experiment : str
+    x : float
+        [m]
+    stations : int
+        How many.
+    hours : float
+        Field work [h].
+    now, then : float
+        Squared standard errors D^2 between the nearest rivals, now and with it [-].
+    """
+
+    name: str
     experiment: str
     x: float
     stations: int
-    hours: float  # field work [h]
-    # now, then: squared standard errors D^2 between the nearest rivals, now and with it [-]
+    hours: float
     now: float
     then: float
 
@@ -219,11 +287,20 @@ class ProposedMeasurement:
 
 @dataclass(frozen=True)
 class Question:
-    """What to separate, and the measurements that could."""
+    """What to separate, and the measurements that could.
 
-    about: Annotated[Subject, KeptSubject]  # the rivals
-    measurements: tuple[ProposedMeasurement, ...]  # by what they add in an hour
-    # D^2 from which a diagnosis detects it 19 times of 20 [-]; infinite if that depends on no size
+    Attributes
+    ----------
+    about : Subject
+        The rivals.
+    measurements : tuple of ProposedMeasurement
+        By what they add in an hour.
+    seen_from : float
+        D^2 from which a diagnosis detects it 19 times of 20 [-]; infinite if that depends on no size.
+    """
+
+    about: Annotated[Subject, KeptSubject]
+    measurements: tuple[ProposedMeasurement, ...]
     seen_from: Annotated[float, BeforeValidator(lambda kept: math.inf if kept is None else kept)] = math.inf
 
     @property

@@ -37,63 +37,119 @@ OWN_UNIT = "that of the parameter, see `unit`"
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """The errors of the data that the misfit is weighed by."""
+    """The errors of the data that the misfit is weighed by.
 
-    errors: str  # "stated" or "estimated"
-    correlation: float  # of the errors of neighbours along a section [-]
-    scale: float  # of the stated errors [-]
-    grid_error: float  # root mean square, from a grid of twice the cell size [m/s, m]; NaN where that cannot be made
+    Attributes
+    ----------
+    errors : str
+        "stated" or "estimated".
+    correlation : float
+        Of the errors of neighbours along a section [-].
+    scale : float
+        Of the stated errors [-].
+    grid_error : float
+        Root mean square, from a grid of twice the cell size [m/s, m]; NaN where that cannot be made.
+    """
+
+    errors: str
+    correlation: float
+    scale: float
+    grid_error: float
 
 
 @dataclass(frozen=True)
 class PosteriorModes:
-    """Where the search for the best fit ended, the best mode first."""
+    """Where the search for the best fit ended, the best mode first.
 
-    starts: int  # members that were followed downhill
-    mode_theta: Annotated[np.ndarray, Stored(("mode", "parameter"), OWN_UNIT)]  # parameters of each
-    mode_chi2: Annotated[np.ndarray, Stored(("mode",))]  # misfit of each
-    mode_weight: Annotated[np.ndarray, Stored(("mode",))]  # weight of the draws nearest to each
+    Attributes
+    ----------
+    starts : int
+        Members that were followed downhill.
+    mode_theta : ndarray (mode, parameter)
+        Parameters of each [unit of each].
+    mode_chi2 : ndarray (mode,)
+        Misfit of each [-].
+    mode_weight : ndarray (mode,)
+        Weight of the draws nearest to each.
+    """
+
+    starts: int
+    mode_theta: Annotated[np.ndarray, Stored(("mode", "parameter"), OWN_UNIT)]
+    mode_chi2: Annotated[np.ndarray, Stored(("mode",))]
+    mode_weight: Annotated[np.ndarray, Stored(("mode",))]
 
 
 @dataclass(frozen=True)
 class ImportanceDraws:
-    """How the members were drawn, and as many draws from the prior to compare them with."""
+    """How the members were drawn, and as many draws from the prior to compare them with.
 
-    # drawn, worth: members, and what they are worth as equal ones, after each round
+    Attributes
+    ----------
+    drawn, worth : ndarray (round,)
+        Members, and what they are worth as equal ones, after each round.
+    log_density : ndarray (member,)
+        ln of the density of the posterior up to a constant; -inf if it failed.
+    prior_theta : dict of ndarray (member,)
+        Draws from the prior.
+    """
+
     drawn: Annotated[np.ndarray, Stored(("round",), type=WHOLE_NUMBERS)]
     worth: Annotated[np.ndarray, Stored(("round",))]
-    # ln of the density of the posterior up to a constant; -inf if it failed
     log_density: Annotated[np.ndarray, Stored(("member",))]
-    prior_theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]  # draws from the prior
+    prior_theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
 
 
 @dataclass(frozen=True)
 class LeaveOneOut:
-    """Each station predicted from all others."""
+    """Each station predicted from all others.
 
-    # elpd, elpd_error: sum of the log predictive densities of stations left out in turn, and its standard error [-]
+    Attributes
+    ----------
+    elpd, elpd_error : float
+        Sum of the log predictive densities of stations left out in turn, and its standard error [-].
+    inside50, inside95 : float
+        Shares of measurements within the 50 % and the 95 % band of the prediction from all others [-].
+    p_calibration : float
+        Chance that shares below are as uneven as these (Kolmogorov-Smirnov) [-].
+    score, score_k : ndarray (station,)
+        Log predictive density given all other stations, and its Pareto k.
+    below : ndarray (station,)
+        Share of the prediction below the measurement.
+    """
+
     elpd: float
     elpd_error: float
-    # inside50, inside95: shares of measurements within the 50 % and the 95 % band of the prediction from all others [-]
     inside50: float
     inside95: float
-    p_calibration: float  # chance that shares below are as uneven as these (Kolmogorov-Smirnov) [-]
-    # score, score_k: log predictive density given all other stations, and its Pareto k
+    p_calibration: float
     score: Annotated[np.ndarray, Stored(("station",))]
     score_k: Annotated[np.ndarray, Stored(("station",))]
-    below: Annotated[np.ndarray, Stored(("station",))]  # share of the prediction below the measurement
+    below: Annotated[np.ndarray, Stored(("station",))]
 
 
 @dataclass(frozen=True)
 class MisfitTest:
-    """Whether the errors explain what the best member leaves, at all stations together and at each."""
+    """Whether the errors explain what the best member leaves, at all stations together and at each.
 
-    # chi2, freedom: of the best member, whitened by the covariance of the errors [-], and its degrees of freedom
+    Attributes
+    ----------
+    chi2 : float
+        Of the best member, whitened by the covariance of the errors [-].
+    freedom : int
+        Its degrees of freedom.
+    p_misfit : float
+        Chance of a chi2 as large under errors alone [-].
+    surprise : ndarray (station,)
+        Residual that calibration cannot explain, in its errors.
+    outlier : ndarray of bool (station,)
+        Whether one such residual among all is no chance.
+    """
+
     chi2: float
     freedom: int
-    p_misfit: float  # chance of a chi2 as large under errors alone [-]
-    surprise: Annotated[np.ndarray, Stored(("station",))]  # residual that calibration cannot explain, in its errors
-    outlier: Annotated[np.ndarray, Stored(("station",), type=YES_OR_NO)]  # one such among all is no chance
+    p_misfit: float
+    surprise: Annotated[np.ndarray, Stored(("station",))]
+    outlier: Annotated[np.ndarray, Stored(("station",), type=YES_OR_NO)]
 
     @property
     def worst_outlier(self) -> int:
@@ -103,12 +159,20 @@ class MisfitTest:
 
 @dataclass(frozen=True)
 class GroupsLeftOut:
-    """Each section, and each experiment, predicted from all other stations."""
+    """Each section, and each experiment, predicted from all other stations.
 
-    # left_out, left_out_stations: sections and experiments left out in turn, and how many stations each has
+    Attributes
+    ----------
+    left_out : ndarray of str (group,)
+        Sections and experiments left out in turn.
+    left_out_stations : ndarray of int (group,)
+        How many stations each has.
+    left_out_score, left_out_k : ndarray (group,)
+        Log predictive density of the stations of each together, and its Pareto k.
+    """
+
     left_out: Annotated[np.ndarray, Stored(("group",), type=IN_WORDS)]
     left_out_stations: Annotated[np.ndarray, Stored(("group",), type=WHOLE_NUMBERS)]
-    # left_out_score, left_out_k: log predictive density of the stations of each together, and its Pareto k
     left_out_score: Annotated[np.ndarray, Stored(("group",))]
     left_out_k: Annotated[np.ndarray, Stored(("group",))]
 
@@ -138,45 +202,88 @@ ByKind = Annotated[dict[str, float], Stored(("kind",), VALUE_UNIT)]
 
 @dataclass(frozen=True)
 class InferenceSettings:
-    """How the members were weighed, and which ensemble they come from."""
+    """How the members were weighed, and which ensemble they come from.
 
-    # "glue": members of the ensemble weighed; "refine": draws around the modes; "surrogate": of a surrogate
+    Attributes
+    ----------
+    method : str
+        "glue": members of the ensemble weighed; "refine": draws around the modes; "surrogate": of a surrogate.
+    likelihood : str
+        "gaussian", "nse" or "inverse-variance".
+    sigma_rule : str
+        "best-member" or "known".
+    threshold : float
+        Smallest efficiency of a member with weight [-]; -inf: none.
+    ensemble_hash : str
+        Config hash of the ensemble, '' where none was needed.
+    seed : int
+        Of the draws.
+    version : str
+        Of vegglue.
+    """
+
     method: str
-    likelihood: str  # "gaussian", "nse" or "inverse-variance"
-    sigma_rule: str  # "best-member" or "known"
-    threshold: float  # smallest efficiency of a member with weight [-]; -inf: none
-    ensemble_hash: str  # config hash of the ensemble, '' where none was needed
-    # seed, version: of the draws; and that of vegglue
+    likelihood: str
+    sigma_rule: str
+    threshold: float
+    ensemble_hash: str
     seed: int
     version: str
 
 
 @dataclass(frozen=True)
 class WeightedSample:
-    """The members: their parameters, what each predicts, how well, and its weight."""
+    """The members: their parameters, what each predicts, how well, and its weight.
 
-    # members, failed, best: how many, those without a flow among them, and the one that fits best
+    Attributes
+    ----------
+    members, failed, best : int
+        How many, those without a flow among them, and the one that fits best.
+    unit : dict of str
+        Of each parameter.
+    theta : dict of ndarray (member,)
+        Values of each parameter [its unit].
+    weights : ndarray (member,)
+        w, of sum 1.
+    efficiency : ndarray (member,)
+        1 - sum (y - f)^2 / sum (y - mean y)^2 (Nash-Sutcliffe).
+    log_likelihood : ndarray (member, station)
+        Gaussian; of a refined posterior that of each station given all others.
+    prediction : ndarray (member, station)
+        f [unit of the kind].
+    """
+
     members: int
     failed: int
     best: int
-    # unit, theta: by parameter: its unit, and its values (member,)
     unit: Annotated[dict[str, str], Stored(("parameter",), type=IN_WORDS)]
     theta: Annotated[dict[str, np.ndarray], Stored(("parameter", "member"), OWN_UNIT)]
-    weights: Annotated[np.ndarray, Stored(("member",))]  # w, of sum 1
-    efficiency: Annotated[np.ndarray, Stored(("member",))]  # 1 - sum (y - f)^2 / sum (y - mean y)^2 (Nash-Sutcliffe)
-    # Gaussian; of a refined posterior that of each station given all others
+    weights: Annotated[np.ndarray, Stored(("member",))]
+    efficiency: Annotated[np.ndarray, Stored(("member",))]
     log_likelihood: Annotated[np.ndarray, Stored(("member", "station"))]
-    prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]  # f [unit of the kind]
+    prediction: Annotated[np.ndarray, Stored(("member", "station"), VALUE_UNIT)]
 
 
 @dataclass(frozen=True)
 class WeightStatistics:
-    """What the weights are worth."""
+    """What the weights are worth.
 
-    weighed: int  # members solved and above the threshold
-    effective_size: float  # N = 1 / sum w^2 (Kish): equal members that the weights w are worth [-]
-    largest_weight: float  # largest w [-]
-    pareto_k: float  # shape of the tail of the weights [-]; above 0.7 they are not to be trusted
+    Attributes
+    ----------
+    weighed : int
+        Members solved and above the threshold.
+    effective_size : float
+        N = 1 / sum w^2 (Kish): equal members that the weights w are worth [-].
+    largest_weight : float
+        Largest w [-].
+    pareto_k : float
+        Shape of the tail of the weights [-]; above 0.7 they are not to be trusted.
+    """
+
+    weighed: int
+    effective_size: float
+    largest_weight: float
+    pareto_k: float
 
 
 @dataclass(frozen=True)
@@ -184,69 +291,120 @@ class Marginals:
     """Each parameter by its name, beside its prior, and the correlation of all pairs.
 
     Of a log-uniform or lognormal parameter, correlation, width_ratio and bound_mass are those of its log10.
+
+    Attributes
+    ----------
+    median, sd : dict of float
+        Median and standard deviation [unit of the parameter].
+    quantiles, prior_quantiles : dict of ndarray (level,)
+        Of the posterior and of the prior at LEVELS [unit of the parameter].
+    log10_median, log10_sd : dict of float
+        The same of log10, if the prior is log-uniform or lognormal [-].
+    correlation : ndarray (parameter, other_parameter)
+        Of all pairs.
+    width_ratio : dict of float
+        95 % range of the posterior over that of the prior.
+    identified : dict of bool
+        Whether that is below IDENTIFIED_BELOW.
+    bounds : dict of ndarray (side,)
+        Of the prior, maybe infinite [unit of the parameter].
+    bound_mass : dict of ndarray (side,)
+        Share of the weight within 2 % of the range of a bound [-].
+    bound_hit : dict of ndarray of bool (side,)
+        Whether it presses against that bound.
     """
 
-    # median, sd: median and standard deviation [unit of the parameter]
     median: ByParameter
     sd: ByParameter
-    # quantiles, prior_quantiles: of the posterior and of the prior at LEVELS
     quantiles: Annotated[dict[str, np.ndarray], Stored(("parameter", "level"), OWN_UNIT)]
     prior_quantiles: Annotated[dict[str, np.ndarray], Stored(("parameter", "level"), OWN_UNIT)]
-    # log10_median, log10_sd: the same of log10, if the prior is log-uniform or lognormal [-]
     log10_median: ByLogParameter
     log10_sd: ByLogParameter
-    correlation: Annotated[np.ndarray, Stored(("parameter", "other_parameter"))]  # of all pairs
-    # 95 % range of the posterior over that of the prior
+    correlation: Annotated[np.ndarray, Stored(("parameter", "other_parameter"))]
     width_ratio: Annotated[dict[str, float], Stored(("parameter",))]
-    # Whether that is below IDENTIFIED_BELOW
     identified: Annotated[dict[str, bool], Stored(("parameter",), type=YES_OR_NO)]
-    bounds: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), OWN_UNIT)]  # of the prior, maybe infinite
-    # bound_mass, bound_hit: share of the weight within 2 % of the range of a bound; and whether it presses against it
+    bounds: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), OWN_UNIT)]
     bound_mass: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"))]
     bound_hit: Annotated[dict[str, np.ndarray], Stored(("parameter", "side"), type=YES_OR_NO)]
 
 
 @dataclass(frozen=True)
 class GoodnessOfFit:
-    """What is left between measured and predicted, and the errors it is compared with, by kind of observation."""
+    """What is left between measured and predicted, and the errors it is compared with, by kind of observation.
 
-    used: int  # stations that count
-    chi2: float  # sum ((y - f) / s)^2 of the best member, s known standard errors [-]; NaN where one is unknown
-    sigma: ByKind  # root mean square residual of the best member, or of the known standard errors, by kind [its unit]
-    # rmse, best_rmse: root mean square residual of the median prediction, and of the best member, by kind [its unit]
+    Attributes
+    ----------
+    used : int
+        Stations that count.
+    chi2 : float
+        sum ((y - f) / s)^2 of the best member, s known standard errors [-]; NaN where one is unknown.
+    sigma : dict of float
+        Root mean square residual of the best member, or of the known standard errors, by kind [its unit].
+    rmse, best_rmse : dict of float
+        Root mean square residual of the median prediction, and of the best member, by kind [its unit].
+    noise : ndarray (station,)
+        Standard deviation of a residual, NaN if unknown.
+    residual : ndarray (station,)
+        y - f of the median prediction.
+    """
+
+    used: int
+    chi2: float
+    sigma: ByKind
     rmse: ByKind
     best_rmse: ByKind
-    noise: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # standard deviation of a residual, NaN if unknown
-    residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]  # y - f of the median prediction
+    noise: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
+    residual: Annotated[np.ndarray, Stored(("station",), VALUE_UNIT)]
 
 
 @dataclass(frozen=True)
 class PredictiveDistribution:
-    """What the posterior predicts at the stations: quantiles, and draws of equal weight."""
+    """What the posterior predicts at the stations: quantiles, and draws of equal weight.
 
-    # model_band, total_band: quantiles at LEVELS of the members alone, and with the residual error
+    Attributes
+    ----------
+    model_band, total_band : ndarray (level, station)
+        Quantiles at LEVELS of the members alone, and with the residual error.
+    draws : ndarray (chain, draw)
+        Members of draws of equal weight.
+    predictive : ndarray (chain, draw, station)
+        What these predict, with residual error.
+    """
+
     model_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]
     total_band: Annotated[np.ndarray, Stored(("level", "station"), VALUE_UNIT)]
-    draws: Annotated[np.ndarray, Stored(("chain", "draw"), type=WHOLE_NUMBERS)]  # members of draws of equal weight
-    # What these predict, with residual error
+    draws: Annotated[np.ndarray, Stored(("chain", "draw"), type=WHOLE_NUMBERS)]
     predictive: Annotated[np.ndarray, Stored(("chain", "draw", "station"), VALUE_UNIT)]
 
 
 @dataclass(frozen=True)
 class CorrectedCanopy:
-    """phi of a stand for another canopy height: equal Chézy coefficient at the same depth."""
+    """phi of a stand for another canopy height: equal Chézy coefficient at the same depth.
 
-    parameter: str  # name of phi
-    # from_height, to_height, depth: of the canopy [m], and depth of the water [m]
+    Attributes
+    ----------
+    parameter : str
+        Name of phi.
+    from_height, to_height, depth : float
+        Of the canopy [m], and depth of the water [m].
+    phi : ndarray (member,)
+        phi of each member [-].
+    median, sd : float
+        Median and standard deviation [-].
+    quantiles : ndarray (level,)
+        At LEVELS [-].
+    log10_median, log10_sd : float
+        Median and standard deviation of log10 phi [-].
+    """
+
+    parameter: str
     from_height: float
     to_height: float
     depth: float
-    phi: Annotated[np.ndarray, Stored(("member",))]  # phi of each
-    # median, sd, quantiles: median, standard deviation, and quantiles at LEVELS [-]
+    phi: Annotated[np.ndarray, Stored(("member",))]
     median: float
     sd: float
     quantiles: Annotated[np.ndarray, Stored(("level",))]
-    # log10_median, log10_sd: median and standard deviation of log10 phi [-]
     log10_median: float
     log10_sd: float
 
@@ -257,24 +415,41 @@ class Transfer:
 
     Values and errors on the scale on which the prior is flat (log10 of a log-uniform one); NaN where the data constrain
     little. chi2 of homogeneity with its freedom and chance; misfits chi2 in the joint fit and alone.
+
+    Attributes
+    ----------
+    scale : float
+        Of the errors, from what the experiments alone leave [-].
+    gain : float
+        By which chi2 falls when every experiment has its own parameters [-].
+    more : int
+        How many parameters more these are.
+    p_all : float
+        Chance of such a gain by errors alone [-].
+    experiments : ndarray of str (experiment,)
+    value, error : ndarray (experiment, parameter)
+        Estimate of each experiment alone, and its standard error.
+    chi2, freedom, p : ndarray (parameter,)
+        Of homogeneity, its degrees of freedom, and its chance by errors alone.
+    misfit_together, misfit_alone : ndarray (experiment,)
+        chi2 in the joint fit, and of the experiment alone.
+    stations : ndarray (experiment,)
+        How many.
     """
 
-    scale: float  # of the errors, from what the experiments alone leave [-]
-    gain: float  # by which chi2 falls when every experiment has its own parameters [-]
-    more: int  # how many parameters more these are
-    p_all: float  # chance of such a gain by errors alone [-]
-    experiments: Annotated[np.ndarray, Stored(("experiment",), type=IN_WORDS)]  # names
-    # value, error: estimate of each experiment alone, and its standard error
+    scale: float
+    gain: float
+    more: int
+    p_all: float
+    experiments: Annotated[np.ndarray, Stored(("experiment",), type=IN_WORDS)]
     value: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
     error: Annotated[np.ndarray, Stored(("experiment", "parameter"), OWN_UNIT)]
-    # chi2, freedom, p: of homogeneity, its degrees of freedom, and its chance by errors alone
     chi2: Annotated[np.ndarray, Stored(("parameter",))]
     freedom: Annotated[np.ndarray, Stored(("parameter",))]
     p: Annotated[np.ndarray, Stored(("parameter",))]
-    # misfit_together, misfit_alone: chi2 in the joint fit, and of the experiment alone
     misfit_together: Annotated[np.ndarray, Stored(("experiment",))]
     misfit_alone: Annotated[np.ndarray, Stored(("experiment",))]
-    stations: Annotated[np.ndarray, Stored(("experiment",), type=WHOLE_NUMBERS)]  # how many
+    stations: Annotated[np.ndarray, Stored(("experiment",), type=WHOLE_NUMBERS)]
 
 
 @dataclass(frozen=True)
@@ -282,16 +457,29 @@ class Surrogate:
     """Of a command: what a posterior by a surrogate rests on, and how far it is known.
 
     Errors are standard errors over realisations of what the surrogate does not know, the largest of any parameter.
+
+    Attributes
+    ----------
+    runs, failed : int
+        Of the command, and those of them that failed.
+    settled : int
+        1 if the errors were small enough, and stayed so when runs were added.
+    median_error : float
+        Of a median [standard deviations of the posterior].
+    sd_error : float
+        Of a standard deviation, over itself [-].
+    last_error : float
+        Of the surrogate at the last runs, root mean square [standard errors of the data].
+    validation_low, validation_high : float
+        Discharges at which measurements would test it [m3/s]; NaN if the case has any.
     """
 
-    # runs, failed: of the command, and those of them that failed
     runs: int
     failed: int
-    settled: int  # 1 if the errors were small enough, and stayed so when runs were added
-    median_error: float  # of a median [standard deviations of the posterior]
-    sd_error: float  # of a standard deviation, over itself [-]
-    last_error: float  # of the surrogate at the last runs, root mean square [standard errors of the data]
-    # validation_low, validation_high: discharges at which measurements would test it [m3/s]; NaN if the case has any
+    settled: int
+    median_error: float
+    sd_error: float
+    last_error: float
     validation_low: float
     validation_high: float
 
