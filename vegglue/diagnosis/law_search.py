@@ -52,22 +52,39 @@ from vegglue.wording.sentences import file_text, phrase, sentence
 
 @dataclass(frozen=True)
 class LawFound:
-    """A law, term -> term exp(a g(quantity)), that the data know."""
+    """A law, term -> term exp(a g(quantity)), that the data know.
 
-    # law, same_as: the law, and the listed effect that it restates, '' for none
+    Attributes
+    ----------
+    law : Law
+    same_as : str
+        The listed effect that it restates, '' for none.
+    reference, first : float or None
+        r of its quantity, and of that of the law that a product multiplies [unit of the quantity]; None without one.
+    scale, strength : float
+        A plausible a, and the calibrated one [-].
+    interval95 : (float, float)
+        Of the strength [-].
+    chance : float
+        That its term changes with its quantity, in whatever form [-]; the law is the form that explains most.
+    log_evidence : float
+        ln evidence [-].
+    seen : (float, float)
+        From where to where the data have seen its quantity [its unit].
+    alike : tuple of str
+        Listed effects and laws that leave the same trace at the stations.
+    """
+
     law: Law
     same_as: str
-    # reference, first: r of its quantity, and of that of the law that a product multiplies, where they have one
     reference: float | None
-    # scale, strength, interval95: A plausible a, and the calibrated one with its 95 % interval [-]
     scale: float
     strength: float
     interval95: tuple[float, float]
-    # That its term changes with its quantity, in whatever form [-]; the law is the form that explains most
     chance: float
-    log_evidence: float  # ln evidence [-]
-    seen: tuple[float, float]  # from where to where the data have seen its quantity
-    alike: tuple[str, ...]  # listed effects and laws that leave the same trace at the stations
+    log_evidence: float
+    seen: tuple[float, float]
+    alike: tuple[str, ...]
     first: float | None = None
 
     @property
@@ -105,11 +122,19 @@ class LawFound:
 
 @dataclass(frozen=True)
 class ProductFound:
-    """A product of the best law with another quantity."""
+    """A product of the best law with another quantity.
 
-    # The product, reported as any law; its chance is that it is what is left, among all else that could be
+    Attributes
+    ----------
+    found : LawFound
+        The product, reported as any law; its chance is that it is what is left, among all else that could be.
+    refit : Refit
+        Of it, beside the law.
+    strength_of_law : float
+        a of the law then [-].
+    """
+
     found: LawFound
-    # refit, strength_of_law: of it, beside the law whose a is then strength_of_law [-]
     refit: Refit
     strength_of_law: float
 
@@ -122,19 +147,33 @@ class ProductFound:
 
 @dataclass(frozen=True)
 class Discovery:
-    """What a search among all laws found."""
+    """What a search among all laws found.
 
-    # p, tried: chance that errors alone make laws stand out as much [-], and the number of laws that had something to
-    # act on
+    Attributes
+    ----------
+    p : float
+        Chance that errors alone make laws stand out as much [-].
+    tried : int
+        Number of laws that had something to act on.
+    laws : tuple of LawFound
+        The best first; none if nothing is found.
+    others : dict of float
+        Chances of other causes by name [-]; they and the laws hold 95 % together.
+    compared : mapping of float
+        ln evidence of all that was calibrated, by name [-].
+    likeliest : Refit or None
+        The likeliest of these, where it is in the model and not in the data.
+    product : ProductFound or None
+        Of the best law with another quantity, where that law leaves a misfit.
+    """
+
     p: float
     tried: int
-    # laws, others: the laws, best first, and the names of other causes with their chances, that hold 95 % together;
-    # none where nothing is found
     laws: tuple[LawFound, ...]
     others: dict[str, float]
-    compared: Mapping[str, float] = field(default_factory=dict)  # ln evidence of all that was calibrated, by name [-]
-    likeliest: Refit | None = None  # the likeliest of these, where it is in the model and not in the data
-    product: ProductFound | None = None  # of the best law with another quantity, where that law leaves a misfit
+    compared: Mapping[str, float] = field(default_factory=dict)
+    likeliest: Refit | None = None
+    product: ProductFound | None = None
 
     @property
     def best(self) -> LawFound | None:

@@ -268,14 +268,30 @@ class PlanAnswer:
 
 @dataclass(frozen=True)
 class DesignCriterion:
-    """How well measurements answer a question, by the lengths of the traces that they would leave."""
+    """How well measurements answer a question, by the lengths of the traces that they would leave.
 
-    question: PlanQuestion  # what is asked. Of two effects there are three traces, the third the sum of both.
-    candidates: int  # number of hypotheses about listed effects
-    level: float  # of the alarm
-    amplitudes: tuple[Amplitude, ...]  # of the effects that the question is about (k,)
-    beyond: Array  # by how much the score of each has to be above that of the alarm to be named (k,) [standard errors]
-    bending: Array  # see `bending_of` (k,)
+    Attributes
+    ----------
+    question : PlanQuestion
+        What is asked. Of two effects there are three traces, the third the sum of both.
+    candidates : int
+        Number of hypotheses about listed effects.
+    level : float
+        Of the alarm, ln of the sum of Bayes factors [-].
+    amplitudes : tuple of Amplitude
+        Of the k effects that the question is about.
+    beyond : ndarray (k,)
+        By how much the score of each has to be above that of the alarm to be named [standard errors].
+    bending : ndarray (k,)
+        See `bending_of`.
+    """
+
+    question: PlanQuestion
+    candidates: int
+    level: float
+    amplitudes: tuple[Amplitude, ...]
+    beyond: Array
+    bending: Array
 
     def sizes(self, squares: Array) -> Array:
         """Lengths of traces at places of the priors (place, ..., k), or the distance of two, of squares at each draw:
@@ -334,14 +350,27 @@ class DesignCriterion:
 
 @dataclass(frozen=True)
 class PlanSearch:
-    """The search for pieces of field work to add."""
+    """The search for pieces of field work to add.
 
-    wide: PlanModel  # all pieces that are possible
-    criterion: DesignCriterion  # what is maximised
-    # present, another: flows that are measured in anyhow, and hours of another one [h]
+    Attributes
+    ----------
+    wide : PlanModel
+        All pieces that are possible.
+    criterion : DesignCriterion
+        What is maximised.
+    present : frozenset of str
+        Flows that are measured in anyhow.
+    another : float
+        Hours of another one [h].
+    base : PossibleMeasurements
+        Given the plan as it is, at each draw of the priors (draw, ...).
+    """
+
+    wide: PlanModel
+    criterion: DesignCriterion
     present: frozenset[str]
     another: float
-    base: PossibleMeasurements  # given the plan as it is, at each draw of the priors (draw, ...)
+    base: PossibleMeasurements
 
     @cached_property
     def start(self) -> PlanAnswer:

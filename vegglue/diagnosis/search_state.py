@@ -97,21 +97,39 @@ def rivals_in(undecided: Undecided) -> tuple[Rival, ...]:
 
 @dataclass(frozen=True)
 class SearchState:
-    """What a search has accepted so far."""
+    """What a search has accepted so far.
 
-    # steps, places, instruments: accepted effects, places and faulty instruments
+    Attributes
+    ----------
+    steps : tuple of Step
+        Accepted effects.
+    places : tuple of LocalAnomaly
+    instruments : tuple of FaultyInstrument
+    prior_weights : tuple of PriorWeight
+        Of all that is held.
+    flagged : tuple of int
+        Excluded readings, indices among the used stations.
+    of_shape : float
+        ln evidence of places as they competed, less that in the model, whose covariance holds the error of their
+        shape.
+    p, rate : float
+        Of the last alarm, and the rate below which it is sounded [-].
+    undecided : Undecided or None
+        What competed last and led to nothing.
+    implausible : tuple of ImplausibleOutlet or ImplausibleValues
+        Values that no flow of the case can have.
+    """
+
     steps: tuple[Step, ...] = ()
     places: tuple[LocalAnomaly, ...] = ()
     instruments: tuple[FaultyInstrument, ...] = ()
-    prior_weights: tuple[PriorWeight, ...] = ()  # of all that is held
-    flagged: tuple[int, ...] = ()  # excluded readings, indices among the used stations
-    # Ln evidence of places as they competed, less that in the model, whose covariance holds the error of their shape
+    prior_weights: tuple[PriorWeight, ...] = ()
+    flagged: tuple[int, ...] = ()
     of_shape: float = 0.0
-    # p, rate: of the last alarm, and the rate below which it is sounded
     p: float = 1.0
     rate: float = 0.0
-    undecided: Undecided | None = None  # what competed last and led to nothing
-    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()  # values that no flow of the case can have
+    undecided: Undecided | None = None
+    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()
 
     @property
     def alarmed(self) -> bool:

@@ -53,40 +53,81 @@ TERMS_OF_DISCHARGES, OF_DEVICES = ("inflow", "bed"), ("device_gain", "zero_offse
 
 @dataclass(frozen=True)
 class VerdictInputs:
-    """What a verdict rests on."""
+    """What a verdict rests on.
 
-    candidates: tuple[CandidateEffect, ...]  # every tested effect, the strongest first
-    # errors, misfit: as estimated, and of the model with all that was accepted
+    Attributes
+    ----------
+    candidates : tuple of CandidateEffect
+        Every tested effect, the strongest first.
+    errors : EstimatedErrors
+    misfit : ChiSquare
+        Of the model with all that was accepted.
+    steps : tuple of Step
+    places : tuple of LocalAnomaly
+    instruments : tuple of FaultyInstrument
+        What was accepted.
+    field : FieldFound or None
+    laws : CandidateLaws or None
+    model_error : ModelErrorUsed or None
+        What was found beside it.
+    undecided : tuple of Rival
+        Hypotheses of which none leads.
+    implausible : tuple of ImplausibleOutlet or ImplausibleValues
+        Values that no flow can have.
+    not_excluded : tuple of tuple of str
+        Groups of effects among which one that is there undetected is.
+    held_out, by_chance : float
+        Errors at held-out measurements over the expected ones [-], NaN without any, infinite without a flow; and
+        what of that errors alone exceed in 5 % of cases.
+    neighbours : bool
+        Whether readings side by side are excluded.
+    strained : (str, float)
+        The parameter furthest off its prior, and how far [standard deviations].
+    strained_without : (str, float) or None
+        The section without which it is not too far, and how far then.
+    between : float
+        Errors between the sections over those of the data [-].
+    carried : tuple of CarriedDischarge
+        Sections that clearly carry another discharge than stated.
+    significant_effects : mapping of float
+        p of those that were not accepted, by name [-].
+    remainder : bool
+        Whether all of them may be a remainder of what was.
+    surroundings : tuple of Note
+        Notes on the map, the measured stretch, the depth and the parameters.
+    excluded : mapping of str
+        Effects that cannot act at the site, with the reason of each.
+    hangs_on : NameHangsOnSection or None
+        The section without which another name leads.
+    bed : tuple of BedCorrected
+        Where it differs from the surveyed one, the clearest first.
+    """
+
+    candidates: tuple[CandidateEffect, ...]
     errors: EstimatedErrors
     misfit: ChiSquare
-    # steps, places, instruments, field, laws, model_error: what was accepted, or found beside it
     steps: tuple[Step, ...] = ()
     places: tuple[LocalAnomaly, ...] = ()
     instruments: tuple[FaultyInstrument, ...] = ()
-    undecided: tuple[Rival, ...] = ()  # hypotheses of which none leads
-    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()  # values that no flow can have
+    undecided: tuple[Rival, ...] = ()
+    implausible: tuple[ImplausibleOutlet | ImplausibleValues, ...] = ()
     field: FieldFound | None = None
     laws: CandidateLaws | None = None
     model_error: ModelErrorUsed | None = None
-    not_excluded: tuple[tuple[str, ...], ...] = ()  # groups of effects among which one that is there undetected is
-    # held_out, by_chance: errors at held-out measurements over the expected ones [-], NaN without any, infinite without
-    # a flow; and what of that errors alone exceed in 5 % of cases
+    not_excluded: tuple[tuple[str, ...], ...] = ()
     held_out: float = float("nan")
     by_chance: float = 1.0
-    neighbours: bool = False  # whether readings side by side are excluded
-    strained: tuple[str, float] = ("", 0.0)  # the parameter furthest off its prior, and how far [standard deviations]
-    strained_without: tuple[str, float] | None = None  # the section without which it is not too far, and how far then
-    between: float = 1.0  # errors between the sections over those of the data [-]
-    carried: tuple[CarriedDischarge, ...] = ()  # sections that clearly carry another discharge than stated
-    # significant_effects, remainder: those that were not accepted, with p [-], and whether all of them may be a
-    # remainder of what was
+    neighbours: bool = False
+    strained: tuple[str, float] = ("", 0.0)
+    strained_without: tuple[str, float] | None = None
+    between: float = 1.0
+    carried: tuple[CarriedDischarge, ...] = ()
     significant_effects: Mapping[str, float] = by_default(default_factory=dict)
     remainder: bool = False
-    surroundings: tuple[Note, ...] = ()  # notes on the map, the measured stretch, the depth and the parameters
-    # Effects that cannot act at the site, with the reason of each
+    surroundings: tuple[Note, ...] = ()
     excluded: Mapping[str, str] = by_default(default_factory=dict)
-    hangs_on: NameHangsOnSection | None = None  # the section without which another name leads
-    bed: tuple[BedCorrected, ...] = ()  # where it differs from the surveyed one, the clearest first
+    hangs_on: NameHangsOnSection | None = None
+    bed: tuple[BedCorrected, ...] = ()
 
 
 def make_verdict(inputs: VerdictInputs) -> Verdict:

@@ -64,13 +64,21 @@ class Section:
 
 @dataclass(frozen=True)
 class DeadProbe:
-    """A probe that reads near zero at all heights."""
+    """A probe that reads near zero at all heights.
 
-    heights: int  # number of points
-    # largest, expected: largest |u|, and mean u between its neighbours [m/s]
+    Attributes
+    ----------
+    heights : int
+        Number of points.
+    largest, expected : float
+        Largest |u|, and mean u between its neighbours [m/s].
+    deviation, expected_deviation : float or None
+        Median of u_std here and between its neighbours [m/s], None if unknown.
+    """
+
+    heights: int
     largest: float
     expected: float
-    # deviation, expected_deviation: median of u_std here and between its neighbours [m/s], None if unknown
     deviation: float | None
     expected_deviation: float | None
 

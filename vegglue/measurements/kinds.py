@@ -29,20 +29,33 @@ class Unused(StrEnum):
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of observation."""
+    """One kind of observation.
 
-    # name, words: as in a case and in tables of stations, and the same in prose
+    Attributes
+    ----------
+    name, words : str
+        As in a case and in tables of stations, and the same in prose.
+    unit : str
+        Of a value and of its standard error.
+    column, file : str
+        Column of the values in a CSV file, and name of such a file in a folder of measurements.
+    instrument : {"probe", "gauge", "section"}
+        A probe measures a velocity at a point of a named section, a gauge a level at a point, a section what passes
+        a whole cross-section, so that y has no meaning.
+    correlated : bool
+        Whether the errors of neighbours along a section are correlated.
+    usual_error : float
+        Standard error of a measurement still to be made if none of this kind is at hand [unit].
+    """
+
     name: str
     words: str
-    unit: str  # of a value and of its standard error
-    # column, file: column of the values in a CSV file, and name of such a file in a folder of measurements
+    unit: str
     column: str
     file: str
-    # a probe measures a velocity at a point of a named section, a gauge a level at a point, a section what passes a
-    # whole cross-section, so that y has no meaning
     instrument: Literal["probe", "gauge", "section"]
-    correlated: bool  # whether the errors of neighbours along a section are correlated
-    usual_error: float  # standard error of a measurement still to be made if none of this kind is at hand [unit]
+    correlated: bool
+    usual_error: float
 
     @property
     def error_column(self) -> str:

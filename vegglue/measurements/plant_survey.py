@@ -36,11 +36,20 @@ class SurveyedQuantity:
 
 @dataclass(frozen=True)
 class RigidCylinder:
-    """phi of a stand of rigid cylinders."""
+    """phi of a stand of rigid cylinders.
 
-    draws: Array  # of phi (draws,) [-]
-    parts: dict[str, float]  # mean contribution of stems, branches and undergrowth to phi [-]
-    # Assumed range, as it was not surveyed [1/m2]; None without undergrowth
+    Attributes
+    ----------
+    draws : ndarray (draws,)
+        Of phi [-].
+    parts : dict of float
+        Mean contribution of stems, branches and undergrowth to phi [-].
+    undergrowth_density : (float, float) or None
+        Assumed range, as it was not surveyed [1/m2]; None without undergrowth.
+    """
+
+    draws: Array
+    parts: dict[str, float]
     undergrowth_density: tuple[float, float] | None
 
     @property

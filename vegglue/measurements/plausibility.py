@@ -91,20 +91,36 @@ class Symptom(Enum):
 
 @dataclass(frozen=True)
 class ImplausibleValues:
-    """Used values of one kind of observation with one problem."""
+    """Used values of one kind of observation with one problem.
 
-    quantity: str  # the kind in words
-    # instrument, si_unit: as in Kind, and the unit of its values
+    Attributes
+    ----------
+    quantity : str
+        The kind in words.
+    instrument, si_unit : str
+        As in Kind, and the unit of its values.
+    symptom : Symptom
+    unit : str
+        The unit in which they would be plausible; empty for none.
+    size : float
+        Median over the values, see Symptom.
+    count, total : int
+        Number of these and of all used values of the kind.
+    first : (float, float, float or None)
+        Value, x and y of the first [SI]; y None if the kind has none.
+    places : tuple of (str, str or None)
+        Experiments and sections; '' for a gauge without a name, None for all values of the experiment.
+    """
+
+    quantity: str
     instrument: str
     si_unit: str
     symptom: Symptom
-    unit: str  # the unit in which they would be plausible; empty for none
-    size: float  # median over the values, see Symptom
-    # count, total: number of these and of all used values of the kind
+    unit: str
+    size: float
     count: int
     total: int
-    first: tuple[float, float, float | None]  # value, x and y of the first [SI]; y None if the kind has none
-    # Experiments and sections; '' for a gauge without a name, None for all values of the experiment
+    first: tuple[float, float, float | None]
     places: tuple[tuple[str, str | None], ...]
 
 
@@ -129,28 +145,46 @@ class ImplausibleOutlet:
 
 @dataclass(frozen=True)
 class PlausibleFlow:
-    """Bounds for one experiment on the grid."""
+    """Bounds for one experiment on the grid.
 
-    # x, y: columns (nx,) and rows (ny,) [m]
+    Attributes
+    ----------
+    x, y : ndarray (nx,), (ny,)
+        Columns and rows [m].
+    slowest, fastest : ndarray (nx,)
+        Q / A [m/s], infinite if the section may be dry.
+    lowest, highest : ndarray (nx,)
+        Water level [m].
+    smoothest, thickest : ndarray (nx,)
+        The same without what is left for gauges that are off, on smooth walls and in growth [m].
+    floor : ndarray (nx,)
+        Lowest bed of the section [m].
+    discharge : (float, float)
+        Least, of one inflow alone, and most, of all [m3/s].
+    depth : float
+        Largest at the outlet [m].
+    level : (float, float)
+        At the outlet [m].
+    width : float
+        Of the grid [m].
+    depths : ndarray (nx, ny)
+        Expected [m].
+    """
+
     x: Array
     y: Array
-    # slowest, fastest: Q / A (nx,) [m/s], infinite if the section may be dry
     slowest: Array
     fastest: Array
-    # lowest, highest: water level (nx,) [m]
     lowest: Array
     highest: Array
-    # smoothest, thickest: the same without what is left for gauges that are off, on smooth walls and in growth (nx,)
-    # [m]
     smoothest: Array
     thickest: Array
-    floor: Array  # lowest bed of the section (nx,) [m]
-    discharge: Bounds  # least, of one inflow alone, and most, of all [m3/s]
-    # depth, level: largest depth, and level at the outlet [m]
+    floor: Array
+    discharge: Bounds
     depth: float
     level: Bounds
-    width: float  # of the grid [m]
-    depths: Array  # expected (nx, ny) [m]
+    width: float
+    depths: Array
 
     def column(self, x: float) -> int:
         """Index of the column of cells nearest to x [m]."""

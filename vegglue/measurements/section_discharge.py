@@ -52,11 +52,21 @@ Verticals = tuple[Array, Array, Array]
 
 @dataclass(frozen=True)
 class CrossSection:
-    """A section of regular cells under a flat water level."""
+    """A section of regular cells under a flat water level.
 
-    y: Array  # middles of the cells across the channel (cells,) [m]
-    bed: Array  # (cells,) [m]
-    surface: float  # water level [m]
+    Attributes
+    ----------
+    y : ndarray (cells,)
+        Middles of the cells across the channel [m].
+    bed : ndarray (cells,)
+        [m]
+    surface : float
+        Water level [m].
+    """
+
+    y: Array
+    bed: Array
+    surface: float
 
     @property
     def width(self) -> float:
@@ -79,19 +89,36 @@ class Discharge:
 
 @dataclass(frozen=True)
 class CarriedDischarge:
-    """What the verticals of one section carry."""
+    """What the verticals of one section carry.
 
-    # experiment, section, x: of the section; x [m]
+    Attributes
+    ----------
+    experiment, section : str
+    x : float
+        Of the section [m].
+    value : float
+        Discharge [m3/s].
+    interval95 : (float, float)
+        Of the discharge [m3/s].
+    stated : (float, float) or None
+        What has entered upstream, 95 % of its priors [m3/s]; None if that is not known.
+    share : float
+        Of the wet width that lies between the outermost verticals [-].
+    verticals : int
+        Their number.
+    gauged : bool
+        Whether the level was measured.
+    """
+
     experiment: str
     section: str
     x: float
-    # value, interval95: discharge [m3/s]
     value: float
     interval95: Bounds
-    stated: Bounds | None  # what has entered upstream, 95 % of its priors [m3/s]; None if that is not known
-    share: float  # of the wet width that lies between the outermost verticals [-]
-    verticals: int  # their number
-    gauged: bool  # whether the level was measured
+    stated: Bounds | None
+    share: float
+    verticals: int
+    gauged: bool
 
     @property
     def ratio(self) -> float:

@@ -31,24 +31,47 @@ TINY = 1e-300  # keeps 0 / 0 from points that all lie below the top; their slope
 
 @dataclass(frozen=True)
 class Column:
-    """The points of one vertical."""
+    """The points of one vertical.
 
-    height: Array  # above the bed (points,) [m]
-    # velocity, standard_error: (points,) [m/s]
+    Attributes
+    ----------
+    height : ndarray (points,)
+        Above the bed [m].
+    velocity, standard_error : ndarray (points,)
+        [m/s]
+    depth : float
+        Of the water [m].
+    """
+
+    height: Array
     velocity: Array
     standard_error: Array
-    depth: float  # of the water [m]
+    depth: float
 
 
 @dataclass(frozen=True)
 class ProfileFit:
-    """u(z) = within + slope ln(max(z / top, 1)), slope = u* / kappa."""
+    """u(z) = within + slope ln(max(z / top, 1)), slope = u* / kappa.
 
-    within: float  # uniform velocity below the top [m/s]; 0 without plants
-    slope: float  # of the logarithmic part above it [m/s]
-    top: float  # canopy height inside plants, else the roughness height z_0 [m]
-    covariance: Array  # of (within, slope, top), times scatter^2 (3, 3)
-    # Root of the reduced chi-square, at least 1 [-]: scatter of the points over what their sampling errors explain
+    Attributes
+    ----------
+    within : float
+        Uniform velocity below the top [m/s]; 0 without plants.
+    slope : float
+        Of the logarithmic part above it [m/s].
+    top : float
+        Canopy height inside plants, else the roughness height z_0 [m].
+    covariance : ndarray (3, 3)
+        Of (within, slope, top), times scatter^2.
+    scatter : float
+        Root of the reduced chi-square, at least 1 [-]: scatter of the points over what their sampling errors
+        explain.
+    """
+
+    within: float
+    slope: float
+    top: float
+    covariance: Array
     scatter: float
 
     def velocity(self, height: Array) -> Array:
@@ -76,13 +99,22 @@ class CanopyUnknown(Enum):
 
 @dataclass(frozen=True)
 class CanopyHeight:
-    """Deflected canopy height above the bed."""
+    """Deflected canopy height above the bed.
 
-    # value, standard_error: [m]; NaN if the verticals show no canopy top
+    Attributes
+    ----------
+    value, standard_error : float
+        [m]; NaN if the verticals show no canopy top.
+    columns : int
+        Number of verticals.
+    unknown : CanopyUnknown or None
+        Why they show none, or None.
+    """
+
     value: float
     standard_error: float
-    columns: int  # number of verticals
-    unknown: CanopyUnknown | None = None  # why they show none, or None
+    columns: int
+    unknown: CanopyUnknown | None = None
 
 
 def sampling_error(deviation: Array, duration: Array, time_scale: Array | float) -> Array:

@@ -39,18 +39,31 @@ class Work(Enum):
 
 @dataclass(frozen=True)
 class PlannedPiece:
-    """A piece of field work: verticals of a transect, a vertical, a gauge or a gauging in one experiment, or a line of
-    bed levels, which is of all.
+    """A piece of field work.
+
+    Verticals of a transect, a vertical, a gauge or a gauging in one experiment, or a line of bed levels, which is of
+    all.
+
+    Attributes
+    ----------
+    work : Work
+    experiment : str
+        The flow it is done in, '' for all.
+    x : float
+        [m]
+    y : tuple of float
+        Of its stations [m], empty for a gauging.
+    hours : float
+        Without those of another flow [h].
+    new, again : bool
+        Whether the experiment is a flow that the case does not have, and whether the same is measured before.
     """
 
-    # work, experiment: its kind, and the flow it is done in, '' for all
     work: Work
     experiment: str
-    # x, y: its places [m], y empty for a gauging
     x: float
     y: tuple[float, ...]
-    hours: float  # without those of another flow [h]
-    # new, again: whether the experiment is a flow that the case does not have, and whether the same is measured before
+    hours: float
     new: bool = False
     again: bool = False
 
@@ -73,28 +86,44 @@ class PlannedEffect:
     """An effect as the planned measurements would show it.
 
     Named means that the first step of a diagnosis has it, alone or as one of a few.
+
+    Attributes
+    ----------
+    name, title : str
+    unit : str
+        Of its amplitude.
+    smallest, best, worst : float
+        Distance of the amplitude from off that is named with 90 % [unit], infinite if no size is: averaged over all
+        draws of the priors, and in those where it is least and largest.
+    plausible, furthest : float
+        A plausible distance, and the largest possible one [unit].
+    chance_plausible, chance : float
+        That the plausible size is named, and one drawn from the prior of the amplitude [-].
+    visibility : float
+        Share of the trace that calibration cannot mimic [-].
+    confused : tuple of Confusion
+        Other effects with a similar trace, the most similar first.
+    place : Confusion or None
+        The term at a place that has one.
+    parameter : str
+        Whose change is most like it.
+    cosine : float
+        Between both [-].
     """
 
-    # name, title, unit: of the effect, and of its amplitude
     name: str
     title: str
     unit: str
-    # smallest, best, worst: distance of the amplitude from off that is named with 90 % [unit], infinite if no size is:
-    # averaged over all draws of the priors, and in those where it is least and largest
     smallest: float
     best: float
     worst: float
-    # plausible, furthest: a plausible distance, and the largest possible one [unit]
     plausible: float
     furthest: float
-    # chance_plausible, chance: that the plausible size is named, and one drawn from the prior of the amplitude [-]
     chance_plausible: float
     chance: float
-    visibility: float  # share of the trace that calibration cannot mimic [-]
-    # confused, place: other effects with a similar trace, the most similar first, and the term at a place that has one
+    visibility: float
     confused: tuple[Confusion, ...]
     place: Confusion | None
-    # parameter, cosine: the parameter whose change is most like it, and the cosine between both [-]
     parameter: str
     cosine: float
 
@@ -116,51 +145,91 @@ class PlannedEffect:
 
 @dataclass(frozen=True)
 class PlannedPlaces:
-    """Something unlisted at a place that changes a term."""
+    """Something unlisted at a place that changes a term.
 
-    # term, unit: the term, and the unit of its sizes
+    Attributes
+    ----------
+    term, unit : str
+        The term, and the unit of its sizes.
+    plausible : float
+        A plausible size [unit].
+    places : int
+        How many are under water.
+    share : float
+        Of these, where the plausible size is detected with 90 % [-].
+    smallest : float
+        Size that is detected with 90 % at half of them [unit].
+    """
+
     term: str
     unit: str
-    plausible: float  # a plausible size [unit]
-    places: int  # how many are under water
-    share: float  # of these, where the plausible size is detected with 90 % [-]
-    smallest: float  # size that is detected with 90 % at half of them [unit]
+    plausible: float
+    places: int
+    share: float
+    smallest: float
 
 
 @dataclass(frozen=True)
 class PlaceChances:
-    """Chance that drag of a plausible size is detected at each place."""
+    """Chance that drag of a plausible size is detected at each place.
 
-    # x, y, chance: places [m] and the chance at each [-], (place,)
+    Attributes
+    ----------
+    x, y : tuple of float
+        Places [m].
+    chance : tuple of float
+        At each [-].
+    length, width : float
+        Half length and half width of one spot [m].
+    """
+
     x: tuple[float, ...]
     y: tuple[float, ...]
     chance: tuple[float, ...]
-    # length, width: half length and half width of one spot [m]
     length: float
     width: float
 
 
 @dataclass(frozen=True)
 class PlannedInstruments:
-    """Instruments of one kind."""
+    """Instruments of one kind.
 
-    # instrument, count: the kind, and how many there are
+    Attributes
+    ----------
+    instrument : str
+        The kind.
+    count : int
+        How many there are.
+    smallest : float
+        Offset that is detected with 90 % in half of them, over the standard error of a reading [-].
+    plausible : float
+        A plausible offset over that error [-].
+    """
+
     instrument: str
     count: int
-    smallest: float  # offset that is detected with 90 % in half of them, over the standard error of a reading [-]
-    plausible: float  # a plausible offset over that error [-]
+    smallest: float
+    plausible: float
 
 
 @dataclass(frozen=True)
 class PlannedParameter:
-    """How well a parameter would be known."""
+    """How well a parameter would be known.
 
-    # name, unit, meaning: of the parameter
+    Attributes
+    ----------
+    name, unit, meaning : str
+        Of the parameter.
+    share : float
+        Standard error over that of its prior [-].
+    before, after : (float, float)
+        95 % intervals around the middle of the prior [unit].
+    """
+
     name: str
     unit: str
     meaning: str
-    share: float  # standard error over that of its prior [-]
-    # before, after: 95 % intervals around the middle of the prior [unit]
+    share: float
     before: tuple[float, float]
     after: tuple[float, float]
 
@@ -194,12 +263,19 @@ PlanQuestion = EffectsInGeneral | OneEffect | TwoEffects
 
 @dataclass(frozen=True)
 class ProposedPieces:
-    """Pieces that could be added together, as one more discharge takes more than one."""
+    """Pieces that could be added together, as one more discharge takes more than one.
+
+    Attributes
+    ----------
+    pieces : tuple of PlannedPiece
+    hours : float
+        Field work, with that of another flow [h].
+    before, after, least : float
+        The answer to the question before and after, the mean over all draws, and the least of them after [-].
+    """
 
     pieces: tuple[PlannedPiece, ...]
-    hours: float  # field work, with that of another flow [h]
-    # before, after, least: the answer to the question before and after, the mean over all draws, and the least of them
-    # after [-]
+    hours: float
     before: float
     after: float
     least: float

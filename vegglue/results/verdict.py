@@ -23,21 +23,43 @@ TOO_SMALL = 0.001
 
 @dataclass(frozen=True)
 class ChiSquare:
-    """chi2 = |W (y - f)|^2 of a model, with W'W the inverse covariance of the errors of y - f."""
+    """chi2 = |W (y - f)|^2 of a model, with W'W the inverse covariance of the errors of y - f.
 
-    value: float  # chi2 [-]
-    freedom: int  # its degrees of freedom
-    p: float = float("nan")  # chance of a chi2 as large under errors alone [-], NaN where it was not asked for
+    Attributes
+    ----------
+    value : float
+        chi2 [-].
+    freedom : int
+        Its degrees of freedom.
+    p : float
+        Chance of a chi2 as large under errors alone [-], NaN where it was not asked for.
+    """
+
+    value: float
+    freedom: int
+    p: float = float("nan")
 
 
 @dataclass(frozen=True)
 class EstimatedErrors:
-    """The errors as estimated from the residuals."""
+    """The errors as estimated from the residuals.
 
-    correlation: float  # of neighbours [-]
-    scale: float  # true over stated errors [-]
-    grid_error: float  # root mean square error of the grid in velocities [m/s], NaN without any
-    flagged: tuple[int, ...]  # rows of the stations rejected as outliers
+    Attributes
+    ----------
+    correlation : float
+        Of neighbours [-].
+    scale : float
+        True over stated errors [-].
+    grid_error : float
+        Root mean square error of the grid in velocities [m/s], NaN without any.
+    flagged : tuple of int
+        Rows of the stations rejected as outliers.
+    """
+
+    correlation: float
+    scale: float
+    grid_error: float
+    flagged: tuple[int, ...]
 
     @property
     def clearly_larger(self) -> bool:
@@ -184,20 +206,37 @@ Reason = (
 
 @dataclass(frozen=True)
 class EffectFound:
-    """An accepted effect, and what it may be instead."""
+    """An accepted effect, and what it may be instead.
 
-    # name, title: its name, with the place or instrument that it is limited to, and its title
+    Attributes
+    ----------
+    name, title : str
+        Its name, with the place or instrument that it is limited to, and its title.
+    amplitude : float
+        [unit]
+    interval95 : (float, float)
+        Of the amplitude [unit].
+    unit : str
+    probability : float
+        Of it and of those alike together, among all that was tried [-].
+    alike : tuple of str
+        Effects that leave the same trace in these data.
+    rivals : tuple of Rival
+        Others with their probabilities, the likeliest first.
+    likelier : LocalAnomaly or None
+        A place that is likelier than every group of effects.
+    likelier_probability : float
+        Of that place [-], NaN without one.
+    """
+
     name: str
     title: str
-    # amplitude, interval95, unit: size with its 95 % interval
     amplitude: float
     interval95: tuple[float, float]
     unit: str
-    probability: float  # of it and of those alike together, among all that was tried [-]
-    alike: tuple[str, ...] = ()  # effects that leave the same trace in these data
-    rivals: tuple[Rival, ...] = ()  # others with their probabilities, the likeliest first
-    # likelier, likelier_probability: a place that is likelier than every group of effects, and its probability [-];
-    # None and NaN without one
+    probability: float
+    alike: tuple[str, ...] = ()
+    rivals: tuple[Rival, ...] = ()
     likelier: LocalAnomaly | None = None
     likelier_probability: float = float("nan")
 
@@ -209,11 +248,21 @@ class EffectFound:
 
 @dataclass(frozen=True)
 class EffectsTested:
-    """How many effects were tested."""
+    """How many effects were tested.
 
-    effects: int  # how many
-    candidates: int  # as how many: one effect in one experiment, section, device or patch each
-    testable: int  # effects that would be seen at twice a plausible size
+    Attributes
+    ----------
+    effects : int
+        How many.
+    candidates : int
+        As how many: one effect in one experiment, section, device or patch each.
+    testable : int
+        Effects that would be seen at twice a plausible size.
+    """
+
+    effects: int
+    candidates: int
+    testable: int
 
 
 # What the model still lacks with all that was accepted.
@@ -228,10 +277,18 @@ class ErrorsStillLarger:
 
 @dataclass(frozen=True)
 class EffectsStillSignificant:
-    """Effects that are significant and were not accepted."""
+    """Effects that are significant and were not accepted.
 
-    effects: tuple[tuple[str, float], ...]  # names with the family-wise p of each [-], the clearest first
-    remainder: bool  # whether they may be a remainder of what was accepted
+    Attributes
+    ----------
+    effects : tuple of (str, float)
+        Names with the family-wise p of each [-], the clearest first.
+    remainder : bool
+        Whether they may be a remainder of what was accepted.
+    """
+
+    effects: tuple[tuple[str, float], ...]
+    remainder: bool
 
 
 Remaining = ErrorsStillLarger | EffectsStillSignificant
@@ -267,41 +324,70 @@ class ImplausibleAmplitude:
 
 @dataclass(frozen=True)
 class EstimateAtBound:
-    """A calibrated parameter within PRESSES of an end of its prior: the bound decides its value."""
+    """A calibrated parameter within PRESSES of an end of its prior: the bound decides its value.
 
-    # parameter, value, unit: its name and calibrated value
+    Attributes
+    ----------
+    parameter : str
+    value : float
+        As calibrated [unit].
+    unit : str
+    low, high : float
+        The ends of its prior [unit].
+    lower : bool
+        Whether it is the lower one.
+    """
+
     parameter: str
     value: float
     unit: str
-    # low, high: the ends of its prior
     low: float
     high: float
-    lower: bool  # whether it is the lower one
+    lower: bool
 
 
 @dataclass(frozen=True)
 class BeyondHandbook:
-    """A calibrated parameter beyond what a handbook has."""
+    """A calibrated parameter beyond what a handbook has.
 
-    # parameter, value, unit: its name and calibrated value
+    Attributes
+    ----------
+    parameter : str
+    value : float
+        As calibrated [unit].
+    unit : str
+    low, high : float
+        The range of the handbook [unit].
+    source : str
+        Which handbook, and for what.
+    """
+
     parameter: str
     value: float
     unit: str
-    # low, high: the range of the handbook
     low: float
     high: float
-    source: str  # which handbook, and for what
+    source: str
 
 
 @dataclass(frozen=True)
 class InflowDevelops:
-    """An accepted fault of the probes of a section near the inflow, where the profile over the depth may develop."""
+    """An accepted fault of the probes of a section near the inflow, where the profile over the depth may develop.
 
-    effect: str  # the fault
-    # distance, depths: of the section behind the inflow [m], and over the depth [-]
+    Attributes
+    ----------
+    effect : str
+        The fault.
+    distance, depths : float
+        Of the section behind the inflow [m], and over the depth [-].
+    length : float
+        Over which the profile develops [depths].
+    """
+
+    effect: str
     distance: float
     depths: float
-    length: float  # over which the profile develops [depths]
+    length: float
 
 
 @dataclass(frozen=True)
@@ -371,23 +457,41 @@ class StatedErrorsTooSmall:
 
 @dataclass(frozen=True)
 class InstrumentExcluded:
-    """An instrument whose readings are excluded."""
+    """An instrument whose readings are excluded.
 
-    instrument: FaultyInstrument  # which, and by how much it is off
-    clear: bool  # whether by more than `least`
-    least: float  # what chance or the model may make [standard errors]
+    Attributes
+    ----------
+    instrument : FaultyInstrument
+        Which, and by how much it is off.
+    clear : bool
+        Whether by more than `least`.
+    least : float
+        What chance or the model may make [standard errors].
+    """
+
+    instrument: FaultyInstrument
+    clear: bool
+    least: float
 
 
 @dataclass(frozen=True)
 class EffectsUntestable:
-    """Effects that these data cannot show."""
+    """Effects that these data cannot show.
 
-    # Their names by the parameter whose change leaves their trace, '' for none
+    Attributes
+    ----------
+    groups : tuple of (str, tuple of str)
+        Their names by the parameter whose change leaves their trace, '' for none.
+    effects, candidates : int
+        How many there are.
+    also : bool
+        Whether others that are named elsewhere are untestable, too.
+    """
+
     groups: tuple[tuple[str, tuple[str, ...]], ...]
-    # effects, candidates: how many there are
     effects: int
     candidates: int
-    also: bool  # whether others that are named elsewhere are untestable, too
+    also: bool
 
 
 @dataclass(frozen=True)
@@ -399,33 +503,57 @@ class PlacesOnMap:
 
 @dataclass(frozen=True)
 class BedCorrected:
-    """A spot in which flow and survey put the bed elsewhere than the survey alone."""
+    """A spot in which flow and survey put the bed elsewhere than the survey alone.
 
-    # x, y, x_error, y_error: middle with its standard errors [m]
+    Attributes
+    ----------
+    x, y, x_error, y_error : float
+        Middle with its standard errors [m].
+    length, width : float
+        Half length and half width [m].
+    change : float
+        Mean rise of the bed [m].
+    interval95 : (float, float)
+        Of the change [m].
+    log_factor : float
+        ln of the Bayes factor against no mean error there [-].
+    local_log_factor : float
+        ln of that of a local error beside all that the survey leaves open [-].
+    between : (float, float)
+        x of the surveyed lines on both sides [m], NaN beyond the last.
+    """
+
     x: float
     y: float
     x_error: float
     y_error: float
-    # length, width: half length and half width [m]
     length: float
     width: float
-    # change, interval95: mean rise of the bed with its 95 % interval [m]
     change: float
     interval95: tuple[float, float]
-    log_factor: float  # ln of the Bayes factor against no mean error there [-]
-    local_log_factor: float  # ln of that of a local error beside all that the survey leaves open [-]
-    between: tuple[float, float]  # x of the surveyed lines on both sides [m], NaN beyond the last
+    log_factor: float
+    local_log_factor: float
+    between: tuple[float, float]
 
 
 @dataclass(frozen=True)
 class MeasuredStretch:
-    """Velocities lie in a stretch of the model only."""
+    """Velocities lie in a stretch of the model only.
 
-    # low, high: least and largest x of them [m]
+    Attributes
+    ----------
+    low, high : float
+        Least and largest x of them [m].
+    length : float
+        Of the model [m].
+    effects : tuple of str
+        Of the case, those that act along the channel.
+    """
+
     low: float
     high: float
-    length: float  # of the model [m]
-    effects: tuple[str, ...]  # of the case, those that act along the channel
+    length: float
+    effects: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -444,36 +572,73 @@ class MisfitRemains:
 
 @dataclass(frozen=True)
 class CommandCompared:
-    """How the linear model of a command of `engine` was made, and how far it is from the command."""
+    """How the linear model of a command of `engine` was made, and how far it is from the command.
 
-    repeated: int  # how often its differences were taken
-    parameters: int  # how many there are
-    errors: float  # root mean square difference at the last parameters [standard errors], NaN when unknown
-    failure: str  # why the command gave nothing, '' when it did
-    rough: tuple[str, ...]  # parameters whose differences are mostly noise
-    settled: bool  # whether the search for the best place settled
-    careful: bool  # whether sizes and chances have to be taken with care
+    Attributes
+    ----------
+    repeated : int
+        How often its differences were taken.
+    parameters : int
+        How many there are.
+    errors : float
+        Root mean square difference at the last parameters [standard errors], NaN when unknown.
+    failure : str
+        Why the command gave nothing, '' when it did.
+    rough : tuple of str
+        Parameters whose differences are mostly noise.
+    settled : bool
+        Whether the search for the best place settled.
+    careful : bool
+        Whether sizes and chances have to be taken with care.
+    """
+
+    repeated: int
+    parameters: int
+    errors: float
+    failure: str
+    rough: tuple[str, ...]
+    settled: bool
+    careful: bool
 
 
 @dataclass(frozen=True)
 class ResultCompared:
-    """The flow of a finished run of another model beside that of the built-in engine, over wet cells."""
+    """The flow of a finished run of another model beside that of the built-in engine, over wet cells.
 
-    code: str  # the program
-    # velocity_share, level_share: root mean square difference of the velocity vector over its mean size, and of the
-    # level over the mean depth [-]
+    Attributes
+    ----------
+    code : str
+        The program.
+    velocity_share, level_share : float
+        Root mean square difference of the velocity vector over its mean size, and of the level over the mean depth
+        [-].
+    area_share : float
+        Cells that are wet in one flow only, over those wet in theirs [-].
+    velocity, level : float
+        The root mean square differences [m/s, m].
+    beyond_mesh : float
+        Cells wet in ours where they have no mesh, over those wet in theirs [-].
+    discharge_spread : float
+        Standard deviation of their discharge along the channel over its mean [-].
+    measured : float
+        Root mean square difference of theirs, as it is, from the measured velocities [m/s], NaN without any.
+    alike : bool
+        Whether all shares are within their limits, so that a diagnosis may use slopes of the built-in engine.
+    limits : (float, float, float)
+        Of the three shares [-].
+    """
+
+    code: str
     velocity_share: float
     level_share: float
-    area_share: float  # cells that are wet in one flow only, over those wet in theirs [-]
-    # velocity, level: the root mean square differences [m/s, m]
+    area_share: float
     velocity: float
     level: float
-    beyond_mesh: float  # cells wet in ours where they have no mesh, over those wet in theirs [-]
-    discharge_spread: float  # standard deviation of their discharge along the channel over its mean [-]
-    # Root mean square difference of theirs, as it is, from the measured velocities [m/s], NaN without any
+    beyond_mesh: float
+    discharge_spread: float
     measured: float
-    alike: bool  # whether all shares are within their limits, so that a diagnosis may use slopes of the built-in engine
-    limits: tuple[float, float, float]  # of the three shares [-]
+    alike: bool
+    limits: tuple[float, float, float]
 
 
 Note = (
