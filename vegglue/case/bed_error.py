@@ -38,8 +38,19 @@ def _plain(layers: tuple[BedLayer, ...]) -> tuple[BedLayer, ...]:
 
 @dataclass(frozen=True)
 class SurveyedLayer:
-    """A layer of the bed with a survey: its index among the layers, the survey as read, levels (nx ny,) [m] and cells
-    (nx ny,) that have them.
+    """A layer of the bed with a survey.
+
+    Attributes
+    ----------
+    index : int
+        Among the layers.
+    covariances : tuple of CovarianceOfBed
+    read : BedSurvey
+        The survey as read.
+    level : ndarray (nx ny,)
+        [m]
+    there : ndarray of bool (nx ny,)
+        Cells that have its levels.
     """
 
     index: int
@@ -93,7 +104,17 @@ _root_of_covariance = memoised(MOST_BEDS_KEPT)(root_of_covariance)  # grids of o
 
 @dataclass(frozen=True)
 class SurveyedLine:
-    """A line of the survey of a layer of the bed, by its index, its number there, and its middle x, y [m]."""
+    """A line of the survey of a layer of the bed.
+
+    Attributes
+    ----------
+    layer : int
+        Index of the layer.
+    number : int
+        Of the line in that survey.
+    x, y : float
+        Its middle [m].
+    """
 
     layer: int
     number: int

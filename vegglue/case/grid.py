@@ -148,9 +148,15 @@ LEAST_STRETCH = 0.2
 
 @dataclass(frozen=True)
 class Grid:
-    """Centres of the cells along x (nx,) and y (ny,), and their size [m].
+    """The regular grid of a case.
 
-    With a centreline, x runs along it and y across, positive to its left; cells have their size on it.
+    Attributes
+    ----------
+    x, y : ndarray (nx,), (ny,)
+        Centres of the cells [m]. With a centreline, x runs along it and y across, positive to its left.
+    dx, dy : float
+        Size of a cell [m], with a centreline on it.
+    centreline : Centreline or None
     """
 
     x: Array

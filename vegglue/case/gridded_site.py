@@ -22,16 +22,31 @@ RIMS_KEPT = 32
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """A site on its grid. Compared by identity, so that what is computed of a site can be cached."""
+    """A site on its grid. Compared by identity, so that what is computed of a site can be cached.
+
+    Attributes
+    ----------
+    grid : Grid
+    bed : ndarray (nx, ny)
+        Level of the bed [m].
+    friction_class : ndarray of int (nx, ny)
+        Index into `class_names`.
+    class_names : tuple of str
+    patch : ndarray of int (nx, ny)
+        Index into the patches of the case, of the one that covers most of a cell, -1 without plants.
+    cover : ndarray (nx, ny)
+        Share of a cell that plants cover [-].
+    own : mapping of Site
+        The site in experiments with another bed, by their names.
+    """
 
     grid: Grid
-    bed: Array  # level of the bed [m]
-    friction_class: NDArray[np.int64]  # index into class_names
+    bed: Array
+    friction_class: NDArray[np.int64]
     class_names: tuple[str, ...]
-    # Index into the patches of the case, of the one that covers most of a cell, -1 without plants
     patch: NDArray[np.int64]
-    cover: Array  # share of a cell that plants cover [-]
-    own: Mapping[str, "Site"] = field(default_factory=dict)  # the site in experiments with another bed
+    cover: Array
+    own: Mapping[str, "Site"] = field(default_factory=dict)
 
     @property
     def main_patch(self) -> NDArray[np.int64]:

@@ -218,7 +218,17 @@ class PriorSample:
 
 
 def sobol_sample(case: Case) -> PriorSample:
-    """The members of a case: s_ij of the scrambled Sobol' sequence, theta_ij = F_j^-1(s_ij)."""
+    """s_ij of the scrambled Sobol' sequence, theta_ij = F_j^-1(s_ij): the members of a case.
+
+    Parameters
+    ----------
+    case : Case
+        With the priors F_j, the number of members and the seed.
+
+    Returns
+    -------
+    PriorSample
+    """
     return sample_at(case, sobol_points(len(case.parameters), case.simulate.members, case.simulate.seed))
 
 
@@ -257,7 +267,21 @@ def middle_value(case: Case, value: Value) -> float:
 
 
 def value_at(case: Case, value: Value, share: float) -> float:
-    """The number, or what so much of the prior of the parameter of that name lies below [its unit]."""
+    """A quantile of a value: the number itself, or that of the prior of the parameter of that name.
+
+    Parameters
+    ----------
+    case : Case
+    value : float or str
+        A number, or the name of a parameter.
+    share : float
+        Of the prior that lies below [-].
+
+    Returns
+    -------
+    float
+        [its unit]
+    """
     return float(quantile(case.parameters[value], share)) if isinstance(value, str) else value
 
 

@@ -56,9 +56,18 @@ def as_yaml(tree: Tree) -> str:
 
 
 def case_hash(case: Case) -> str:
-    """sha256 of the resolved case, in its order, and of the contents of every file it names, wherever they lie.
+    """SHA-256 of the resolved case, in its order, and of the contents of every file it names, wherever they lie.
 
-    Its title and what is planned are not in it: no result hangs on them.
+    Its title and what is planned are not in it: no result depends on them.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    str
+        Hexadecimal.
     """
     return _hash(dumped(case, {"planned": True}) | {"title": ""})
 
@@ -113,10 +122,23 @@ LINE = re.compile(r"^# sha256 ([0-9a-f]{16}) of (.+)\n", re.MULTILINE)
 
 
 def write_made(texts: Mapping[Path, str], advice: str, force: bool = False) -> None:
-    """Write a config, the last of `texts`, and before it the tables it comes with.
+    """Write a config, and before it the tables it comes with.
 
-    Errors: InputError, before anything is written, when one is there that vegglue did not write as it is, unless
-    forced; StorageError, which ends with the advice.
+    Parameters
+    ----------
+    texts : mapping of str
+        By path, the config last.
+    advice : str
+        What to do, for messages.
+    force : bool
+        Whether what vegglue did not write as it is is replaced, too.
+
+    Raises
+    ------
+    InputError
+        Before anything is written, if such a file is there and not to be replaced.
+    StorageError
+        If one cannot be written.
     """
     refuse_not_made(texts, advice, force)
     *tables, config = texts

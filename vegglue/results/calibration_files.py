@@ -34,7 +34,19 @@ LOG_PRIORS = ("loguniform", "lognormal")
 
 
 def pest_names(names: Iterable[str], longest: int = LONGEST_PARAMETER) -> dict[str, str]:
-    """Distinct names of at most `longest` letters a-z, 0-9 and _, by the names that they stand for."""
+    """Distinct names of letters a-z, 0-9 and _.
+
+    Parameters
+    ----------
+    names : iterable of str
+    longest : int
+        Letters at most.
+
+    Returns
+    -------
+    dict of str
+        By the names that they stand for.
+    """
     found: dict[str, str] = {}
     for name in names:
         plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "x"
@@ -162,7 +174,17 @@ def weights_of(station: pd.DataFrame) -> Array:
 
 
 def bounds_of(prior: Parameter) -> tuple[float, float]:
-    """Bounds of a prior; of an unbounded side the value that z = -6 or 6 standard deviations leads to."""
+    """Bounds of a prior for programs that need them.
+
+    Parameters
+    ----------
+    prior : Parameter
+
+    Returns
+    -------
+    float, float
+        Low and high [its unit]; of an unbounded side the value that z = -FURTHEST or FURTHEST leads to.
+    """
     from scipy.special import ndtr
 
     low, high = (
@@ -231,7 +253,20 @@ def write_evaluation(path: Path, station: pd.DataFrame) -> None:
 
 
 def log_likelihood(station: pd.DataFrame, prediction: Array) -> Array:
-    """-1/2 sum of (w (y - p))^2 + ln 2 pi - 2 ln w over the stations with a weight w (member,) [-]."""
+    """ln L = -1/2 sum of (w (y - f))^2 + ln 2 pi - 2 ln w
+
+    Parameters
+    ----------
+    station : DataFrame
+        y; w is 1 over the standard error of those that are used and state one, others do not count.
+    prediction : ndarray (member, station)
+        f [unit of each station].
+
+    Returns
+    -------
+    ndarray (member,)
+        [-]
+    """
     weight = weights_of(station)
     counted = weight > 0.0
     w, residual = weight[counted], (station["value"].to_numpy(float) - prediction)[:, counted]

@@ -243,7 +243,17 @@ class Diagnosis:
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """One object with every number that is printed."""
+    """Every number of a diagnosis that is printed.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+
+    Returns
+    -------
+    dict
+        SI; amplitudes in the unit of their effect.
+    """
     verdict, misfit, errors = diagnosis.verdict, diagnosis.misfit, diagnosis.errors
     tree = {
         "verdict": verdict.kind,

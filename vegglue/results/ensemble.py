@@ -95,7 +95,18 @@ QUANTITIES = tuple(stored_fields(Fields))  # in the order in which sensor.read_s
 
 
 def window_of(case: Case, grid: Grid) -> FieldWindow | None:
-    """The cells whose centres surround the range that the case keeps, None if it keeps none."""
+    """The cells whose centres surround the range of which a case keeps the fields.
+
+    Parameters
+    ----------
+    case : Case
+    grid : Grid
+
+    Returns
+    -------
+    FieldWindow or None
+        None if it keeps none.
+    """
     if case.simulate.fields is None:
         return None
     low, high = case.simulate.fields.x
@@ -111,7 +122,18 @@ def megabytes(case: Case, window: FieldWindow) -> float:
 
 @dataclass(frozen=True)
 class FieldsTooLarge:
-    """`simulate.fields` exceeds its budget [MB]; length of its range and one that fits [m]."""
+    """Fields of all members that exceed their budget.
+
+    Attributes
+    ----------
+    megabytes : float
+        Their size [MB].
+    members : int
+    budget : float
+        [MB]
+    length, fitting : float
+        Length of the range along x, and of one that fits [m].
+    """
 
     megabytes: float
     members: int

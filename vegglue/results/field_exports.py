@@ -93,7 +93,19 @@ QUANTITIES_OF_FLOW = dict.fromkeys(("bed", "level", "depth"), "m") | dict.fromke
 
 
 def quantities(flow: FlowFields, grid: Grid, frame: Frame | None) -> dict[str, Array]:
-    """The fields of one experiment by name (nx, ny); with a frame the components on the map too."""
+    """The fields of one experiment by name.
+
+    Parameters
+    ----------
+    flow : FlowFields
+    grid : Grid
+    frame : Frame or None
+
+    Returns
+    -------
+    dict of ndarray (nx, ny)
+        bed, level and depth [m], u and v [m/s]; with a frame or a centreline the components on the map, too.
+    """
     found = {name: getattr(flow, name) for name in ("bed", "level", "depth", "u", "v")}
     if frame is not None or grid.centreline is not None:
         u, v = flow.u, flow.v

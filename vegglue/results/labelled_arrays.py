@@ -25,8 +25,24 @@ ENGINE = "h5netcdf"
 
 
 def read_labelled(path: Path, *groups: str) -> "xarray.Dataset":
-    """Groups of a result file as one dataset, whose attributes name what they were made from: config, config_hash,
-    seed, version. Errors: InputError without xarray, StorageError for a broken file.
+    """Groups of a result file as one dataset.
+
+    Parameters
+    ----------
+    path : Path
+    *groups : str
+
+    Returns
+    -------
+    xarray.Dataset
+        Its attributes state what it was made from: config, config_hash, seed, version.
+
+    Raises
+    ------
+    InputError
+        Without xarray.
+    StorageError
+        For a broken file.
     """
     xarray = extra_library("xarray")
     extra_library(ENGINE)
@@ -71,6 +87,20 @@ def as_tree(parts: "Mapping[str, xarray.Dataset]") -> "xarray.DataTree":
 
     Each variable has a `long_name`, `units` that UDUNITS reads, and a `standard_name` if CF has one. A unit that CF
     does not know, or that differs between stations, stands in its `comment`.
+
+    Parameters
+    ----------
+    parts : mapping of xarray.Dataset
+        By the name of the group.
+
+    Returns
+    -------
+    xarray.DataTree
+
+    Raises
+    ------
+    InputError
+        Without xarray.
     """
     groups = {name: part.copy() for name, part in parts.items()}
     for name, variable in chain.from_iterable(part.variables.items() for part in groups.values()):
@@ -96,8 +126,26 @@ def as_tree(parts: "Mapping[str, xarray.Dataset]") -> "xarray.DataTree":
 
 
 def extra_library(name: str, extra: str = "arviz", asking: str = "vegglue.load", instead: str = "") -> Any:
-    """A library that vegglue can do without. Errors: InputError, which names who asks, the extra that has it, and what
-    else may be done.
+    """A library that vegglue can do without.
+
+    Parameters
+    ----------
+    name : str
+    extra : str
+        That has it.
+    asking : str
+        What needs it, for the message.
+    instead : str
+        What else may be done, for the message.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    InputError
+        If it is not installed.
     """
     try:
         module: ModuleType = import_module(name)

@@ -17,9 +17,17 @@ from vegglue.measurements.observations import STATION_TYPES, station_table
 
 @dataclass(frozen=True)
 class Stored:
-    """Annotation of a field that is stored: names of its dimensions, [unit], and what stands where nothing is known.
+    """Annotation of a field that is stored.
 
-    For a dict the first dimension is that of its keys.
+    Attributes
+    ----------
+    dims : tuple of str
+        Names of its dimensions; of a dict the first is that of its keys.
+    unit : str
+    fill : object
+        What stands where nothing is known.
+    type : type
+        Of its values.
     """
 
     dims: tuple[str, ...]
@@ -30,7 +38,17 @@ class Stored:
 
 @dataclass(frozen=True)
 class Variable:
-    """One dataset: names of its dimensions, values, [unit], and the shape of the blocks it is compressed in, if any."""
+    """One dataset of a file.
+
+    Attributes
+    ----------
+    dims : tuple of str
+        Names of its dimensions.
+    values : array
+    unit : str
+    compressed : tuple of int or None
+        Shape of the blocks in which it is compressed, if any.
+    """
 
     dims: tuple[str, ...]
     values: Any
@@ -40,7 +58,17 @@ class Variable:
 
 @dataclass(frozen=True)
 class Group:
-    """What belongs together in a file: coordinates by dimension, variables on them, and [units] of coordinates."""
+    """What belongs together in a file.
+
+    Attributes
+    ----------
+    coordinates : mapping of array
+        By dimension.
+    variables : mapping of Variable
+        On these.
+    units : mapping of str
+        Of the coordinates.
+    """
 
     coordinates: Mapping[str, Any]
     variables: Mapping[str, Variable]
@@ -68,10 +96,27 @@ _KINDS = {"O": "O", "S": "O", "f": "fiu", "i": "iu", "b": "b"}
 
 
 def fitting(group: ReadGroup, stored: Mapping[str, Stored], sizes: Mapping[str, int] | None = None) -> ReadGroup:
-    """The group, where each variable is there with its type and the size of each of its dimensions.
+    """A group, once each of its variables is there with its type and the size of each of its dimensions.
 
-    sizes: of dimensions that are known already. Errors: KeyError for a missing one, ValueError for one that does not
-    fit.
+    Parameters
+    ----------
+    group : mapping of ndarray
+    stored : mapping of Stored
+        The variables.
+    sizes : mapping of int, optional
+        Of dimensions that are known already.
+
+    Returns
+    -------
+    mapping of ndarray
+        The group.
+
+    Raises
+    ------
+    KeyError
+        If one is missing.
+    ValueError
+        If one does not fit.
     """
     known = dict(sizes or {})
     for name, one in stored.items():

@@ -339,7 +339,21 @@ class FieldPlan:
 
 
 def hours_of(pieces: Sequence[PlannedPiece], another_flow: float, present: frozenset[str] = frozenset()) -> float:
-    """Hours of some pieces together, with those of each flow beside the first; present: flows measured in anyhow."""
+    """Hours of some pieces of field work together, with those of each flow beside the first.
+
+    Parameters
+    ----------
+    pieces : sequence of PlannedPiece
+    another_flow : float
+        [h]
+    present : frozenset of str
+        Flows that are measured in anyhow.
+
+    Returns
+    -------
+    float
+        [h]
+    """
     flows = {one.experiment for one in pieces if one.experiment} - present
     free = 0 if present else 1
     return math.fsum(one.hours for one in pieces) + another_flow * max(len(flows) - free, 0)
@@ -348,7 +362,14 @@ def hours_of(pieces: Sequence[PlannedPiece], another_flow: float, present: froze
 def plan_json(plan: FieldPlan) -> dict[str, Any]:
     """A plan as the object that `vegglue plan --json` prints and plan.json keeps: docs/plan.md lists its keys.
 
-    A size that is never named is null.
+    Parameters
+    ----------
+    plan : FieldPlan
+
+    Returns
+    -------
+    dict
+        A size that is never named is null.
     """
 
     def piece(one: PlannedPiece) -> dict[str, Any]:
@@ -395,7 +416,18 @@ WGS84 = "EPSG:4326"
 
 @dataclass(frozen=True)
 class FieldPlace:
-    """A place where work is done, in one flow or in several: its name, and y of its stations [m], the lowest first."""
+    """A place where work is done, in one flow or in several.
+
+    Attributes
+    ----------
+    name : str
+    work : Work
+    x : float
+        [m]
+    y : tuple of float
+        Of its stations [m], the lowest first.
+    experiments : tuple of str
+    """
 
     name: str
     work: Work
@@ -406,8 +438,20 @@ class FieldPlace:
 
 @dataclass(frozen=True)
 class FieldStation:
-    """A station: its name, x and y in the case [m], east and north on the map [m], NaN without a frame or centreline,
-    longitude and latitude [degrees], NaN if unknown; experiments in which something is measured there.
+    """A station of field work.
+
+    Attributes
+    ----------
+    name : str
+    work : Work
+    x, y : float
+        In the case [m].
+    east, north : float
+        On the map [m], NaN without a frame or centreline.
+    longitude, latitude : float
+        [degrees], NaN if unknown.
+    experiments : tuple of str
+        In which something is measured there.
     """
 
     name: str
@@ -423,8 +467,15 @@ class FieldStation:
 
 @dataclass(frozen=True)
 class FieldFiles:
-    """What was written: the folder, and why there is no GPX, '' if there is one: 'frame' or 'crs' of the case is
-    missing, 'pyproj' is not installed, or 'system' is unknown to it.
+    """The files of field work that were written.
+
+    Attributes
+    ----------
+    folder : Path
+    stations : tuple of FieldStation
+    without_gpx : {"", "frame", "crs", "pyproj", "system"}
+        Why there is no GPX, '' if there is one: `frame` or `crs` of the case is missing, pyproj is not installed, or
+        the system is unknown to it.
     """
 
     folder: Path
@@ -450,7 +501,19 @@ def field_places(plan: FieldPlan) -> tuple[FieldPlace, ...]:
 
 
 def field_stations(case: Case, plan: FieldPlan) -> tuple[tuple[FieldStation, ...], str]:
-    """Stations of all places with their map coordinates, and why they have no longitude and latitude, '' if they do."""
+    """Stations of all places of a plan with their map coordinates.
+
+    Parameters
+    ----------
+    case : Case
+    plan : FieldPlan
+
+    Returns
+    -------
+    tuple of FieldStation
+    str
+        Why they have no longitude and latitude, '' if they do; see `FieldFiles`.
+    """
 
     def measured_in(place: FieldPlace, y: float) -> tuple[str, ...]:
         """The flows in which a station is measured: a bank may be dry in another one."""
@@ -495,7 +558,25 @@ def field_stations(case: Case, plan: FieldPlan) -> tuple[tuple[FieldStation, ...
 
 
 def write_field_files(folder: Path, case: Case, plan: FieldPlan) -> FieldFiles:
-    """Write stations.csv, stations.gpx and sheet/ into the folder of a plan. Raises StorageError."""
+    """Write stations.csv, stations.gpx and sheet/ into the folder of a plan.
+
+    Parameters
+    ----------
+    folder : Path
+    case : Case
+    plan : FieldPlan
+
+    Returns
+    -------
+    FieldFiles
+
+    Raises
+    ------
+    InputError
+        If `frame` of the case places stations outside its `crs`, or the sheet was filled in.
+    StorageError
+        If a file cannot be written.
+    """
     stations, without = field_stations(case, plan)
     heading = ["station", "work", "x", "y", "east", "north", "longitude", "latitude", "flows"]
     rows = [
@@ -539,8 +620,19 @@ def refuse_filled_in(folder: Path) -> None:
 
 
 def sheets(folder: Path, case: Case, plan: FieldPlan) -> dict[str, str]:
-    """The tables to fill in, by their names, flow by flow from downstream as the work goes, and last the site file that
-    names the case they are of.
+    """The tables of a plan to fill in, flow by flow from downstream as the work goes.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they will be.
+    case : Case
+    plan : FieldPlan
+
+    Returns
+    -------
+    dict of str
+        Texts by the name of the file, last the site file that names the case they are of.
     """
     planned, found = case.planned or Planned(), {}
     names = {(one.work, one.x, one.y): one.name for one in field_stations(case, plan)[0]}

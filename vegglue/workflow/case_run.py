@@ -158,7 +158,25 @@ class CaseRun:
 def case_run(
     case: Case | CaseRun, runs: Path | str, jobs: int = -1, watch: Watch = silent, force: bool = False
 ) -> CaseRun:
-    """The run of a case. A CaseRun is returned as it is: it has its own settings."""
+    """The run of a case.
+
+    Parameters
+    ----------
+    case : Case or CaseRun
+        A CaseRun is returned as it is: it has its own settings.
+    runs : Path or str
+        Folder of all runs.
+    jobs : int
+        Processes; -1 for one on every core.
+    watch : callable
+        Is called with each phase.
+    force : bool
+        Whether what vegglue did not write is replaced, too.
+
+    Returns
+    -------
+    CaseRun
+    """
     return case if isinstance(case, CaseRun) else CaseRun(case, Path(runs), jobs, watch, force)
 
 
@@ -177,7 +195,23 @@ def folder_of(runs: Path | str, case: Case) -> Path:
 
 
 def of_size(case: Case, members: int | None) -> Case:
-    """The case with another number of members, or as it is. Errors: InputError for none, a part, or too many."""
+    """The case with another number of members.
+
+    Parameters
+    ----------
+    case : Case
+    members : int or None
+        The case as it is, if None.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        If that is no whole number of 1 to MOST_MEMBERS.
+    """
     if members is None:
         return case
     if not isinstance(members, Integral):
@@ -197,7 +231,19 @@ def as_solved(case: Case, folder: Path) -> Case:
 
 
 def other_size(case: Case, folder: Path) -> int | None:
-    """How many members the ensemble in the folder of its run has, if its size is all that is not the case's."""
+    """How many members the stored ensemble of a case has, if its size is all that is not the case's.
+
+    Parameters
+    ----------
+    case : Case
+    folder : Path
+        Of its run.
+
+    Returns
+    -------
+    int or None
+        None without an ensemble, and for one of exactly this case or of another.
+    """
     path = folder / "ensemble.h5"
     stored = stored_hash(path)
     if stored in (None, simulation_hash(case)):
@@ -207,7 +253,19 @@ def other_size(case: Case, folder: Path) -> int | None:
 
 
 def kept_best_fit(case: Case, folder: Path) -> Array | None:
-    """Where an earlier command found that exactly this case fits best, z (p,)."""
+    """Where an earlier command found that exactly this case fits best.
+
+    Parameters
+    ----------
+    case : Case
+    folder : Path
+        Of its run, with best.json or posterior.h5.
+
+    Returns
+    -------
+    ndarray (p,) or None
+        z [standard deviations of the prior].
+    """
     wanted = case_hash(case)
     try:
         found = json.loads(read_text(folder / "best.json", LARGEST_JSON))
@@ -231,9 +289,26 @@ def keep_best_fit(case: Case, folder: Path, theta: Mapping[str, float], config_h
 
 
 def calibrated_anew(model: Model, known: Array | None, aside: pd.DataFrame) -> Baseline:
-    """The model at its minimum, searched from the prior and, if it is known, from z = `known` (p,).
+    """The model at its minimum, searched from the prior and from a place that is known.
 
     Of two different minima the one with more evidence is returned, as the model's own error differs between them.
+
+    Parameters
+    ----------
+    model : Model
+    known : ndarray (p,) or None
+        z [standard deviations of the prior].
+    aside : DataFrame
+        Measurements that are excluded, with the columns of MEASUREMENT.
+
+    Returns
+    -------
+    Baseline
+
+    Raises
+    ------
+    InputError
+        If no steady flow is found, or there is nothing to calibrate.
     """
     model = excluding(model, aside)
     base = for_prediction(kept_baseline(model))
@@ -256,7 +331,18 @@ def best_parameters(base: Baseline) -> dict[str, float]:
 
 
 def calibrated(run: CaseRun, aside: pd.DataFrame) -> Baseline:
-    """The case where it predicts best, kept for the next command; aside: measurements that are excluded."""
+    """A case where it predicts best, kept for the next command.
+
+    Parameters
+    ----------
+    run : CaseRun
+    aside : DataFrame
+        Measurements that are excluded, with the columns of MEASUREMENT.
+
+    Returns
+    -------
+    Baseline
+    """
     wanted = run.config_hash
     base = calibrated_anew(run.commanded_model, kept_best_fit(run.case, run.folder), aside)
     keep_best_fit(run.case, run.folder, best_parameters(base), wanted)
@@ -264,9 +350,22 @@ def calibrated(run: CaseRun, aside: pd.DataFrame) -> Baseline:
 
 
 def median_flow(run: CaseRun, posterior: Posterior) -> dict[str, FlowFields]:
-    """Steady fields at cell centres by experiment for the median parameters, kept in flow.h5.
+    """Steady fields at cell centres for the median parameters, kept in flow.h5.
 
-    An experiment without a steady flow is left out. Raises StorageError.
+    Parameters
+    ----------
+    run : CaseRun
+    posterior : Posterior
+
+    Returns
+    -------
+    dict of FlowFields
+        By experiment; one without a steady flow is left out.
+
+    Raises
+    ------
+    StorageError
+        If they cannot be written.
     """
     path, theta, wanted = run.folder / "flow.h5", posterior.marginals.median, case_hash(run.case)
     kept = flow_that_fits(path, wanted, theta)

@@ -88,10 +88,25 @@ class CommandTried:
 
 
 def with_command(model: Model, folder: Path, watch: Watch) -> Model:
-    """The model with the engine of its command or of its finished run, if its case has one; folder: of its results.
+    """The model with the engine of its command or of its finished run, if its case has one.
 
-    Raises InputError when the command cannot be run, or fails where it fits best, and when the flow of the finished run
-    is too far from the built-in engine's.
+    Parameters
+    ----------
+    model : Model
+    folder : Path
+        Of the results of the case.
+    watch : callable
+        Is called with each phase.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    InputError
+        If the command cannot be run, or fails where it fits best; if the flow of the finished run is too far from that
+        of the built-in engine.
     """
     if model.case.engine is not None:
         return place_of_command(model, folder, watch).model
@@ -103,8 +118,21 @@ def with_command(model: Model, folder: Path, watch: Watch) -> Model:
 
 
 def command_to_learn(model: Model, folder: Path, watch: Watch) -> "tuple[Model, CommandToLearn]":
-    """The built-in engine corrected where the command of a case fits best, so that many predictions cost no run; and
-    what a surrogate is learned from.
+    """The built-in engine corrected where the command of a case fits best, and what a surrogate is learned from.
+
+    Parameters
+    ----------
+    model : Model
+    folder : Path
+        Of the results of the case.
+    watch : callable
+        Is called with each phase.
+
+    Returns
+    -------
+    Model
+        With that engine, so that many predictions cost no run.
+    CommandToLearn
     """
     from vegglue.inference.surrogate import CommandToLearn  # late: only `infer` of a command waits for it
 
@@ -188,7 +216,20 @@ def command_compared(
 def command_tried(model: Model, folder: Path) -> CommandTried:
     """Run the command at the medians of the priors and a step ahead in each parameter; a diagnosis uses the same runs.
 
-    Raises InputError when it fails at the medians.
+    Parameters
+    ----------
+    model : Model
+    folder : Path
+        Of the results of the case.
+
+    Returns
+    -------
+    CommandTried
+
+    Raises
+    ------
+    InputError
+        If it fails at the medians.
     """
     case, bare = model.case, without_effects(model)
     middle, runs = np.zeros(len(bare.names)), command_runs(case, folder)
@@ -234,7 +275,20 @@ def refuse_command(case: Case, verb: str) -> None:
 
 
 def place_of_command(model: Model, folder: Path, watch: Watch) -> CommandPlace:
-    """The place where the command fits best: as an earlier verb has left it, or searched and kept."""
+    """The place where the command of a case fits best: as an earlier verb has left it, or searched and kept.
+
+    Parameters
+    ----------
+    model : Model
+    folder : Path
+        Of the results of the case.
+    watch : callable
+        Is called with each phase.
+
+    Returns
+    -------
+    CommandPlace
+    """
     runs, path, wanted = command_runs(model.case, folder), folder / "engine" / PLACE_FILE, case_hash(model.case)
     known = kept_place(path, wanted, len(model.names))
     if known is not None:
@@ -254,8 +308,21 @@ def place_of_command(model: Model, folder: Path, watch: Watch) -> CommandPlace:
 
 
 def kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool, int, Array, int] | None:
-    """The place in a file: z (p,), whether its search settled, places tried, where the command ran (k, q), and how many
-    runs failed; None if it is damaged or another.
+    """The place of a command in a file.
+
+    Parameters
+    ----------
+    path : Path
+    wanted : str
+        Hash of the case.
+    parameters : int
+        p.
+
+    Returns
+    -------
+    tuple or None
+        z (p,), whether its search settled, places tried, where the command ran (k, q), and how many runs failed; None
+        if the file is damaged or of another case.
     """
     try:
         kept = json.loads(read_text(path, LARGEST_JSON))

@@ -114,7 +114,29 @@ def discover(
 
 
 def written(parent: Case, laws: Sequence[LawFound], target: Path, file: Path, force: bool) -> Case:
-    """The child config and the effect file it names, read back as any other."""
+    """The child config of a law and the effect file that it names, read back as any other.
+
+    Parameters
+    ----------
+    parent : Case
+    laws : sequence of LawFound
+        A law, and its product if it has one.
+    target, file : Path
+        The config, and the effect file.
+    force : bool
+        Whether what vegglue did not write is replaced, too.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        If such a file is there and not to be replaced.
+    StorageError
+        If one cannot be written.
+    """
     refuse_parent(target, parent.source)
     text, names = effect_text(laws, parent.effect_file), " and ".join(map(effect_name, laws))
     added: list[tuple[Candidate, dict[str, float]]] = []

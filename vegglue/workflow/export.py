@@ -143,8 +143,18 @@ def export(
 
 
 def members_to_export(run: CaseRun, valued: Array) -> dict[str, tuple[dict[str, Array], Array, Array]]:
-    """Parameters (member,), predictions at the valued stations (member, station) and chains (member,) of the members
-    that were solved, and of the draws of the posterior; of each of them that fits the case.
+    """The members that were solved and the draws of the posterior, of each of them that fits the case.
+
+    Parameters
+    ----------
+    run : CaseRun
+    valued : ndarray of bool (station,)
+        Stations with a value, v of them.
+
+    Returns
+    -------
+    dict of (dict of ndarray (member,), ndarray (member, v), ndarray (member,))
+        Parameters [unit of each], predictions [unit of each station] and chains, by "ensemble" or "posterior".
     """
     case, folder = as_solved(run.case, run.folder), run.folder
     found, wanted = {}, case_hash(case)
@@ -201,7 +211,21 @@ def export_to_spotpy(run: CaseRun) -> Exported:
 
 
 def flow_to_export(run: CaseRun) -> tuple[dict[str, FlowFields], Array | None, str]:
-    """The flow by experiment, predictions at the stations, None if no flow is found, and whose parameters these are."""
+    """The flow of a case for its median, best or middle parameters.
+
+    Parameters
+    ----------
+    run : CaseRun
+
+    Returns
+    -------
+    dict of FlowFields
+        By experiment.
+    ndarray (station,) or None
+        Predictions [unit of each station], None if no flow is found.
+    str
+        Whose parameters these are, in words.
+    """
     case, folder = run.case, run.folder
     sized = run.of(as_solved(case, folder))
     wanted = sized.config_hash

@@ -173,7 +173,19 @@ def extend_stepwise(
 
 
 def extended(run: CaseRun, found: Diagnosis) -> StepwiseExtension:
-    """The parent and its children, each better than the one before; a model that is only tried leaves no file."""
+    """The parent and its children, each better than the one before; a model that is only tried leaves no file.
+
+    Parameters
+    ----------
+    run : CaseRun
+        Of the parent.
+    found : Diagnosis
+        Of the parent.
+
+    Returns
+    -------
+    StepwiseExtension
+    """
     aside = excluded_by(found)
     run.watch(Progress(with_compilation(f"calibrating {run.case.name}")))
     parent = calibrated(run, aside)
@@ -230,9 +242,17 @@ def verdict_digest(found: Diagnosis) -> str:
 
 
 def kept_extension(run: CaseRun, found: Diagnosis) -> StepwiseExtension | None:
-    """How exactly this case was extended before, by exactly this diagnosis and with its children unchanged, or None.
+    """How exactly this case was extended before, by exactly this diagnosis and with its children unchanged.
 
-    Never that of a case with code or a command of the user, as a child could name another.
+    Parameters
+    ----------
+    run : CaseRun
+    found : Diagnosis
+
+    Returns
+    -------
+    StepwiseExtension or None
+        None without one, and of a case with code or a command of the user, as a child could name another.
     """
     kept = comparison_that_fits(run.folder, run.config_hash)
     if kept is None or run.case.effect_file is not None or run.case.engine is not None:
@@ -328,7 +348,22 @@ def write_relevelled(parent: Case, loose: Case, target: Path, force: bool = Fals
 def calibrated_with_additions(
     parent: Model, added: Sequence[Addition], found: Diagnosis, aside: pd.DataFrame
 ) -> Baseline | None:
-    """The parent with additions, calibrated from the prior and from where the diagnosis ended; None without a flow."""
+    """The parent with additions, calibrated from the prior and from where the diagnosis ended.
+
+    Parameters
+    ----------
+    parent : Model
+    added : sequence of (Candidate, mapping of float)
+        Effects with values of their shapes [unit of each].
+    found : Diagnosis
+    aside : DataFrame
+        Measurements that are excluded, with the columns of MEASUREMENT.
+
+    Returns
+    -------
+    Baseline or None
+        None if no flow is found.
+    """
     child = with_additions(parent.case, added)
     theta = {name: value for name, value in values_tried(parent.case, found).items() if name in child.parameters}
     for one, _ in added:

@@ -48,9 +48,19 @@ BAD_PROBE_EXCESS = 10.0
 
 @dataclass(frozen=True)
 class Hidden:
-    """One thing that is hidden, in the unit of its amplitude (a bad probe in standard errors).
+    """One thing that is hidden.
 
-    signal: its visibility on the model's grid [standard errors]; station: row of a bad probe, else -1.
+    Attributes
+    ----------
+    name : str
+    amplitude : float
+        [unit of its amplitude; a bad probe in standard errors]
+    shapes : dict of float
+        [unit of each]
+    signal : float
+        Its visibility on the model's grid [standard errors].
+    station : int
+        Row of a bad probe, else -1.
     """
 
     name: str
@@ -67,9 +77,18 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Answer:
-    """What is true: everything hidden, the parameters, and the errors.
+    """What is true.
 
-    correlation: of neighbours along a section [-]; scale: true over stated errors [-].
+    Attributes
+    ----------
+    hidden : tuple of Hidden
+    parameters : dict of float
+        [unit of each]
+    correlation : float
+        Of the errors of neighbours along a section [-].
+    scale : float
+        True over stated errors [-].
+    seed : int
     """
 
     hidden: tuple[Hidden, ...]
@@ -85,9 +104,15 @@ class VisibilityError(InputError):
 
 @dataclass(frozen=True)
 class TwinBase:
-    """A true place z (p,) seen by the model and by the finer one that makes the data, nothing hidden yet.
+    """A true place seen by the model and by the finer one that makes the data, nothing hidden yet.
 
-    difference: between the model and a coarser one (station,), which a diagnosis takes for the error of its grid.
+    Attributes
+    ----------
+    model, fine : Model
+    here, there : Point
+        Of either, at the same z.
+    difference : ndarray (station,)
+        Between the model and a coarser one, which a diagnosis takes for the error of its grid [unit of each station].
     """
 
     model: Model
@@ -100,7 +125,31 @@ class TwinBase:
 def chosen_effect(
     base: TwinBase, errors: Noise, name: str, size: float | None, snr: float, random: np.random.Generator
 ) -> tuple[Candidate, Hidden]:
-    """The candidate of this `name`, at its size; what `?` or chance decides is drawn until it can be seen."""
+    """An effect to hide, at its size.
+
+    Parameters
+    ----------
+    base : TwinBase
+    errors : Noise
+    name : str
+        An effect, `unlisted:NAME`, or `?`: then it is drawn until it can be seen.
+    size : float or None
+        [unit of its amplitude]; as visible as `snr` if None.
+    snr : float
+        [standard errors]
+    random : numpy.random.Generator
+
+    Returns
+    -------
+    Candidate, Hidden
+
+    Raises
+    ------
+    VisibilityError
+        If it is as visible as wanted at no plausible size.
+    InputError
+        If the effect is unknown, or cannot have that size.
+    """
     everything = candidates_of(base.model.case, base.model.station)
     for _ in range(DRAWN if name == ANY or name.startswith(UNLISTED) else 1):
         candidate = everything[int(random.integers(len(everything)))] if name == ANY else candidate_of(base.model, name)
@@ -134,9 +183,24 @@ def chosen_effect(
 
 
 def candidate_of(model: Model, name: str) -> Candidate:
-    """The effect that a name stands for, listed or `unlisted:NAME`. Errors: InputError.
+    """The effect that a name stands for.
 
     `discharge_error` is the one of the only experiment, if there is one only, by the name that a diagnosis has for it.
+
+    Parameters
+    ----------
+    model : Model
+    name : str
+        Of a listed effect, or `unlisted:NAME`.
+
+    Returns
+    -------
+    Candidate
+
+    Raises
+    ------
+    InputError
+        If it is unknown, or something unlisted and the case has effects of its own.
     """
     if not name.startswith(UNLISTED):
         try:
@@ -160,9 +224,23 @@ def case_hiding(case: Case, candidate: Candidate, hidden: Hidden) -> Case:
 
 
 def bad_probe(errors: Noise, size: str, random: np.random.Generator) -> Hidden:
-    """A probe of velocity that reads wrong, by `size` standard errors if that is given.
+    """A probe of velocity that reads wrong, drawn from those with a neighbour in their section.
 
-    Errors: InputError where no section has two velocities.
+    Parameters
+    ----------
+    errors : Noise
+    size : str
+        Standard errors, BAD_PROBE_EXCESS up or down if empty.
+    random : numpy.random.Generator
+
+    Returns
+    -------
+    Hidden
+
+    Raises
+    ------
+    InputError
+        If no section has two velocities, or the size is no number.
     """
     velocity = np.flatnonzero(np.isfinite(errors.separation).sum(axis=1) > 1)  # gauges have no neighbours
     if not velocity.size:
@@ -223,7 +301,20 @@ def _signal(base: TwinBase, errors: Noise, candidate: Candidate, hidden: Hidden)
 
 
 def visible_length(base: TwinBase, errors: Noise, trace: Array) -> float:
-    """|(I - P_J) W d| of a change d (station,) of the predictions."""
+    """|(I - P_J) W d| of a change d of the predictions.
+
+    Parameters
+    ----------
+    base : TwinBase
+    errors : Noise
+    trace : ndarray (station,)
+        d [unit of each station].
+
+    Returns
+    -------
+    float
+        [standard errors]
+    """
     white = errors.whiten(errors.used(trace[:, None]))
     slopes = errors.whiten(errors.used(base.here.slope))
     return float(score_test.project(slopes, white[:, 0], np.zeros(slopes.shape[1]), white).length[0])
@@ -236,7 +327,23 @@ OFF_CENTRE = (0.3, 1.0)
 
 
 def errors_named(text: str) -> tuple[float, float]:
-    """Correlation of neighbours, and true over stated errors: `white`, `ar1:0.5`, `understated:1.5`."""
+    """The errors that `--noise` names.
+
+    Parameters
+    ----------
+    text : str
+        `white`, `ar1:0.5`, `understated:1.5`.
+
+    Returns
+    -------
+    float, float
+        Correlation of neighbours, and true over stated errors [-].
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
     kind, _, number = text.partition(":")
     try:
         value = float(number) if number else 0.0
@@ -252,13 +359,41 @@ def errors_named(text: str) -> tuple[float, float]:
 
 
 def true_place(parameters: int, seed: int) -> Array:
-    """z (p,), the standard normal coordinates of the prior: on either side of the centre of each, off it."""
+    """A true place, on either side of the centre of each prior by OFF_CENTRE.
+
+    Parameters
+    ----------
+    parameters : int
+        p.
+    seed : int
+
+    Returns
+    -------
+    ndarray (p,)
+        z [standard deviations of the prior].
+    """
     random = np.random.default_rng((seed, 1))
     return np.asarray(random.choice([-1.0, 1.0], parameters) * random.uniform(*OFF_CENTRE, parameters))
 
 
 def twin_base(model: Model, z: Array) -> TwinBase:
-    """The model and a finer one at a true place z (p,). Errors: InputError when no steady flow is found there."""
+    """A model and a finer one at a true place.
+
+    Parameters
+    ----------
+    model : Model
+    z : ndarray (p,)
+        [standard deviations of the prior]
+
+    Returns
+    -------
+    TwinBase
+
+    Raises
+    ------
+    InputError
+        If no steady flow is found there.
+    """
     fine = finer(model)
     here, there = linearise(model, z), linearise(fine, z)
     if here is None or there is None:
@@ -281,10 +416,28 @@ def finer(model: Model) -> Model:
 def measured_twin(
     base: TwinBase, wanted: Sequence[str], snr: float, noise: str, seed: int
 ) -> tuple[pd.DataFrame, Answer]:
-    """Stations with the values measured in a truth that hides `wanted`, and the answer.
+    """Stations with the values measured in a truth that hides something, and the answer.
 
-    wanted: `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `?` for any effect, `nothing`. Errors: InputError for
-    what is unknown, or cannot be made as visible as wanted.
+    Parameters
+    ----------
+    base : TwinBase
+    wanted : sequence of str
+        `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `?` for any effect, `nothing`.
+    snr : float
+        Visibility of what has no size [standard errors].
+    noise : str
+        See `errors_named`.
+    seed : int
+
+    Returns
+    -------
+    DataFrame
+    Answer
+
+    Raises
+    ------
+    InputError
+        For what is unknown, or cannot be made as visible as wanted; if no flow is found with it.
     """
     random = np.random.default_rng((seed, 2))
     correlation, scale = errors_named(noise)

@@ -111,9 +111,25 @@ def is_inferred(run: CaseRun) -> bool:
 
 
 def own_ensemble(run: CaseRun, given: Ensemble | None, needed: bool) -> Ensemble | None:
-    """The ensemble that was given, else the one in the folder; None if there is none and it is not needed.
+    """The ensemble that a posterior is made of.
 
-    Raises InputError for an ensemble of another state of the case, or if there is none and it is needed.
+    Parameters
+    ----------
+    run : CaseRun
+    given : Ensemble or None
+        The one in the folder of the run, if None.
+    needed : bool
+        Whether the posterior needs one.
+
+    Returns
+    -------
+    Ensemble or None
+        None if there is none and it is not needed.
+
+    Raises
+    ------
+    InputError
+        For an ensemble of another state of the case or of another size, or if there is none and it is needed.
     """
     case, path = run.case, run.folder / "ensemble.h5"
     if given is None:
@@ -135,7 +151,23 @@ def needs_ensemble(case: Case, method: Method) -> bool:
 
 
 def chosen_method(case: Case, asked: Method | None) -> Method:
-    """The wanted method, else that of the case; an informal likelihood is always weighed. Errors: InputError."""
+    """How a posterior is made; members of an informal likelihood are always weighed.
+
+    Parameters
+    ----------
+    case : Case
+    asked : {"glue", "refine", "surrogate"} or None
+        That of the case, if None.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        If that is no method, or none for this case.
+    """
     if asked not in (None, *get_args(Method)):
         raise InputError(f"--method: expected {' or '.join(get_args(Method))}, got {asked!r}.")
     chosen = asked or case.infer.method

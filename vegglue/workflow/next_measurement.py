@@ -120,7 +120,16 @@ def _detected_length(found: Diagnosis) -> float:
 def with_places(base: Baseline, found: Diagnosis) -> Baseline:
     """The calibrated model with the places that its diagnosis found, as that calls untestable what hides beside them.
 
-    From where the diagnosis ended.
+    Parameters
+    ----------
+    base : Baseline
+    found : Diagnosis
+        From where it ended the model is calibrated.
+
+    Returns
+    -------
+    Baseline
+        The same without places.
     """
     if not found.places:
         return base
@@ -133,8 +142,21 @@ def with_places(base: Baseline, found: Diagnosis) -> Baseline:
 def questions_about(
     about: Subject, rivals: Sequence[Explanation], worths: Sequence[MeasurementWorth]
 ) -> list[Question]:
-    """A question with what could be measured for it. If nothing answers it and there are more than two rivals, those
-    that something separates from all others follow.
+    """A question with what could be measured for it.
+
+    Parameters
+    ----------
+    about : Subject
+    rivals : sequence of (Candidate, dict of float, float)
+        Effect, values of its shapes, gain.
+    worths : sequence of MeasurementWorth
+        Of these rivals.
+
+    Returns
+    -------
+    list of Question
+        If nothing answers it and there are FEWEST_PARTED rivals or more, those that something separates from all others
+        follow.
     """
     whole = Question(about, _ranked(_proposed(one, one.now.min(), one.then.min()) for one in worths))
     if whole.useful or len(rivals) < FEWEST_PARTED:
@@ -160,7 +182,18 @@ def _proposed(one: MeasurementWorth, now: float, then: float) -> ProposedMeasure
 
 
 def what_is_open(case: Case, found: Diagnosis) -> list[tuple[Subject, list[Explanation]]]:
-    """What the diagnosis leaves open, and the rivals of each question; nothing of data that it doubts."""
+    """What a diagnosis leaves open.
+
+    Parameters
+    ----------
+    case : Case
+    found : Diagnosis
+
+    Returns
+    -------
+    list of (Subject, list of (Candidate, dict of float, float))
+        The rivals of each question; none of data that it doubts.
+    """
     if found.verdict.doubts_the_data:
         return []
     questions: list[tuple[Subject, list[Explanation]]] = []
@@ -214,7 +247,21 @@ def _laws_by_name(found: Diagnosis) -> dict[str, CandidateLaw]:
 
 
 def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: bool = False) -> list[Explanation]:
-    """Effects of a diagnosis by name, at the size it found or a plausible one; laws at their size to first order."""
+    """Effects and laws of a diagnosis as explanations.
+
+    Parameters
+    ----------
+    case : Case
+    found : Diagnosis
+    names : sequence of str
+    plausible : bool
+        Whether effects have a plausible size, else the one that was found; laws have that to first order.
+
+    Returns
+    -------
+    list of (Candidate, dict of float, float)
+        Effect, values of its shapes [unit of each], gain (amplitude - off)^power.
+    """
     rivals: list[Explanation] = []
     for candidate_effect in (one for one in found.candidate_effects if one.name in names):
         candidate = candidate_named(case, found.predictions.station, candidate_effect.name)

@@ -94,8 +94,21 @@ def run(
 
 @one_thread()
 def with_a_law(parent: CaseRun, alone: Comparison, show: Show) -> CaseRun:
-    """The case with a law that is in no list, if one is found and errors at held-out sections are less with it than
-    those of the case `alone`; else the case. Only then their comparison is kept.
+    """A case with a law that is in no list, if one is found and helps.
+
+    Parameters
+    ----------
+    parent : CaseRun
+    alone : Comparison
+        Of that case alone.
+    show : callable
+        Is called with each result.
+
+    Returns
+    -------
+    CaseRun
+        The child if errors at held-out sections are less with the law, else the parent. Only then their comparison is
+        kept.
     """
     law = discover(parent)
     show(parent.case, law)
@@ -114,9 +127,22 @@ def with_a_law(parent: CaseRun, alone: Comparison, show: Show) -> CaseRun:
 
 
 def make_posterior(run: CaseRun, members: int | None, show: Show) -> bool:
-    """Make the posterior of a case, and the ensemble if it is wanted, unless they are up to date; whether it has one.
+    """Make the posterior of a case, and the ensemble if it is wanted, unless they are up to date.
 
     An ensemble is wanted if its size is given, the posterior needs it, its fields are to be kept, or there was one.
+
+    Parameters
+    ----------
+    run : CaseRun
+    members : int or None
+        Of the ensemble, as in the case if None.
+    show : callable
+        Is called with each result.
+
+    Returns
+    -------
+    bool
+        Whether there is a posterior.
     """
     case, ensemble = run.case, None
     there = begun_or_finished(run.runs / case.name / "ensemble.h5")

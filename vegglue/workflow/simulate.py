@@ -89,7 +89,16 @@ def simulate(
 
 
 def compute_members(run: CaseRun, path: Path, given: PriorSample | None = None) -> None:
-    """Solve the members of a case, or the given ones, or run its command for each, into a file."""
+    """Solve the members of a case, or run its command for each, into a file.
+
+    Parameters
+    ----------
+    run : CaseRun
+    path : Path
+        Of the HDF5 file.
+    given : PriorSample, optional
+        Members in place of those that the case draws from its priors.
+    """
     if run.case.engine is None:
         solve_ensemble(run.case, run.observations, path, run.jobs, run.watch, run.site, given)
         return
@@ -99,7 +108,22 @@ def compute_members(run: CaseRun, path: Path, given: PriorSample | None = None) 
 
 
 def simulate_given(run: CaseRun, file: Path) -> Ensemble:
-    """Solve the members of a CSV. Raises InputError for one that does not fit the case."""
+    """Solve the members of a CSV, and write their predictions beside the ensemble.
+
+    Parameters
+    ----------
+    run : CaseRun
+    file : Path
+
+    Returns
+    -------
+    Ensemble
+
+    Raises
+    ------
+    InputError
+        For a file that does not fit the case.
+    """
     theta = read_parameters(file, run.case)
     run, given = run.sized(len(next(iter(theta.values())))), sample_of(run.case, theta)
     path = given_folder(run, file) / "ensemble.h5"

@@ -188,24 +188,46 @@ def reveal(folder: Path | str, *, runs: Path | str = "runs", trust: bool = False
 
 @dataclass(frozen=True)
 class Mark:
-    """One hidden cause compared with a diagnosis."""
+    """One hidden cause compared with a diagnosis.
 
-    # hidden, kind: the cause, and what kind of cause it is
+    Attributes
+    ----------
+    hidden : Hidden
+    kind : {"probe", "unlisted", "law", "effect"}
+    verdict : str
+        Kind of the verdict, '' without a diagnosis.
+    found : bool
+        Whether it counts as found for its kind of cause.
+    named : bool
+        Whether the verdict is this effect alone.
+    inside : bool
+        Whether it is in the set.
+    open : bool
+        Whether it is listed among what is not excluded.
+    holds : bool or None
+        Whether the 95 % interval holds the true amplitude, None if it is not in the set.
+    away : float
+        Distance of the nearest place found from the true one [m], NaN without either.
+    groups : tuple of int
+        Groups of effects that the data cannot separate, for each step.
+    said : tuple of str
+        The set.
+    shapes : tuple of (str, float, float)
+        Name, found and true value of shapes that differ by 5 % or more [unit of each].
+    """
+
     hidden: Hidden
     kind: Literal["probe", "unlisted", "law", "effect"]
-    verdict: str = ""  # kind of the verdict, '' without a diagnosis
-    # found, named: whether it counts as found for its kind of cause, and whether the verdict is this effect alone
+    verdict: str = ""
     found: bool = False
     named: bool = False
-    # inside, open: whether it is in the set, and whether it is listed among what is not excluded
     inside: bool = False
     open: bool = False
-    holds: bool | None = None  # whether the 95 % interval holds the true amplitude, None if it is not in the set
-    away: float = float("nan")  # distance of the nearest place found from the true one [m], NaN without either
-    # groups, said: groups of effects that the data cannot separate, for each step, and the set
+    holds: bool | None = None
+    away: float = float("nan")
     groups: tuple[int, ...] = ()
     said: tuple[str, ...] = ()
-    shapes: tuple[tuple[str, float, float], ...] = ()  # (name, found, true) of shapes that differ by 5 % or more
+    shapes: tuple[tuple[str, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -230,7 +252,18 @@ def marks(answer: Answer, diagnosis: Diagnosis | None) -> list[Mark]:
 
 
 def mark(hidden: Hidden, diagnosis: Diagnosis | None) -> Mark:
-    """Compare one hidden cause with a diagnosis, if there is one."""
+    """A hidden cause compared with a diagnosis.
+
+    Parameters
+    ----------
+    hidden : Hidden
+    diagnosis : Diagnosis or None
+
+    Returns
+    -------
+    Mark
+        Kind of the cause alone, without a diagnosis.
+    """
     if hidden.name == BAD_PROBE:
         none = Mark(hidden, "probe")
     elif not hidden.listed:
