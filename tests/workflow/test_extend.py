@@ -190,10 +190,14 @@ def test_effects_and_places_are_tried_in_the_order_found(turn: int) -> None:
     assert [candidate.name for candidate, _ in found_additions(case, found)] == names
 
 
-@pytest.mark.parametrize(("chance", "tried"), [(0.76, 2), (0.1, 1)])
-def test_a_place_likelier_than_an_effect_is_tried_after_it(chance: float, tried: int) -> None:
+@pytest.mark.parametrize(
+    ("kind", "chance", "tried"), [("one-of", 0.76, 2), ("one-of", 0.1, 1), ("cannot-tell", 0.1, 2)]
+)
+def test_a_place_likelier_than_an_effect_is_tried_after_it_in_doubt_any_other(
+    kind: str, chance: float, tried: int
+) -> None:
     case = load_case(ROOT / "configs" / "twin.yaml")
-    found = found_in(case, "one-of", order=("streamlining_vogel_exponent",))
+    found = found_in(case, kind, order=("streamlining_vogel_exponent",))
     place, name = replace(a_place("bed"), x_spread=3.0), "unlisted_bed[x47.29,y-0.29]"
     step = replace(found.steps[0], chances=(0.24,), others={name: chance}, places={name: place})
     found = replace(found, steps=(step,))

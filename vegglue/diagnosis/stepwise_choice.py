@@ -3,7 +3,7 @@
 Those are the only judges: measurements for validation are never asked. An effect of one experiment, or of one section,
 is not known where that is left out: errors there do not judge it.
 
-Tried are the effects and places that a diagnosis found, and places that are likelier.
+Tried are the effects and places that a diagnosis found, and places that may be there instead of an effect.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -331,7 +331,7 @@ def found_additions(case: Case, found: Diagnosis) -> list[Addition]:
 
 
 def tried_additions(case: Case, found: Diagnosis) -> list[Addition]:
-    """What was found, and after each effect the place that is likelier than it.
+    """What was found, and after each effect the places that may be there instead, see `_rival_places`.
 
     Held-out errors decide between both, and if they are the same, what is known is kept.
 
@@ -345,11 +345,10 @@ def tried_additions(case: Case, found: Diagnosis) -> list[Addition]:
     list of (Candidate, dict of float)
         Each with values of its shapes [unit of each]; places are spread over where they may lie.
     """
-    likelier = _likelier_places(found)
-    tried: list[Addition] = []
+    rivals, tried = _rival_places(found), list[Addition]()
     for one in found_additions(case, found):
-        place = likelier.get(one[0].name)
-        tried += [one, (candidate_at(case, place), place.shapes)] if place else [one]
+        instead = [place for effect, place in rivals if effect == one[0].name]
+        tried += [one, *((candidate_at(case, place), place.shapes) for place in instead)]
     return tried
 
 
@@ -398,7 +397,7 @@ def nominees(case: Case, found: Diagnosis) -> list[Nominee]:
     -------
     list of Nominee
     """
-    known = {candidate_at(case, place).name: name for name, place in _likelier_places(found).items()}
+    known = {candidate_at(case, place).name: effect for effect, place in _rival_places(found)}
     named = []
     for one, _ in tried_additions(case, found):
         groups: dict[By, tuple[str, ...]] = {"experiments": one.experiments, "sections": one.sections}
@@ -409,21 +408,25 @@ def nominees(case: Case, found: Diagnosis) -> list[Nominee]:
 
 
 def places_tried(found: Diagnosis) -> list[LocalAnomaly]:
-    """Places that were found and those that are likelier than an effect, spread over where they may lie."""
-    return [*(spread_over_its_error(place) for place in found.places), *_likelier_places(found).values()]
+    """Places that were found and those that may be there instead of an effect, spread over where they may lie."""
+    return [*(spread_over_its_error(place) for place in found.places), *(place for _, place in _rival_places(found))]
 
 
-def _likelier_places(found: Diagnosis) -> dict[str, LocalAnomaly]:
-    """Places that are likelier than an accepted effect, by its name, spread over where they may lie."""
-    return {
-        step.accepted: spread_over_its_error(step.places[step.likelier_place])
+def _rival_places(found: Diagnosis) -> list[tuple[str, LocalAnomaly]]:
+    """Accepted effects and places that may be there instead, spread over where they may lie: one that is likelier, and
+    in doubt each that is not negligible, as then all that is kept has to help clearly.
+    """
+    rivals = {
+        name: (step.accepted, spread_over_its_error(place))
         for step in found.steps
-        if step.likelier_place
+        for name, place in step.places.items()
+        if in_doubt(found) or name == step.likelier_place
     }
+    return list(rivals.values())
 
 
 def values_tried(case: Case, found: Diagnosis) -> dict[str, float]:
-    """`values_found`, and the sizes of the likelier places.
+    """`values_found`, and the sizes of places that may be there instead of effects.
 
     Parameters
     ----------
@@ -435,8 +438,8 @@ def values_tried(case: Case, found: Diagnosis) -> dict[str, float]:
     dict of float
         By parameter [its unit].
     """
-    likelier = _likelier_places(found).values()
-    return values_found(case, found) | {candidate_at(case, one).parameter: one.amplitude for one in likelier}
+    rivals = {candidate_at(case, one).parameter: one.amplitude for _, one in _rival_places(found)}
+    return values_found(case, found) | rivals
 
 
 def values_found(case: Case, found: Diagnosis) -> dict[str, float]:
