@@ -14,7 +14,9 @@ from linear_baseline import CASE_OF_TWINS, at_best, measured_linearly, stations_
 from vegglue.decision_constants import constants
 from vegglue.diagnosis import candidate_effects
 from vegglue.diagnosis.candidate_effects import candidate_laws, laws_beside, same_as_accepted
+from vegglue.diagnosis.competition import Hypothesis
 from vegglue.diagnosis.diagnose import diagnose_model
+from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.search_state import PriorWeight, SearchState
 from vegglue.effects.grammar import LAWS
 from vegglue.results.causes import CandidateLaws, Step
@@ -24,10 +26,12 @@ NAMES = ("law_bank_speed_step", "law_bank_speed_ramp", "law_floor_along_trend")
 
 
 def suspected(
-    found: SearchState, p: float = 1e-3, rivals: tuple[float, ...] = (0.0,), lost: float = 0.0, p_last: float = 1e-3
-) -> CandidateLaws | None:
+    found: SearchState, p: float = 1e-3, rivals: tuple[float, ...] = (0.0,), lost: float = 0.0, p_last: float = 1e-3,
+    far: float = 0.0,
+) -> CandidateLaws | None:  # fmt: skip
     """What is reported of three laws of ln evidence 9, 7 and 1, with this alarm, beside kinds of these ln evidences;
-    lost: by how much less they have once they are calibrated; p_last: of the alarm beside all that was accepted.
+    lost: by how much less they have once they are calibrated; p_last: of the alarm beside all that was accepted; far:
+    where a parameter lies with the likeliest of them in the model [standard deviations].
     """
     laws = [SimpleNamespace(law=LAWS[name], candidate=SimpleNamespace(amplitude=LAWS[name].effect.amplitude))
             for name in NAMES]  # fmt: skip
@@ -47,8 +51,11 @@ def suspected(
     last: Any = SimpleNamespace(base=base, kinds=tuple(SimpleNamespace(total=one) for one in rivals))
     kept = np.array([9.0, 7.0, 1.0]) - lost
     beside_last: Any = SimpleNamespace(p=p_last)
+    fitted: Any = SimpleNamespace(point=SimpleNamespace(z=np.array([-far, *np.zeros(len(base.model.names))])))
+    refit = Refit(screening.laws[0].candidate, {}, fitted, 9.0, -0.5, (-0.7, -0.3))
+    calibrated = [Hypothesis("law", NAMES[0], 9.0, 0, refit)]
     return candidate_laws(
-        last, last, found, lambda: screening, lambda: beside_last, lambda *given: ((), kept, given[-1])
+        last, last, found, lambda: screening, lambda: beside_last, lambda *given: (calibrated, kept, given[-1])
     )
 
 
@@ -143,6 +150,16 @@ def test_a_place_is_compared_with_laws_by_what_it_explained() -> None:
     assert chances[0] > 0.9 > 0.1 > chances[1]
     assert candidate_laws_of("a", chance=0.92).clear
     assert not candidate_laws_of("a", chance=0.9).clear
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_law_with_which_no_name_would_be_believed_is_not_clear(share: float) -> None:
+    """Where a tidal river divides, a law led water that leaves there, and left the viscosity as far off its prior."""
+    place = SearchState(places=(an_anomaly(),), prior_weights=(PriorWeight("any", 0.0, 1.0),))
+    laws = suspected(place, far=share * constants().far_off_prior)
+    assert laws is not None
+    assert laws.likelier
+    assert laws.clear == (share < 1.0)
 
 
 @pytest.mark.slow

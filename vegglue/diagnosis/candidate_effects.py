@@ -23,11 +23,13 @@ from vegglue.calibration.fit import objective
 from vegglue.calibration.law_screening import LawScreening, first_order_gain, law_fingerprints, screen_laws
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import prior_shrinkage
+from vegglue.case.case_effects import parameters_of_effects
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import Hypothesis, chances_in_set
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.search_state import SearchState
 from vegglue.effects.grammar import LAWS, SAME_AS
+from vegglue.engine.interface import Model
 from vegglue.normal_range import NORMAL95
 from vegglue.results.causes import (
     AmplitudeEstimate,
@@ -193,7 +195,7 @@ def candidate_laws(
         against = [kind.total for kind in last.kinds]
     same = same_as_accepted(screening, found.effects)
     evidence = np.where(same, -np.inf, screening.kind.log_evidence)
-    of_laws, strengths = screening.of_each(evidence), {}
+    of_laws, refits = screening.of_each(evidence), dict[str, Refit]()
     # What was accepted stands for all its forms, with the evidence of the likeliest.
     of_forms = float(screening.kind.log_evidence[same].max(initial=-np.inf))
     against = [max(one, of_forms) for one in against]
@@ -206,7 +208,7 @@ def candidate_laws(
         calibrated, kept, own = refitted(screening, alone, found.log_prior, max(against))
         against = [max(own, of_forms)] if found.accepted else against
         of_laws = screening.of_each(np.where(np.isinf(evidence), -np.inf, kept))
-        strengths = {one.name: one.what.amplitude for one in calibrated if isinstance(one.what, Refit)}
+        refits = {one.name: one.what for one in calibrated if isinstance(one.what, Refit)}
     if not np.isfinite(of_laws).any():
         return None
     chances = chances_of_laws()
@@ -225,15 +227,33 @@ def candidate_laws(
                 equation=one.law.equation(reference),
                 reference=reference,
                 scale=one.candidate.amplitude.scale,
-                strength=strengths.get(one.law.name, first_order_gain(screening.kind, column, one)),
+                strength=(
+                    refits[one.law.name].amplitude
+                    if one.law.name in refits
+                    else first_order_gain(screening.kind, column, one)
+                ),
                 chance=float(chances[j]),
             )
         )
-    suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), tuple(laws), bool(strengths))
+    suspected = CandidateLaws(screening.p, of_laws.size, float(chances.sum()), tuple(laws), bool(refits))
+    if laws[0].name in refits:
+        model = first.base.model
+        _, far = furthest_off_prior(model, refits[laws[0].name].fitted.point.z[: len(model.names)])
+        suspected = replace(suspected, strained=far)
     if found.steps and suspected.clear:
         beside = beside_last()
         suspected = replace(suspected, needed=beside is not None and beside.p < constants().law_alarm_rate)
     return suspected if not found.steps or _may_be_laws(suspected.chance) else None
+
+
+def furthest_off_prior(model: Model, z: Array) -> tuple[str, float]:
+    """The calibrated parameter, other than the amplitude of an effect, that is furthest off the middle of its prior,
+    and how far [standard deviations]; z (p,).
+    """
+    of_effects = parameters_of_effects(model.case)
+    own = [(abs(float(z[j])), name) for j, name in enumerate(model.names) if name not in of_effects]
+    far, strained = max(own, default=(0.0, ""))
+    return strained, far
 
 
 def same_as_accepted(screening: LawScreening, accepted: Sequence[str]) -> NDArray[np.bool_]:

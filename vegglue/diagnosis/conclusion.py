@@ -18,13 +18,19 @@ from vegglue.calibration.noise import Noise, covariance_of_data, with_correlatio
 from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import kind_named
 from vegglue.case.bed import read_bed_survey
-from vegglue.case.case_effects import effect_of, parameters_of_effects
+from vegglue.case.case_effects import effect_of
 from vegglue.case.channel_geometry import channel_geometry, half_width, site_scales
 from vegglue.case.grid import centreline_in, on_map
 from vegglue.case.gridded_site import cells_at
 from vegglue.case.schema import Case
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.candidate_effects import candidate_effects_of, candidate_laws, laws_beside, not_excluded
+from vegglue.diagnosis.candidate_effects import (
+    candidate_effects_of,
+    candidate_laws,
+    furthest_off_prior,
+    laws_beside,
+    not_excluded,
+)
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.comparison import HeldOutErrors, held_out_errors, largest_error_between
 from vegglue.diagnosis.competition import cannot_be, possible_change, tempering
@@ -325,12 +331,9 @@ def _verdict(
     of_bed: tuple[BedCorrected, ...],
 ) -> Verdict:
     """The verdict on what was found, once all that it rests on is computed."""
-    base, model, z = last.base, last.base.model, last.base.fitted.point.z
+    base, model = last.base, last.base.model
     carried = submit(mismatched_discharges, model.case, model.site, model.station)
-    # The calibrated parameter, other than the amplitude of an effect, that is furthest off the middle of its prior.
-    of_effects = parameters_of_effects(model.case)
-    own = [(abs(float(z[j])), name) for j, name in enumerate(model.names) if name not in of_effects]
-    far, strained = max(own, default=(0.0, ""))
+    strained, far = furthest_off_prior(model, base.fitted.point.z)
     # Whether two single readings are excluded that stand side by side in one section.
     rows = single_readings(base.noise, found)
     neighbours = any(0.0 < base.noise.separation[a, b] < constants().neighbours_within for a in rows for b in rows)

@@ -269,6 +269,9 @@ class CandidateLaws:
     laws: tuple[CandidateLaw, ...]
     calibrated: bool = False
     needed: bool = True
+    # How far the parameter that is furthest off its prior lies with the likeliest law in the model [standard
+    # deviations]
+    strained: float = 0.0
 
     @property
     def likelier(self) -> bool:
@@ -277,8 +280,11 @@ class CandidateLaws:
 
     @property
     def clear(self) -> bool:
-        """Whether laws are strong_odds times as likely as all else together, and needed beside it."""
-        return self.needed and self.chance > constants().strong_odds * (1.0 - self.chance)
+        """Whether laws are strong_odds times as likely as all else together, needed beside it, and with the parameters
+        within far_off_prior, as whatever is named.
+        """
+        believed = self.needed and self.strained <= constants().far_off_prior
+        return believed and self.chance > constants().strong_odds * (1.0 - self.chance)
 
     @property
     def alike(self) -> tuple[CandidateLaw, ...]:
