@@ -188,8 +188,9 @@ class DecisionConstants:
         "which fall together as a misfit of the model does: neighbours are about one apart, others two",
     )  # fmt: skip
     few_sections: float = _constant(
-        4.0, "sections", CHOSEN, "up to which a name is tried without each of them: of more, one hardly decides"
-    )
+        4.0, "sections", CHOSEN, "up to which same_kind_odds of another name without one of them are a doubt; of more "
+        "one hardly decides, and strong_odds are needed: these after C of docs/measured.md without t0",
+    )  # fmt: skip
     model_error_evidence: float = _constant(
         3.3, "-", DERIVED, "rise of the log-likelihood above which the model needs more error of its own than it is "
         "allowed: half of the 99 % point of chi2 with one degree of freedom",

@@ -101,21 +101,38 @@ def test_a_parameter_that_one_section_alone_strains_is_found(others: float, hang
     assert found is None if not hangs else (found is not None and found[0] == "C" and found[1] < 0.1)
 
 
-@pytest.mark.parametrize(("other", "named"), [(0.1, True), (0.0, False)])
-def test_a_name_that_one_section_alone_gives_is_found(other: float, named: bool) -> None:
-    """The first section shows one effect, by 20 standard errors of each reading, and the second another or none."""
-    station = stations_of(CASE_OF_TWINS, ("A", "B"), 4)
+@pytest.mark.parametrize(
+    ("sections", "other", "accepted", "elsewhere", "named"),
+    [
+        ("AB", 0.1, "wind", 1.2, True),
+        ("AB", 0.0, "wind", 1.2, False),
+        ("AB", 0.1, "waves", 1.2, False),
+        ("AB", 0.1, "wind", 0.0, False),
+        ("ABCDEF", 0.1, "wind", 1.2, True),
+        ("AB", 0.006, "wind", 1.2, True),
+        ("ABCDEF", 0.006, "wind", 1.2, False),
+    ],
+)
+def test_a_name_that_one_section_alone_gives_is_found(
+    sections: str, other: float, accepted: str, elsewhere: float, named: bool
+) -> None:
+    """The first section shows one effect, by 20 standard errors of each reading, and the second another or none; of
+    many sections the other has to lead by more without the first. With all of them the first effect leads. It would be
+    seen elsewhere, too: what acts in the first section alone is not asked for without it.
+    """
+    station = stations_of(CASE_OF_TWINS, tuple(sections), 4)
     station = station[station["experiment"] == station["experiment"].iloc[0]].reset_index(drop=True)
-    first = (station["section"] == "A").to_numpy(float)
-    traces = np.column_stack([0.2 * first, 0.1 * (1.0 - first)])
-    base = at_best(CASE_OF_TWINS, station, 0.2 * first + other * (1.0 - first), np.zeros((len(station), 2)))
+    first, second = ((station["section"] == name).to_numpy(float) for name in "AB")
+    signs = np.where(np.arange(len(station)) % 2, 1.0, -1.0)  # across what the other does
+    traces = np.column_stack([0.2 * first + 0.2 * elsewhere * signs * second, 0.1 * second])
+    base = at_best(CASE_OF_TWINS, station, 0.2 * first + other * second, np.zeros((len(station), 2)))
     amplitude = Amplitude("a", "-", "", 1.0, -9.0, 9.0)
     prints: Any = SimpleNamespace(
         candidates=[SimpleNamespace(name="wind"), SimpleNamespace(name="waves")], amplitudes=[amplitude] * 2,
         columns=[np.array([0]), np.array([1])], only_sign=np.zeros(2, int), values=traces,
     )  # fmt: skip
-    screening: Any = SimpleNamespace(base=base, fingerprints=prints)
-    found = conclusion.name_without_a_section(screening, SearchState(steps=(step("wind"),)))
+    screening: Any = SimpleNamespace(base=base, fingerprints=prints, best_column=lambda candidate: candidate)
+    found = conclusion.name_without_a_section(screening, SearchState(steps=(step(accepted),)))
     assert found == (NameHangsOnSection("wind", "A", "waves") if named else None)
 
 

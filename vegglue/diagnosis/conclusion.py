@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
+from vegglue.arrays import Array
 from vegglue.calibration import score_test
 from vegglue.calibration.baseline import Baseline, log_evidence
 from vegglue.calibration.fingerprints import least_depth
@@ -397,9 +398,10 @@ def single_readings(noise: Noise, found: SearchState) -> list[int]:
 def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnSection | None:
     """The first section without which another listed effect leads the accepted one, to first order.
 
-        (E_best - E_own) / w(E_own) > ln same_kind_odds
+        (E_best - E_own) / w(E_own) > ln odds
 
-    Scores and evidence are those of the first screening without the rows of the section.
+    Odds are same_kind_odds for few_sections, strong_odds for more. Scores and evidence are those of the first screening
+    without the rows of the section.
 
     Parameters
     ----------
@@ -409,15 +411,16 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
     Returns
     -------
     NameHangsOnSection or None
-        None if there is no such section, if no effect was accepted first or a place beside it, and for more than
-        few_sections; a section counts once for each experiment.
+        None if there is no such section, if no effect was accepted first or a place beside it, or if another effect
+        leads with all sections, too: then refits have decided, not first order. A section counts once for each
+        experiment, but not if it holds most of the squared fingerprint: what acts there alone is not seen without it.
     """
     base, prints = first.base, first.fingerprints
     used = base.model.station.iloc[base.noise.rows]
     section_of = used.groupby(["experiment", "section"], sort=False).ngroup().to_numpy()
     sections = np.unique(section_of[velocity_rows(used)])
     names = [one.name for one in prints.candidates]
-    if not found.steps or found.places or not 1 < len(sections) <= constants().few_sections:
+    if not found.steps or found.places or sections.size < 2:
         return None
     step = found.steps[0]
     together = {name for group in step.groups if step.accepted in group for name in group} | set(step.rivals)
@@ -427,19 +430,33 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
     point, plausible = base.fitted.point, np.array([one.plausible_gain for one in prints.amplitudes])
     columns = base.noise.used(point.slope), base.noise.used(prints.values)
     residual = base.noise.residual(point.prediction)
-    for section in sections:
-        kept = section_of != section
+
+    own_column = first.best_column(names.index(step.accepted))
+
+    def leading(kept: Array) -> tuple[str, float, float]:
+        """The effect with most evidence of some rows, the ln odds by which it leads the accepted one, and the squared
+        length of the fingerprint of the latter.
+        """
         noise = replace(base.noise, lower=np.asarray(np.linalg.cholesky(covariance[np.ix_(kept, kept)]), float))
         slope, changes, left = (noise.whiten(part[kept]) for part in (*columns, residual))
         projected = score_test.project(slope, left, point.z, changes)
         scores = score_test.scores(projected, prints.only_sign)
         evidence = score_test.log_factors(scores, plausible * projected.length)
         of_each = np.array([float(evidence[some].max()) for some in prints.columns])
-        best = int(np.argmax(of_each))
-        own = max(float(of_each[names.index(name)]) for name in together if name in names)
+        best, own = int(np.argmax(of_each)), max(float(of_each[names.index(one)]) for one in together if one in names)
         ahead = (float(of_each[best]) - own) / float(tempering(np.array(own)))
-        if names[best] not in together and ahead > np.log(constants().same_kind_odds):
-            return NameHangsOnSection(step.accepted, str(used["section"].to_numpy()[~kept][0]), names[best])
+        return names[best], ahead, float(projected.length[own_column]) ** 2
+
+    name, _, whole = leading(section_of >= 0)
+    if name not in together:
+        return None
+    few = sections.size <= constants().few_sections
+    least = np.log(constants().same_kind_odds if few else constants().strong_odds)
+    for section in sections:
+        name, ahead, left = leading(section_of != section)
+        if name not in together and ahead > least and left > 0.5 * whole:
+            section_name = str(used["section"].to_numpy()[section_of == section][0])
+            return NameHangsOnSection(step.accepted, section_name, name)
     return None
 
 
