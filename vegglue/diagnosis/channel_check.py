@@ -44,7 +44,17 @@ FEW_MEMBERS = 100
 
 @dataclass(frozen=True)
 class BeyondGrid:
-    """A patch that reaches out of the grid along `axis`: its ends and those of the grid; wholly: none of it is in."""
+    """A patch that reaches out of the grid.
+
+    Attributes
+    ----------
+    axis : str
+        Along which.
+    patch, grid : (float, float)
+        Ends of the patch and of the grid along that axis [m].
+    wholly : bool
+        Whether none of it is in the grid.
+    """
 
     axis: str
     patch: Bounds
@@ -63,7 +73,15 @@ class PatchWithoutCells:
 
 @dataclass(frozen=True)
 class PatchAreaMissed:
-    """A patch whose cells have another area than the patch [m2]."""
+    """A patch whose cells have another area than the patch.
+
+    Attributes
+    ----------
+    patch : str
+    area, covered : float
+        Of the patch and of its cells [m2].
+    beyond : BeyondGrid or None
+    """
 
     patch: str
     area: float
@@ -150,8 +168,14 @@ class SurveyLeftOut:
 
 @dataclass(frozen=True)
 class ErrorsAssumed:
-    """Errors that an import assumes for a natural reach, as no file states them: of the sides of patches and of the
-    places of verticals across [m], of discharges and of stems [-].
+    """Errors that an import assumes for a natural reach, as no file states them.
+
+    Attributes
+    ----------
+    edges, probes : float
+        Of the sides of patches and of the places of verticals across [m].
+    discharge, stems : float
+        Of discharges and of stems [-].
     """
 
     edges: float
@@ -178,8 +202,20 @@ class StandDry:
 
 @dataclass(frozen=True)
 class CanopyEmergent:
-    """A canopy above the water: its height within 95 % of the prior, and the depth there in each experiment [m];
-    always: whatever height in that range; emergent: `numerics.emergent`.
+    """A canopy above the water.
+
+    Attributes
+    ----------
+    stand : str
+    height : (float, float)
+        Within 95 % of the prior [m].
+    experiments : tuple of str
+    depths : tuple of float
+        Largest depth there in each experiment [m].
+    always : bool
+        Whether it is above the water whatever its height in that range.
+    emergent : str
+        `numerics.emergent` of the case.
     """
 
     stand: str
@@ -192,7 +228,17 @@ class CanopyEmergent:
 
 @dataclass(frozen=True)
 class CanopyUnlikeMeasured:
-    """A canopy height of the case, 95 % of its prior, and another one that the verticals of a section show [m]."""
+    """A canopy height of the case, and another one that the verticals of a section show.
+
+    Attributes
+    ----------
+    section, experiment : str
+    measured : float
+        [m]
+    stand : str
+    height : (float, float)
+        95 % of the prior [m].
+    """
 
     section: str
     experiment: str
@@ -203,8 +249,21 @@ class CanopyUnlikeMeasured:
 
 @dataclass(frozen=True)
 class BankLawHeld:
-    """Wet cells of a class too shallow for Keulegan's law: up_to: k_s is the upper end of its prior [m]; depth: below
-    which the law is held [m]; argument: 12 h / k_s there [-]; shares: of the wet cells of the class [-] by experiment.
+    """Wet cells of a friction class that are too shallow for Keulegan's law.
+
+    Attributes
+    ----------
+    friction_class : str
+    k_s : float
+        [m]
+    up_to : bool
+        Whether that is the upper end of its prior.
+    depth : float
+        Below which the law is held [m].
+    argument : float
+        12 h / k_s there [-].
+    shares : tuple of (str, float)
+        Of the wet cells of the class by experiment [-].
     """
 
     friction_class: str
@@ -290,7 +349,15 @@ class ParameterIdle:
 
 @dataclass(frozen=True)
 class UnitOfPrior:
-    """A prior in another unit than the effect takes."""
+    """A prior in another unit than the effect takes.
+
+    Attributes
+    ----------
+    parameter, stated : str
+        The parameter, and the unit of its prior.
+    effect, quantity, taken : str
+        Key of the effect, which of its numbers it is, and the unit of that.
+    """
 
     parameter: str
     stated: str

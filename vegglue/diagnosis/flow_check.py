@@ -63,7 +63,18 @@ FEWEST_OF_A_MEAN = 3
 
 @dataclass(frozen=True)
 class DischargeUnlike:
-    """A measured discharge [m3/s] at x [m] that all sections contradict, and what the nearest of these carries."""
+    """A measured discharge that all sections contradict.
+
+    Attributes
+    ----------
+    experiment : str
+    x : float
+        Where it was measured [m].
+    value : float
+        [m3/s]
+    nearest : CarriedDischarge
+        What the nearest of these sections carries.
+    """
 
     experiment: str
     x: float
@@ -88,7 +99,16 @@ class OutletWithoutCells:
 
 @dataclass(frozen=True)
 class OutletDry:
-    """An experiment whose outlet level lies below all of the bed there; bed: its lowest level [m]."""
+    """An experiment whose outlet level lies below all of the bed there.
+
+    Attributes
+    ----------
+    experiment : str
+    level, bed : float
+        At the outlet, and the lowest of its bed [m].
+    measured : bool
+        Whether anything was measured in it.
+    """
 
     experiment: str
     level: float
@@ -128,7 +148,16 @@ class InflowAboveWater:
 
 @dataclass(frozen=True)
 class Supercritical:
-    """An experiment whose even flow without plants on the slope of the floor [-] has this Froude number [-]."""
+    """An experiment whose even flow without plants is supercritical.
+
+    Attributes
+    ----------
+    experiment : str
+    slope : float
+        Of the floor [-].
+    froude : float
+        Froude number on it [-].
+    """
 
     experiment: str
     slope: float
@@ -137,9 +166,16 @@ class Supercritical:
 
 @dataclass(frozen=True)
 class OutletAboveGauge:
-    """Outlets above the last gauge at x, `distance` upstream of them, by more than the velocity lifts the water.
+    """Outlets above the last gauge by more than the velocity lifts the water.
 
-    gauges: (experiment, level of the gauge, rise from it to the outlet) [m].
+    Attributes
+    ----------
+    x : float
+        Of the gauge [m].
+    distance : float
+        By which it lies upstream of the outlet [m].
+    gauges : tuple of (str, float, float)
+        Experiment, level of the gauge, rise from it to the outlet [m].
     """
 
     x: float
@@ -149,7 +185,14 @@ class OutletAboveGauge:
 
 @dataclass(frozen=True)
 class ComponentsExchanged:
-    """Experiments with more water across than along; median |u| and |v| of the first [m/s]."""
+    """Experiments with more water across than along.
+
+    Attributes
+    ----------
+    experiments : tuple of str
+    along, across : float
+        Median |u| and |v| of the first [m/s].
+    """
 
     experiments: tuple[str, ...]
     along: float
@@ -158,7 +201,16 @@ class ComponentsExchanged:
 
 @dataclass(frozen=True)
 class FlowUpstream:
-    """Experiments whose velocities run upstream; median of the first [m/s]; whether the grid follows a centreline."""
+    """Experiments whose velocities run upstream.
+
+    Attributes
+    ----------
+    experiments : tuple of str
+    median : float
+        Of the first [m/s].
+    on_centreline : bool
+        Whether the grid follows a centreline.
+    """
 
     experiments: tuple[str, ...]
     median: float
@@ -176,7 +228,16 @@ class SectionsUpstream:
 
 @dataclass(frozen=True)
 class LevelsRiseDownstream:
-    """Experiments whose water rises from the gauge at x = first to that at last, by so much each [m]."""
+    """Experiments whose water rises downstream.
+
+    Attributes
+    ----------
+    experiments : tuple of str
+    rises : tuple of float
+        Of each [m].
+    first, last : float
+        x of the gauges between which it does [m].
+    """
 
     experiments: tuple[str, ...]
     rises: tuple[float, ...]
@@ -188,8 +249,16 @@ class LevelsRiseDownstream:
 class VelocitiesTurned:
     """Experiments whose velocities are turned to one side at nearly all sections, as no water between two banks is.
 
-    angles: mean of each experiment to that side [degrees]; sections: how many; others: (experiment, angle) of those
-    that share sections and are not turned.
+    Attributes
+    ----------
+    side : str
+    experiments : tuple of str
+    angles : tuple of float
+        Mean of each experiment to that side [degrees].
+    sections : int
+        How many.
+    others : tuple of (str, float)
+        Experiment and angle [degrees] of those that share sections and are not turned.
     """
 
     side: str

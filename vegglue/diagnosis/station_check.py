@@ -46,7 +46,20 @@ class StationsOutsideGrid:
 
 @dataclass(frozen=True)
 class StationsOnLand:
-    """Places outside the wet channel, the first so high above the expected water [m]; most: most velocities are."""
+    """Places outside the wet channel.
+
+    Attributes
+    ----------
+    experiment : str
+    places : int
+        How many.
+    first : (float, float)
+        x, y of the first [m].
+    above : float
+        By how much that lies above the expected water [m].
+    most : bool
+        Whether most velocities do.
+    """
 
     experiment: str
     places: int
@@ -57,7 +70,18 @@ class StationsOnLand:
 
 @dataclass(frozen=True)
 class SharedPlaces:
-    """Stations in use at the place of another of their quantity and experiment; sections of the first place."""
+    """Stations in use at the place of another of their quantity and experiment.
+
+    Attributes
+    ----------
+    quantity, experiment : str
+    stations : int
+        How many.
+    first : (float, float)
+        x, y of the first [m].
+    sections : tuple of str
+        At the first place.
+    """
 
     quantity: str
     experiment: str
@@ -83,7 +107,16 @@ class StationsOnMap:
 
 @dataclass(frozen=True)
 class PlacesInOtherUnit:
-    """Velocities outside the grid, of all, which would lie inside in a unit."""
+    """Velocities outside the grid which would lie inside in another unit.
+
+    Attributes
+    ----------
+    outside, stations : int
+        How many, of all.
+    first : (float, float)
+        x, y of the first, as stated.
+    unit : str
+    """
 
     outside: int
     stations: int
@@ -249,7 +282,18 @@ class HeightsFromSurface:
 
 @dataclass(frozen=True)
 class HeightsExchanged:
-    """A file whose heights (column `upward`) and velocities look exchanged in some of its verticals; first: x, y."""
+    """A file whose heights and velocities look exchanged in some of its verticals.
+
+    Attributes
+    ----------
+    file : Path
+    upward : str
+        Column of the heights.
+    exchanged, verticals : int
+        How many, of all.
+    first : (float, float)
+        x, y of the first [m].
+    """
 
     file: Path
     upward: str
@@ -260,8 +304,19 @@ class HeightsExchanged:
 
 @dataclass(frozen=True)
 class PointsOutsideWater:
-    """Points excluded below the bed or above the surface in verticals that others keep in use; height above the bed
-    and depth of water of the first. levels_doubted: another remark questions the levels of their experiments.
+    """Points excluded below the bed or above the surface in verticals that others keep in use.
+
+    Attributes
+    ----------
+    points : int
+    sections, experiments : tuple of str
+    reason : Unused
+    first : (float, float)
+        x, y of the first [m].
+    height, depth : float
+        Of the first above the bed, and of the water there [m].
+    levels_doubted : bool
+        Whether another remark questions the levels of their experiments.
     """
 
     points: int
@@ -276,8 +331,20 @@ class PointsOutsideWater:
 
 @dataclass(frozen=True)
 class HeightsTakenForLevels:
-    """Verticals of a file that begin at one z while the bed falls by so much from one x to another, as in the first
-    experiment; z: middle of the lowest points in each; heading: of the column z where it was imported, '' if unknown.
+    """Verticals of a file that begin at one z while the bed falls.
+
+    Attributes
+    ----------
+    file : str
+    experiments : tuple of str
+    z : tuple of float
+        Middle of the lowest points in each [m].
+    first, last : float
+        x between which the bed falls in the first experiment [m].
+    fall : float
+        By how much it does [m].
+    heading : str
+        Of the column z where it was imported, '' if unknown.
     """
 
     file: str
@@ -293,8 +360,13 @@ class HeightsTakenForLevels:
 class ErrorsAcrossPlants:
     """Sections across the side of a patch whose verticals get errors from the jump of velocities there.
 
-    sections: (experiment, section); ranges over them of the errors [m/s] from all neighbours, from the points, and from
-    neighbours on the same side of the plants.
+    Attributes
+    ----------
+    sections : tuple of (str, str)
+        Experiment and section.
+    neighbours, points, one_side : (float, float)
+        Ranges over them of the errors from all neighbours, from the points, and from neighbours on the same side of the
+        plants [m/s].
     """
 
     sections: tuple[tuple[str, str], ...]

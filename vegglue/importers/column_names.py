@@ -138,7 +138,16 @@ def in_si(value: object, quantity: str, where: str) -> float:
 
 @dataclass(frozen=True)
 class Role:
-    """What a column may hold. quantity: that of its unit, '' for words; names: how it is usually headed."""
+    """What a column may hold.
+
+    Attributes
+    ----------
+    name : str
+    quantity : str
+        Of its unit, '' for words.
+    names : tuple of str
+        How it is usually headed.
+    """
 
     name: str
     quantity: str

@@ -50,7 +50,17 @@ METRE = 1e-9  # difference of a unit of length from a metre that is none [m]
 
 @dataclass(frozen=True)
 class StatedSystem:
-    """number: of EPSG, 0 for unknown; name: in the file; metres: in one unit of its coordinates, 0 for degrees."""
+    """A coordinate system as a file states it.
+
+    Attributes
+    ----------
+    number : int
+        Of EPSG, 0 if unknown.
+    name : str
+        In the file.
+    metres : float
+        In one unit of its coordinates, 0 for degrees.
+    """
 
     number: int
     name: str

@@ -82,7 +82,15 @@ BED_OF_STREAM, BED_OF_FLUME = (0.01, 0.2), (0.005, 0.05)
 
 @dataclass(frozen=True)
 class FolderCase:
-    """tree: keys and values of a config; texts: of the files beside it that it names, by their paths."""
+    """A folder of measurements as a case that is not written yet.
+
+    Attributes
+    ----------
+    tree : Tree
+        Keys and values of the config.
+    texts : mapping of str
+        Of the files beside it that it names, by their paths.
+    """
 
     tree: Tree
     texts: Mapping[Path, str]

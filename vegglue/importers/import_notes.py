@@ -94,9 +94,23 @@ FileNote = ImportNote | str
 
 @dataclass(frozen=True)
 class RepeatsAveraged:
-    """Repeats of one place. at: x, y of a single one [m], copied: whether it has the same value; together: neighbours
-    in a row that count as one; needed: repeats for a standard error, 0 if there are enough; apart: by how many times
-    their stated errors they differ at `worst` (x, y) [m], 0 if by no more than chance.
+    """Repeats of one place.
+
+    Attributes
+    ----------
+    repeats : int
+    at : (float, float) or None
+        x, y of a single one [m].
+    copied : bool
+        Whether it has the same value.
+    together : float
+        Neighbours in a row that count as one.
+    needed : int
+        Repeats for a standard error, 0 if there are enough.
+    apart : float
+        By how many times their stated errors they differ at `worst`, 0 if by no more than chance [-].
+    worst : (float, float)
+        x, y [m].
     """
 
     repeats: int
@@ -110,8 +124,14 @@ class RepeatsAveraged:
 
 @dataclass(frozen=True)
 class BanksOfBed:
-    """Cells steeper than half the stated slope are banks; floor: the mean width of the others, None without banks, and
-    the stated one [m].
+    """Cells steeper than half the stated slope are banks.
+
+    Attributes
+    ----------
+    slope : float
+        From which on they are [-].
+    floor, stated : float or None
+        Mean width of the others, None without banks, and the stated one [m].
     """
 
     slope: float
@@ -121,8 +141,19 @@ class BanksOfBed:
 
 @dataclass(frozen=True)
 class PatchesRead:
-    """Patches of a file. stems: columns of their density; lengths, densities: what has no unit; unread: columns;
-    alike: of these what may be the density.
+    """Patches of a file.
+
+    Attributes
+    ----------
+    patches : int
+    stems : tuple of str
+        Columns of their density.
+    lengths, densities : tuple of str
+        What has no unit.
+    unread : tuple of str
+        Columns.
+    alike : tuple of str
+        Of these what may be the density.
     """
 
     patches: int
@@ -143,7 +174,17 @@ class UnitsAssumed:
 
 @dataclass(frozen=True)
 class CentrelineTaken:
-    """A centreline: length [m], turn to the left [degrees], and least radius [m], None if straight."""
+    """A centreline.
+
+    Attributes
+    ----------
+    length : float
+        [m]
+    turn : float
+        To the left [degrees].
+    radius : float or None
+        The least [m], None if straight.
+    """
 
     length: float
     turn: float
@@ -152,7 +193,16 @@ class CentrelineTaken:
 
 @dataclass(frozen=True)
 class FlowTaken:
-    """The flow of a finished run: how many places, how many wet, its discharge [m3/s] and outlet level [m]."""
+    """The flow of a finished run.
+
+    Attributes
+    ----------
+    code, time : str
+    places, wet : int
+        How many, and how many of them are wet.
+    discharge, level : float
+        [m3/s], and at the outlet [m].
+    """
 
     code: str
     time: str
@@ -164,8 +214,18 @@ class FlowTaken:
 
 @dataclass(frozen=True)
 class ConfluenceAssumptions:
-    """What the set of the confluence does not state: errors of velocities [-, m/s] and levels [m], Manning's n of the
-    walls, and the width of the side channel [m].
+    """What the set of the confluence does not state.
+
+    Attributes
+    ----------
+    share, velocity : float
+        Errors of velocities [-, m/s].
+    level : float
+        Error of levels [m].
+    wall : float
+        Manning's n of the walls [s m^(-1/3)].
+    width : float
+        Of the side channel [m].
     """
 
     share: float
@@ -177,8 +237,20 @@ class ConfluenceAssumptions:
 
 @dataclass(frozen=True)
 class SiteAssumptions:
-    """What a site file does not state, and so is assumed, None or False for what it states. file: its name; viscosity:
-    the factor to within which it is known [-]; canopy: its height [m]; alike: patches equally dense; bare: no plants.
+    """What a site file does not state, and so is assumed; None or False for what it states.
+
+    Attributes
+    ----------
+    file : str
+        Its name.
+    viscosity : float or None
+        The factor to within which it is known [-].
+    canopy : float or None
+        Its height [m].
+    alike : bool
+        Whether patches are equally dense.
+    bare : bool
+        Whether there are no plants.
     """
 
     file: str

@@ -62,8 +62,16 @@ KIND_OF_FILE = {kind.file: kind for kind in KINDS.values()} | {"holdout.csv": ki
 
 @dataclass(frozen=True)
 class MeasuredFiles:
-    """observations: entries of a case; imported: for each file that was brought into another form what was taken;
-    tables: what is to be written into the folder of data.
+    """The measurements of a folder.
+
+    Attributes
+    ----------
+    observations : list of Tree
+        Entries of a case.
+    imported : list of Tree
+        What was taken, for each file that was brought into another form.
+    tables : list of StationTable
+        To be written into the folder of data.
     """
 
     observations: list[Tree]

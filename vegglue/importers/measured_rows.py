@@ -52,9 +52,16 @@ COMPONENTS = (("east_velocity", "north_velocity"), ("u", "v"))
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a channel lies on the map. frame: None if the map is that of the model; line: None of a straight channel.
+    """Where a channel lies on the map.
 
     A place on the map (E, N) is one of the frame (X, Y), and that one lies s along the centreline and n to its left.
+
+    Attributes
+    ----------
+    frame : Frame or None
+        None if the map is that of the model.
+    line : Centreline or None
+        None of a straight channel.
     """
 
     frame: Frame | None = None
@@ -93,17 +100,34 @@ class Placement:
 
 @dataclass(frozen=True)
 class MeasuredRows:
-    """Rows of one file."""
+    """Rows of one file.
 
-    numbers: Mapping[str, Array]  # by role (rows,) in SI, NaN for missing
-    texts: Mapping[str, Sequence[str]]  # by role, one a row
-    # columns, units: the heading that each role came from, and its unit
+    Attributes
+    ----------
+    numbers : mapping of ndarray (rows,)
+        By role, in SI, NaN if missing.
+    texts : mapping of sequence of str (rows,)
+        By role.
+    columns, units : mapping of str
+        Heading and unit of each role in the file.
+    notes : tuple of FileNote
+        What was done, in short clauses.
+    others : mapping of sequence of str (rows,)
+        Texts of the columns without a role, by heading.
+    lines : sequence of int (rows,)
+        The row of the file that each row stands in, empty if it has none.
+    of_probe : bool
+        Whether u and v are along the axes of a probe, which is set up in the channel.
+    """
+
+    numbers: Mapping[str, Array]
+    texts: Mapping[str, Sequence[str]]
     columns: Mapping[str, str]
     units: Mapping[str, str]
-    notes: tuple[FileNote, ...]  # what was done, in short clauses
-    others: Mapping[str, Sequence[str]] = field(default_factory=dict)  # texts of the columns without a role, by heading
-    lines: Sequence[int] = ()  # the row of the file that each row stands in, none if it has none
-    of_probe: bool = False  # whether u and v are along the axes of a probe, which is set up in the channel
+    notes: tuple[FileNote, ...]
+    others: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    lines: Sequence[int] = ()
+    of_probe: bool = False
 
     @property
     def size(self) -> int:

@@ -29,27 +29,45 @@ FILLS_OF_CODES = (-999.0, -999.999, -9999.0, -99999.0)  # that codes write witho
 
 @dataclass(frozen=True, eq=False)
 class ModelResult:
-    """The final state of a model run, at the places where its velocities lie."""
+    """The final state of a model run, at the places where its velocities lie.
 
-    code: str  # the program, such as HEC-RAS
-    # x, y: places on the map of the file (n,) [m]
+    Attributes
+    ----------
+    code : str
+        The program, such as HEC-RAS.
+    x, y : ndarray (n,)
+        Places on the map of the file [m].
+    bed, depth, level : ndarray (n,)
+        [m]; depth is 0 and level NaN where it is dry.
+    u, v : ndarray (n,)
+        Depth-averaged velocity to the east and to the north of that map [m/s], 0 where it is dry.
+    corners : ndarray (k, 2)
+        Nodes of the mesh [m]: how far it reaches.
+    roughness : ndarray (n,) or None
+        In the unit of its kind [s m^(-1/3), m^(1/3)/s, m^(1/2)/s, m]; None if the file has none.
+    roughness_kind : RoughnessKind
+    crs : str
+        Coordinate system as the file states it, '' if it does not.
+    time : str
+        Of the final state, as the file states it.
+    notes : tuple of FileNote
+        What was converted or left out.
+    """
+
+    code: str
     x: Array
     y: Array
-    # bed, depth, level: (n,) [m]; depth is 0 and level NaN where it is dry
     bed: Array
     depth: Array
     level: Array
-    # u, v: depth-averaged velocity to the east and to the north of that map (n,) [m/s], 0 where it is dry
     u: Array
     v: Array
-    corners: Array  # nodes of the mesh (k, 2) [m]: how far it reaches
-    # roughness, roughness_kind: (n,) in the unit of its kind [s m^(-1/3), m^(1/3)/s, m^(1/2)/s, m]; None if the file
-    # has none
+    corners: Array
     roughness: Array | None = None
     roughness_kind: RoughnessKind = "not-stated"
-    crs: str = ""  # coordinate system as the file states it, '' if it does not
-    time: str = ""  # of the final state, as the file states it
-    notes: tuple[FileNote, ...] = field(default=())  # what was converted or left out
+    crs: str = ""
+    time: str = ""
+    notes: tuple[FileNote, ...] = field(default=())
 
     @property
     def wet(self) -> Mask:

@@ -59,7 +59,18 @@ read_once = lru_cache(maxsize=8)(lambda path, changed: read_result(path))
 
 @dataclass(frozen=True, eq=False)
 class PlacedResult:
-    """A result in the channel: its flow there, Manning's n (n,) or None, and corners of the mesh (k, 2)."""
+    """A finished result in the channel.
+
+    Attributes
+    ----------
+    result : ModelResult
+    flow : TheirFlow
+        In the channel.
+    corners : ndarray (k, 2)
+        Of the mesh, in the channel [m].
+    manning : ndarray (n,) or None
+        Manning's n [s m^(-1/3)].
+    """
 
     result: ModelResult
     flow: TheirFlow
@@ -69,7 +80,21 @@ class PlacedResult:
 
 @dataclass(frozen=True, eq=False)
 class SiteOfResult:
-    """The site file with what a result adds to it, the results by experiment, the bed of the first, and the grid."""
+    """The site file with what a finished result adds to it.
+
+    Attributes
+    ----------
+    site : FieldSite
+    place : Placement
+    paths : mapping of Path
+        Of the results, by experiment.
+    placed : mapping of PlacedResult
+        By experiment.
+    stated : ResultEntry
+    terrain : Terrain
+        The bed of the first.
+    grid : Tree
+    """
 
     site: FieldSite
     place: Placement
@@ -82,7 +107,16 @@ class SiteOfResult:
 
 @dataclass(frozen=True, eq=False)
 class GroundOfResult:
-    """ground: of the first result; parameters: priors of its friction; key: `finished_result` of the case."""
+    """The ground of the first finished result.
+
+    Attributes
+    ----------
+    ground : Ground
+    parameters : Tree
+        Priors of its friction.
+    key : Tree
+        `finished_result` of the case.
+    """
 
     ground: Ground
     parameters: Tree

@@ -64,8 +64,15 @@ APART = 1.5
 
 @dataclass(frozen=True)
 class KnownExperiments:
-    """names: those that the rows of a file may have; site: the site file; key: where in it they stand; others: those
-    under its other key.
+    """The experiments that the rows of a file may name.
+
+    Attributes
+    ----------
+    names : tuple of str
+    site, key : str
+        The site file, and where in it they stand.
+    others : tuple of str
+        Those under its other key.
     """
 
     names: tuple[str, ...]
@@ -90,7 +97,20 @@ class KnownExperiments:
 
 @dataclass(frozen=True)
 class StationTable:
-    """One table to be written: name of its file, columns, rows; the observations that name it; what was taken."""
+    """One table to be written.
+
+    Attributes
+    ----------
+    file : str
+        Its name.
+    heading : tuple of str
+        Columns.
+    rows : list of list of str
+    observations : tuple of Tree
+        That name it.
+    taken : str
+        What was taken.
+    """
 
     file: str
     heading: tuple[str, ...]
@@ -101,7 +121,14 @@ class StationTable:
 
 @dataclass(frozen=True)
 class StationTables:
-    """The tables of one file; left_out: what they lack, and how many of its rows are in none of them and why."""
+    """The tables of one file.
+
+    Attributes
+    ----------
+    tables : list of StationTable
+    left_out : tuple of FileNote
+        What they lack, and how many of its rows are in none of them and why.
+    """
 
     tables: list[StationTable]
     left_out: tuple[FileNote, ...]

@@ -123,9 +123,22 @@ def numbers_of(texts: Sequence[str]) -> Array | None:
 
 @dataclass(frozen=True)
 class ParsedTable:
-    """Headings (columns,), units (columns,) with '' if none is stated, rows of texts (rows, columns) and the number of
-    each in the file (rows,). decimal_comma: whether numbers have one; form: notes on how the table was read; beside:
-    number and text of each line above the heading, and of each comment.
+    """A table as it stands in a file.
+
+    Attributes
+    ----------
+    headings : tuple of str (columns,)
+    units : tuple of str (columns,)
+        '' if none is stated.
+    rows : tuple of sequence of str (rows, columns)
+    row_numbers : tuple of int (rows,)
+        Of each in the file.
+    decimal_comma : bool
+        Whether numbers have one.
+    form : tuple of FileNote
+        How the table was read.
+    beside : tuple of (int, str)
+        Number and text of each line above the heading, and of each comment.
     """
 
     headings: tuple[str, ...]

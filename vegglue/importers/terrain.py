@@ -86,8 +86,18 @@ BANK_CLASS = {"law": "keulegan", "k_s": "k_s"}
 
 @dataclass(frozen=True)
 class Ground:
-    """tree: keys grid, bed and friction of a case; imported: what was taken from which file; texts: of files to be
-    written beside the config, by their paths; level: of the bed, from x and y (n,) to z (n,) in the channel [m].
+    """The ground of a site as parts of a case.
+
+    Attributes
+    ----------
+    tree : Tree
+        Keys grid, bed and friction of a case.
+    imported : list of Tree
+        What was taken from which file.
+    texts : mapping of str
+        Of files to be written beside the config, by their paths.
+    level : callable
+        Of the bed, from x and y (n,) to z (n,) in the channel [m].
     """
 
     tree: Tree
@@ -107,9 +117,18 @@ class FittedSurvey:
 
 @dataclass(frozen=True)
 class Terrain:
-    """Levels of a survey in the channel. level: from x and y (n,) to z (n,) [m], NaN beyond the survey; extent: least
-    and largest x, then y, of the survey [m]; taken: what was taken from which columns; survey: what states how
-    wrong the levels are between its points, None of a raster and of few or very many points.
+    """Levels of a survey in the channel.
+
+    Attributes
+    ----------
+    level : callable
+        From x and y (n,) to z (n,) [m], NaN beyond the survey.
+    extent : (float, float, float, float)
+        Least and largest x, then y, of the survey [m].
+    taken : str
+        What was taken from which columns.
+    survey : FittedSurvey or None
+        What states how wrong the levels are between its points, None of a raster and of few or very many points.
     """
 
     level: Callable[[Array, Array], Array]

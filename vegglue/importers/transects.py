@@ -24,8 +24,18 @@ FASTEST, DEEPEST_RIVER, LEAP, TIMES_USUAL = 7.0, 200.0, 10.0, 20.0
 
 @dataclass(frozen=True)
 class BoatProfile:
-    """One profile: east and north of the start of the transect [m], NaN for unknown, depth [m], heights of the cells
-    above the bed (cells,) [m] and their velocities to the east and north (cells, 2) [m/s].
+    """One profile of a boat.
+
+    Attributes
+    ----------
+    place : (float, float)
+        East and north of the start of the transect [m], NaN if unknown.
+    depth : float
+        [m]
+    height : ndarray (cells,)
+        Of the cells above the bed [m].
+    velocity : ndarray (cells, 2)
+        To the east and north [m/s].
     """
 
     place: tuple[float, float]

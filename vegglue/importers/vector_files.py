@@ -68,9 +68,25 @@ Properties = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class NamedPolygon:
-    """Corners in the channel [m]; density [1/m2] and class if the file has them; density_from: its heading;
-    unread: headings of its other properties, like_density: those that may be a density; unitless: which of x and y have
-    no stated unit, and are taken as m.
+    """A polygon of a file, in the channel.
+
+    Attributes
+    ----------
+    name : str
+    corners : Ring
+        [m]
+    density : float or None
+        [1/m2], if the file has it.
+    friction_class : str or None
+        If the file has it.
+    density_from : str or None
+        Heading of the density.
+    unread : tuple of str
+        Headings of its other properties.
+    like_density : tuple of str
+        Of these, those that may be a density.
+    unitless : tuple of str
+        Which of x and y have no stated unit, and are taken as m.
     """
 
     name: str
@@ -414,7 +430,19 @@ def _refuse_degrees(path: Path, frame: Frame | None, lines: Sequence[Sequence[tu
 
 @dataclass(frozen=True)
 class DrawnCentreline:
-    """shape: as a case keeps it, in the frame; line: what it makes; columns, units: of a table; taken: a summary."""
+    """A centreline of a site file.
+
+    Attributes
+    ----------
+    shape : Tree
+        As a case keeps it, in the frame.
+    line : Centreline
+        What it makes.
+    columns, units : Tree
+        Of a table.
+    taken : str
+        A summary.
+    """
 
     shape: Tree
     line: Centreline
