@@ -88,6 +88,12 @@ def test_two_of_three_are_enough_and_the_third_is_told() -> None:
     assert made.refused == {"c": HeldOutErrorsRose("sections", 2.0, 3.0)}
 
 
+def test_what_has_no_flow_beside_others_keeps_its_own_reason() -> None:
+    """Drag in the wake of a turbine was told to have no flow, which it had by itself."""
+    models: dict[Names, Errors | None] = {PARENT: (4, 4), A: (5, 5), B: (6, 6), A + B: None}
+    assert choice(models).refused["b"] == HeldOutErrorsRose("sections", 4.0, 6.0)
+
+
 @pytest.mark.parametrize("errors", [(5.0, 1.0), (1.0, 5.0), (4.0, 4.0), None])
 def test_no_model_is_left_worse_than_its_parent(errors: Errors | None) -> None:
     made = choice({PARENT: (4, 4), A: errors}, A)

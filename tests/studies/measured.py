@@ -412,9 +412,18 @@ SETS = (
         "C tidal reach by ADCP",
         f"rustychris/hor_flow_and_salmon @ 30f00859: {TRACKS}, {DEM}",
         tidal_reach,
-        "more horizontal shear than in their model, n = 0.023; one track without RTK (notes of the authors)",
+        "more horizontal shear than in their model, n = 0.023; one track without RTK (notes of the authors); below x = "
+        "351 m the river divides, 115 and 130 m3/s of the boat in its branches (tracks 3 and 4)",
         ("inflow_distribution", "inflow_peak", "inflow_skew", "inflow_core", "station_shift"),
-        ("viscosity", "elder", "mixing_length", "smagorinsky", "coherent_structures", "growing_shear_layer"),
+        (
+            "viscosity",
+            "elder",
+            "mixing_length",
+            "smagorinsky",
+            "coherent_structures",
+            "growing_shear_layer",
+            "inflow at a place",  # of the water that leaves; counted since it was seen
+        ),
     ),
     MeasuredSet(
         "D1 jam over a flume, not stated",

@@ -184,7 +184,7 @@ def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = Fals
         if why is None:
             refused = {other: reason for other, reason in refused.items() if other not in group}
             stages, group = (*stages, both), ()
-        else:
+        elif not isinstance(why, NoFlowWithIt):  # beside others: by itself it may have one
             refused[name] = why
     kept, refused = _needed_of({one.name: one for one in named}, stages[-1], refused, score_with)
     kept, refused = _known_of(named, kept, refused, score_with)
