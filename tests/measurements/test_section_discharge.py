@@ -28,6 +28,7 @@ from vegglue.measurements.section_discharge import (
     combine,
     conveyance_weights,
     discharge_mismatches,
+    fall_of_floor,
     grid_weights,
     mismatched_discharges,
     neighbour_error,
@@ -138,12 +139,31 @@ def test_measured_levels_hold_before_expected_ones(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("gauges", "level"), [("28,0,0.96\n", 0.98), ("2,0,0.98\n", 0.974), ("20,0,0.98\n28,0,0.97\n", 0.992)]
+    ("gauges", "level"),
+    [("28,0,0.96\n", 0.98), ("2,0,0.98\n", 0.95 + 0.03 * 22 / 28), ("20,0,0.98\n28,0,0.97\n", 0.992)],
 )
-def test_beyond_the_gauges_the_surface_falls_as_the_floor_does(tmp_path: Path, gauges: str, level: float) -> None:
-    """It was flat: of a single gauge down a steep reach most points lay above the water."""
-    points = read_observations(section_at_8(tmp_path, levels=True, gauges=gauges)).points
-    assert np.allclose(points["depth"], level - FLOOR_THERE)
+def test_above_the_gauges_the_surface_falls_as_the_floor_does_and_below_to_the_outlet(
+    tmp_path: Path, gauges: str, level: float
+) -> None:
+    """It was flat: of a single gauge down a steep reach most points lay above the water. Points and the discharge that
+    they carry had two rules.
+    """
+    case = section_at_8(tmp_path, levels=True, gauges=gauges)
+    found = read_observations(case)
+    assert np.allclose(found.points["depth"], level - FLOOR_THERE)
+    table = found.table
+    (of_gauges,), of_file = carried(case, table), table["kind"] != "level"
+    stated = case.observations[0].model_copy(update={"surface": level})
+    told = case.model_copy(update={"observations": (stated, *case.observations[1:])})
+    assert of_gauges.value == pytest.approx(carried(told, table[of_file])[0].value, rel=2e-3)
+
+
+def test_a_pool_at_the_gauge_is_no_slope() -> None:
+    """The discharge of a section upstream of it was summed under a level as much higher as the pool is deep."""
+    x = np.arange(0.5, 30.0)
+    floor = 0.03 - 0.001 * x
+    assert fall_of_floor(x, np.where(np.abs(x - 15.0) < 3.0, floor - 0.5, floor)) == pytest.approx(0.001, rel=0.1)
+    assert fall_of_floor(x, -floor) == 0.0
 
 
 def test_a_level_that_is_given_holds_before_all(tmp_path: Path) -> None:

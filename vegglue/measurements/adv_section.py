@@ -19,6 +19,8 @@ from vegglue.measurements.section_discharge import (
     GRID_STEP,
     CrossSection,
     Discharge,
+    fall_of_floor,
+    level_by_gauges,
     neighbour_error,
     section_discharges,
 )
@@ -315,24 +317,19 @@ def _placed(case: Case, observation: Observation, points: pd.DataFrame, gauges: 
 def _surface(case: Case, observation: Observation, x: float, gauges: pd.DataFrame) -> float:
     """Water level at x in z of the file [m]: as given, else of the gauges of the experiment, else as expected.
 
-    Between gauges z is linear; beyond them it falls as the floor does, z = z_gauge - S (x - x_gauge), S the slope of
-    the line through the lowest beds of the sections of the grid, at least 0: pools are no slope. As expected: parallel
-    to the floor, z = z_out + max(z_floor(x) - z_floor(L), 0), as in channel_geometry.expected_depth.
+    By gauges: see `level_by_gauges`. As expected: parallel to the floor, z = z_out + max(z_floor(x) - z_floor(L), 0),
+    as in channel_geometry.expected_depth.
     """
     if observation.surface is not None:
         return observation.surface
     experiment, across = str(observation.experiment), _across(case)
     own = gauges[(gauges["experiment"] == experiment) & (gauges["kind"] == WATER_LEVEL)]
     if len(own):
-        along = own.groupby("x")["value"].mean()
-        at = along.index.to_numpy(float)
-        within = float(np.clip(x, at.min(), at.max()))
-        level = float(np.interp(within, at, along.to_numpy(float)))
-        if x != within:
+        level, upstream = level_by_gauges(case, case.experiments[experiment], own, x)
+        if upstream > 0.0:
             places = np.linspace(*case.grid.x, SECTIONS_OF_FLOOR + 2)[1:-1]
             grid = Grid(places, across, float(places[1] - places[0]), GRID_STEP, centreline_in(case))
-            slope = max(-float(np.polyfit(places, bed_levels(case, grid, experiment).min(axis=1), 1)[0]), 0.0)
-            level -= slope * (x - within)
+            level += upstream * fall_of_floor(places, bed_levels(case, grid, experiment).min(axis=1))
     else:
         ends = (x, case.grid.x[1] - 0.5 * case.grid.cell[0])
         here, outlet = (_local_bed(case, experiment, end, across).min() for end in ends)

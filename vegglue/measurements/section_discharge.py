@@ -19,7 +19,7 @@ from vegglue.case.channel_geometry import discharges_upstream_of, expected_depth
 from vegglue.case.grid import Grid
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds, middle_value, prior_range
-from vegglue.case.schema import Case
+from vegglue.case.schema import Case, Experiment
 from vegglue.measurements.kinds import STREAMWISE, WATER_LEVEL
 from vegglue.measurements.plausibility import implausible_levels, implausible_values, plausible_flow
 from vegglue.measurements.vertical_profile import Column, linear_weights
@@ -400,13 +400,49 @@ def changing_discharge(case: Case, experiment: str, x: float) -> str:
     return ""
 
 
+def level_by_gauges(case: Case, setting: Experiment, gauges: pd.DataFrame, x: float) -> tuple[float, float]:
+    """Water level at x, linear between the gauges of an experiment and the outlet; level at the first gauge upstream of
+    it, where z = z_gauge + S (x_gauge - x), S `fall_of_floor`.
+
+    Parameters
+    ----------
+    case : Case
+    setting : Experiment
+    gauges : DataFrame
+        Its stations of measured levels, one at least.
+    x : float
+        [m]
+
+    Returns
+    -------
+    float, float
+        The level [m], and how far upstream of all gauges x lies [m].
+    """
+    measured, end = gauges.groupby("x")["value"].mean(), case.grid.x[1]
+    at, z = measured.index.to_numpy(float), measured.to_numpy(float)
+    if at[-1] < end:
+        at, z = np.append(at, end), np.append(z, middle_value(case, setting.level))
+    return float(np.interp(x, at, z)), max(float(at[0]) - x, 0.0)
+
+
+def fall_of_floor(x: Array, floor: Array) -> float:
+    """S = -dz/dx of the line through the lowest beds of sections, at least 0 [-]: a pool is no slope.
+
+    Parameters
+    ----------
+    x, floor : ndarray (sections,)
+        [m]
+    """
+    return max(-float(np.polyfit(x, floor, 1)[0]), 0.0)
+
+
 def _carried_discharge(
     case: Case, site: Site, experiment: str, section: str, rows: pd.DataFrame, gauges: pd.DataFrame
 ) -> CarriedDischarge | None:
     """None if fewer than FEWEST_VERTICALS stand in the water, or nothing passes them.
 
-    The level is that stated beside the verticals, else between gauges and outlet, else parallel to the floor, and as
-    low as smooth walls or as high as the thickest growth make it.
+    The level is that stated beside the verticals, else by the gauges, else parallel to the floor, and as low as smooth
+    walls or as high as the thickest growth make it.
     """
     x, setting = float(rows["x"].median()), case.experiments[experiment]
     column = int(np.abs(site.grid.x - x).argmin())
@@ -421,13 +457,9 @@ def _carried_discharge(
         flow = plausible_flow(case, site, setting)
         around = min(float(flow.smoothest[column]), level), max(float(flow.thickest[column]), level)
     else:
-        # Linear between gauges and outlet; upstream of the first gauge it rises as the floor does, give or take that.
-        measured, along, floor = gauges.groupby("x")["value"].mean(), site.grid.x, site.bed.min(axis=1)
-        at, z = np.array([*measured.index, along[-1]]), [*measured, middle_value(case, setting.level)]
-        rise = 0.0
-        if along[column] < at[0]:
-            rise = max(float(floor[column] - floor[int(np.abs(along - float(at[0])).argmin())]), 0.0)
-        level = float(np.interp(along[column], at, z)) + rise
+        level, upstream = level_by_gauges(case, setting, gauges, float(site.grid.x[column]))
+        rise = upstream * fall_of_floor(site.grid.x, site.bed.min(axis=1))  # give or take that
+        level += rise
         error = rise + NORMAL95 * float(gauges["standard_error"].fillna(0.0).max())
         around = level - error, level + error
     grid, bed = site.grid, site.bed[column]
