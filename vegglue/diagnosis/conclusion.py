@@ -396,7 +396,7 @@ def single_readings(noise: Noise, found: SearchState) -> list[int]:
 
 
 def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnSection | None:
-    """The first section without which another listed effect leads the accepted one, to first order.
+    """The section without which another listed effect leads the accepted one most clearly, to first order.
 
         (E_best - E_own) / w(E_own) > ln odds
 
@@ -452,12 +452,13 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
         return None
     few = sections.size <= constants().few_sections
     least = np.log(constants().same_kind_odds if few else constants().strong_odds)
+    clearest = None
     for section in sections:
         name, ahead, left = leading(section_of != section)
         if name not in together and ahead > least and left > 0.5 * whole:
-            section_name = str(used["section"].to_numpy()[section_of == section][0])
-            return NameHangsOnSection(step.accepted, section_name, name)
-    return None
+            told = str(used["section"].to_numpy()[section_of == section][0])
+            least, clearest = ahead, NameHangsOnSection(step.accepted, told, name)
+    return clearest
 
 
 def strained_without_a_section(base: Baseline, parameter: str) -> tuple[str, float] | None:
