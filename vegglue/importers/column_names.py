@@ -109,8 +109,25 @@ def si_factor(word: str, quantity: str, where: str) -> float:
 
 
 def scale_of_column(word: str, quantity: str, where: str) -> float:
-    """SI value of 1 in a column [SI unit]: of a unit, or of a scale such as `0.7 m`, a diameter that lengths are given
-    in. InputError, which begins with `where`, for an unknown word.
+    """SI value of 1 in a column.
+
+    Parameters
+    ----------
+    word : str
+        A unit, or a scale such as `0.7 m`, a diameter that lengths are given in.
+    quantity : str
+    where : str
+        How the message begins.
+
+    Returns
+    -------
+    float
+        [SI unit]
+
+    Raises
+    ------
+    InputError
+        For an unknown word.
     """
     scale = re.fullmatch(r"\s*([\d.]+(?:e[-+]?\d+)?)\s*(\S.*)", word.lower())
     if scale is None:
@@ -122,7 +139,25 @@ def scale_of_column(word: str, quantity: str, where: str) -> float:
 
 
 def in_si(value: object, quantity: str, where: str) -> float:
-    """A number in SI, or a text such as `42 l/s` as one. InputError, which begins with `where`."""
+    """A number in SI, or a text such as `42 l/s` as one.
+
+    Parameters
+    ----------
+    value : object
+    quantity : str
+    where : str
+        How the message begins.
+
+    Returns
+    -------
+    float
+        [SI unit]
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
     if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
         return float(value)
     stated = re.fullmatch(r"\s*([-+]?[\d.]+(?:e[-+]?\d+)?)\s*(\S.*?)\s*", value) if isinstance(value, str) else None

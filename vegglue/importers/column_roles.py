@@ -85,9 +85,25 @@ LARGEST_OF = {
 
 
 def columns_of_table(path: Path, table: ParsedTable, options: FileOptions) -> dict[str, int]:
-    """The place of the column of each role: of two the first, unless its name is vaguer than that of the other.
+    """The column of each role: of two the first, unless its name is vaguer than that of the other.
 
-    InputError for a column that the site file names and that is not there, and for two of one name.
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    table : ParsedTable
+    options : FileOptions
+        With the columns that the site file names.
+
+    Returns
+    -------
+    dict of int
+        Place of the column, by role.
+
+    Raises
+    ------
+    InputError
+        For a column that the site file names and that is not there, for two of one name, and for one of two roles.
     """
     headings, named = table.headings, options.columns
     found: dict[str, int] = {}
@@ -194,9 +210,27 @@ def without_flagged(path: Path, table: ParsedTable, columns: Mapping[str, int]) 
 
 
 def unit_of_column(path: Path, table: ParsedTable, columns: Mapping[str, int], role: str, options: FileOptions) -> str:
-    """By the site file, the row of units, the heading; else, of an error or a scatter, that of its values; else SI.
+    """The unit of a column: by the site file, the row of units, or the heading.
 
-    columns: place of the column of each role. InputError for an unknown unit.
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    table : ParsedTable
+    columns : mapping of int
+        Place of the column of each role.
+    role : str
+    options : FileOptions
+
+    Returns
+    -------
+    str
+        If none is stated, of an error or a scatter that of its values, else that of the SI.
+
+    Raises
+    ------
+    InputError
+        For an unknown unit, and for places in degrees.
     """
     quantity, place = ROLES[role].quantity, columns[role]
     if role in options.units:
@@ -236,10 +270,31 @@ def _stated_unit(table: ParsedTable, place: int, quantity: str) -> str:
 def numbers_of_column(
     path: Path, table: ParsedTable, place: int, role: str, unit: str, missing: tuple[float, ...]
 ) -> tuple[Array, list[FileNote]]:
-    """A column of a role in SI, NaN for no value, and what was left out or kept that may be a mark.
+    """A column of a role in SI, and what was left out or kept that may be a mark.
 
     Sevens and eights mark no value if no reading is so large; nines if they are negative, as 99 m may be a level.
-    missing: numbers that are marks beside those of any column.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    table : ParsedTable
+    place : int
+        Of the column.
+    role, unit : str
+    missing : tuple of float
+        Marks beside those of any column [unit].
+
+    Returns
+    -------
+    ndarray (rows,)
+        [SI], NaN for no value.
+    list of FileNote
+
+    Raises
+    ------
+    InputError
+        For an error or a scatter below 0.
     """
     quantity, heading = ROLES[role].quantity, table.headings[place]
     factor = scale_of_column(unit, quantity, shown_path(path))

@@ -257,7 +257,21 @@ def case_from_sheet(folder: Path, target: Path, config: Path) -> FolderCase:
 
     Options of a table are those of its name: it may have been saved in another format, or be of what was not measured.
 
-    Errors: InputError if the config is not there, or nothing was filled in.
+    Parameters
+    ----------
+    folder : Path
+        Of the sheet.
+    target, config : Path
+        Of the child, and of the case.
+
+    Returns
+    -------
+    FolderCase
+
+    Raises
+    ------
+    InputError
+        If the config is not there, or nothing was filled in.
     """
     path = site_file(folder)
     if not config.is_file():

@@ -106,7 +106,24 @@ class FileOptions:
 
 
 def read_file_options(given: Any, where: str) -> FileOptions:
-    """The options in one entry of `files`. InputError, which begins with `where`, for what makes no sense."""
+    """The options in one entry of `files`.
+
+    Parameters
+    ----------
+    given : mapping
+        As the site file states them.
+    where : str
+        How the message begins.
+
+    Returns
+    -------
+    FileOptions
+
+    Raises
+    ------
+    InputError
+        For an unknown key, and for what makes no sense.
+    """
     if not isinstance(given, Mapping):
         raise InputError("no_options", where=where, got=repr(given))
     known = list(FileOptions.__dataclass_fields__)

@@ -68,7 +68,22 @@ BY_BEGINNING: Mapping[bytes, FileReader] = {
 
 
 def reader_of(path: Path) -> FileReader:
-    """The reader of a file, by how it begins. InputError for a record that none reads."""
+    """The reader of a file, by how it begins.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    callable
+        Path, FileOptions -> MeasuredRows.
+
+    Raises
+    ------
+    InputError
+        For a record that none reads.
+    """
     if path.suffix.lower() in WORKBOOKS:
         return read_samples
     try:

@@ -84,8 +84,25 @@ def measured_files(
 ) -> MeasuredFiles:
     """All measurements of a folder.
 
-    used: files that the site file names elsewhere, such as that of the bed; bed: its level, for measured depths.
-    InputError if there are none, or one cannot be read.
+    Parameters
+    ----------
+    folder, target : Path
+        The folder, and the config to be written.
+    site : FieldSite
+    place : Placement
+    used : sequence of str
+        Files that the site file names elsewhere, such as that of the bed.
+    bed : callable
+        Its level, for measured depths: x, y (n,) -> z (n,) in the channel [m].
+
+    Returns
+    -------
+    MeasuredFiles
+
+    Raises
+    ------
+    InputError
+        If there are none, or one cannot be read.
     """
     options = _stated_options(folder, site)
     known = KnownExperiments(tuple(site.experiments), site_file(folder).name, EXPERIMENTS, tuple(site.holdout))
@@ -98,9 +115,26 @@ def measured_files(
 def held_out_measurements(
     folder: Path, target: Path, site: FieldSite, place: Placement, bed: BedLevel
 ) -> MeasuredFiles:
-    """What is held out, read as all measurements are; nothing if no experiment is held out.
+    """What a folder holds out, read as all measurements are.
 
-    InputError if the file cannot be read, or nothing in it is a measurement.
+    Parameters
+    ----------
+    folder, target : Path
+        The folder, and the config to be written.
+    site : FieldSite
+    place : Placement
+    bed : callable
+        As of `measured_files`.
+
+    Returns
+    -------
+    MeasuredFiles
+        Empty if no experiment is held out.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or nothing in it is a measurement.
     """
     paths = held_out_files(folder)[:1] if site.holdout else []
     known = KnownExperiments(tuple(site.holdout), site_file(folder).name, HELD_OUT, tuple(site.experiments))

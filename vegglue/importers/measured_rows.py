@@ -193,7 +193,24 @@ class MeasuredRows:
 
 
 def read_rows(path: Path, options: FileOptions) -> MeasuredRows:
-    """What a file of columns holds, in SI. InputError, which names file, row and column, and for options of others."""
+    """What a file of columns holds, in SI.
+
+    Parameters
+    ----------
+    path : Path
+    options : FileOptions
+        What the site file states about it.
+
+    Returns
+    -------
+    MeasuredRows
+        Without rows that a column of flags marks, or that were pasted twice.
+
+    Raises
+    ------
+    InputError
+        Which names file, row and column; also for options of other files.
+    """
     idle = next((key for key in OF_RECORDS if getattr(options, key) not in (None, 0.0)), None)
     if idle is not None:
         records, dat = OF_RECORDS[idle], path.suffix.lower() == ".dat"
@@ -210,7 +227,25 @@ def read_rows(path: Path, options: FileOptions) -> MeasuredRows:
 
 
 def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> MeasuredRows:
-    """What a table holds, in SI: columns by `options`, else by their usual names; units likewise."""
+    """What a table holds, in SI.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    table : ParsedTable
+    options : FileOptions
+        Columns and units, else their usual names, and the units that the table states.
+
+    Returns
+    -------
+    MeasuredRows
+
+    Raises
+    ------
+    InputError
+        If no column has a known name, or a unit is stated elsewhere for what would be taken for SI.
+    """
     columns = columns_of_table(path, table, options)
     numbers: dict[str, Array] = {}
     units: dict[str, str] = {}
@@ -286,10 +321,29 @@ def read_placed_rows(path: Path, options: FileOptions) -> MeasuredRows:
 
 
 def on_the_tape(path: Path, taken: MeasuredRows, options: FileOptions) -> MeasuredRows:
-    """Places (x, y) = a + t (b - a) / |b - a| at the reading t of a tape from a to b.
+    """(x, y) = a + t (b - a) / |b - a|: places at the reading t of a tape from a to b.
 
     The velocity measured is that square to the tape; it is taken as the one along the channel, which a tape that is off
-    square by 10 degrees makes 1.5 % too small. InputError without the ends of the tape.
+    square by 10 degrees makes 1.5 % too small.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    taken : MeasuredRows
+        With t, `tape` [m].
+    options : FileOptions
+        With a and b, `line` [m].
+
+    Returns
+    -------
+    MeasuredRows
+        With x and y in place of t.
+
+    Raises
+    ------
+    InputError
+        Without the ends of the tape.
     """
     if options.line is None:
         raise InputError(
@@ -372,7 +426,19 @@ def vertical_role(taken: MeasuredRows) -> str | None:
 
 
 def in_the_channel(taken: MeasuredRows, place: Placement, options: FileOptions) -> MeasuredRows:
-    """The rows along and across the channel: turned, flipped and shifted; a speed with its direction as components."""
+    """The rows along and across the channel: turned, flipped and shifted; a speed with its direction as components.
+
+    Parameters
+    ----------
+    taken : MeasuredRows
+    place : Placement
+    options : FileOptions
+
+    Returns
+    -------
+    MeasuredRows
+        A speed beside a component is none: it is the same reading.
+    """
     if options.factor is not None:
         roles = [role for role in taken.numbers if ROLES[role].quantity == "velocity"]
         scaled = {role: options.factor * taken.numbers[role] for role in roles}

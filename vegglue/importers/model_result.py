@@ -95,10 +95,26 @@ class ModelResult:
 def model_result(
     code: str, x: Array, y: Array, bed: Array, level: Array, depth: Array, u: Array, v: Array, **more: Any
 ) -> ModelResult:
-    """The result with dry places as `ModelResult` describes them.
+    """A finished result with dry places as `ModelResult` describes them.
 
     Places without a bed, and those under water without a level, depth or velocity, are left out; without level and
     depth it is dry. The last two are counted in the notes.
+
+    Parameters
+    ----------
+    code : str
+    x, y : ndarray (n,)
+        [m]
+    bed, level, depth : ndarray (n,)
+        [m], NaN if unknown.
+    u, v : ndarray (n,)
+        [m/s], NaN if unknown.
+    **more
+        Further fields of ModelResult.
+
+    Returns
+    -------
+    ModelResult
     """
     placed = np.isfinite(x) & np.isfinite(y) & np.isfinite(bed)
     unknown, stated_dry = ~np.isfinite(level) & ~np.isfinite(depth), np.nan_to_num(depth, nan=np.inf) <= DRY_DEPTH

@@ -45,11 +45,20 @@ Gathered = Mapping[RepeatKey, Sequence[RepeatedValue]]
 
 
 def means_of_repeats(gathered: Gathered) -> list[RepeatedValue]:
-    """Mean of each place and its standard error: from those stated, else s sqrt(tau / n), s at most; 0 for unknown.
+    """mean u and s (tau / n)^(1/2): the mean of each place and its standard error.
 
-    tau: how many values in a row count as one, see `autocorrelation_time`; s: root of sum (u - mean u)^2 / sum (n - 1),
-    of the values without stated errors of the narrowest of place, section and experiment that has ENOUGH degrees of
-    freedom, else of all. One kind and one file.
+    s^2 is sum (u - mean u)^2 / sum (n - 1) of the values without stated errors of the narrowest of place, section and
+    experiment that has ENOUGH degrees of freedom, else of all; tau, see `autocorrelation_time`.
+
+    Parameters
+    ----------
+    gathered : mapping of sequence of (float, float)
+        Values and their errors [m/s], NaN if not stated, by place, in the order of time; of one kind and one file.
+
+    Returns
+    -------
+    list of (float, float)
+        Mean and its error [m/s]: from those stated if all are, else s at most; 0 if unknown.
     """
     unstated = {place: values for place, values in gathered.items() if not _stated(values)}
     tau = autocorrelation_time([one for one, _ in values] for values in unstated.values())
@@ -84,11 +93,23 @@ def _stated(values: Sequence[RepeatedValue]) -> bool:
 
 
 def autocorrelation_time(series: Iterable[Sequence[float]]) -> float:
-    """tau = 1 + 2 sum_k rho_k, up to the first rho_k that is not above 0 (k in values): the mean of n has the variance
-    s^2 tau / n, where s^2 is that of a value (e.g. Sokal 1997, Monte Carlo Methods in Statistical
-    Mechanics; not checked against it). 1 if neighbours are as alike as chance makes them.
+    """tau = 1 + 2 sum_k rho_k, up to the first rho_k that is not above 0
 
-    series: each of one place, in the order of time; their autocovariances are added up, each about its own mean.
+    The mean of n values has the variance s^2 tau / n, where s^2 is that of a value.
+
+    Parameters
+    ----------
+    series : iterable of sequence of float
+        Each of one place, in the order of time; their autocovariances are added up, each about its own mean.
+
+    Returns
+    -------
+    float
+        [values]; 1 if neighbours are as alike as chance makes them.
+
+    References
+    ----------
+    Sokal (1997), Monte Carlo Methods in Statistical Mechanics; not checked against it.
     """
     found = [np.asarray(one, dtype=np.float64) for one in series if len(one) >= LEAST_OF_SERIES]
     longest = max((one.size for one in found), default=0)
@@ -148,10 +169,23 @@ TOGETHER: Mapping[str, Callable[[Array], float]] = {
 def without_repeats(
     points: MeasuredRows, keys: Sequence[tuple[object, ...]], errors: Array
 ) -> tuple[MeasuredRows, RepeatsAveraged]:
-    """Each point once, and a note; rows of equal `keys` (rows,) are one. errors (rows,) [m/s].
+    """Each point once: u is the mean with its error, see `means_of_repeats`.
 
-    u is the mean with its error, see `means_of_repeats`; v and w are means, u_std is the root of the mean square, and
-    durations add up. Without repeats the points are as they were.
+    v and w are means, u_std is the root of the mean square, and durations add up.
+
+    Parameters
+    ----------
+    points : MeasuredRows
+    keys : sequence of tuple (rows,)
+        Rows of equal keys are one.
+    errors : ndarray (rows,)
+        [m/s], NaN if not stated.
+
+    Returns
+    -------
+    MeasuredRows
+        As they were without repeats.
+    RepeatsAveraged
     """
     rows: dict[tuple[object, ...], list[int]] = {}
     for row, key in enumerate(keys):

@@ -312,9 +312,22 @@ def held_out_files(folder: Path) -> list[Path]:
 
 
 def read_site(path: Path, completed: Any = None) -> FieldSite:
-    """The site in a file. InputError, which names file and key, for what is missing, no number or beyond bounds.
+    """The site in a file.
 
-    completed: its keys and values with those of a finished result.
+    Parameters
+    ----------
+    path : Path
+    completed : mapping, optional
+        Its keys and values with those of a finished result.
+
+    Returns
+    -------
+    FieldSite
+
+    Raises
+    ------
+    InputError
+        Which names file and key, for what is missing, no number or beyond bounds.
     """
     if completed is None and not path.exists():
         what = "no site file" if path.parent.is_dir() else "a file" if path.parent.exists() else "no such folder"

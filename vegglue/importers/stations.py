@@ -144,7 +144,30 @@ class StationTables:
 def station_tables(
     taken: MeasuredRows, stem: str, options: FileOptions, known: KnownExperiments, place: Placement, file: str
 ) -> StationTables:
-    """The tables of what was taken from one file. InputError, which begins with `file`."""
+    """The tables of what was taken from one file.
+
+    Parameters
+    ----------
+    taken : MeasuredRows
+    stem : str
+        Of its name.
+    options : FileOptions
+    known : KnownExperiments
+    place : Placement
+    file : str
+        How the message begins.
+
+    Returns
+    -------
+    StationTables
+        One table for each kind of measurement, or one of points of verticals.
+
+    Raises
+    ------
+    InputError
+        If nothing is a measurement, an experiment is unknown, or repeats differ by more than chance with another
+        column.
+    """
     at = [role for role in ("x", "y") if role in taken.numbers]
     without_place = _lacking(taken, at, np.all)
     names = taken.texts.get("section", ()) if options.section is None else ()

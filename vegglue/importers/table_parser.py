@@ -78,7 +78,24 @@ def is_number(text: str) -> bool:
 
 
 def number_in(text: str, decimal_comma: bool) -> float | None:
-    """A field as a number; None for a mark of no value. Errors: ValueError, `comma` or `point` if that is wanted."""
+    """A field of a table as a number.
+
+    Parameters
+    ----------
+    text : str
+    decimal_comma : bool
+        Whether decimals stand behind a comma, else behind a point.
+
+    Returns
+    -------
+    float or None
+        None for a mark of no value.
+
+    Raises
+    ------
+    ValueError
+        `comma` or `point` if that is wanted, else `no number`.
+    """
     plain = text.strip().translate(DASHES)
     if plain.lower() in MISSING_WORDS or OF_FORMULA.fullmatch(plain):
         return None

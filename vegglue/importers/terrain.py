@@ -141,8 +141,25 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
     """The ground of a site whose `bed` names a file: `{file: dtm.tif}`, `{file: sections.csv, sections: true}`.
 
     `grid` (x, y, cell in m, in the frame of the model) is that of the site file, as far as it is given, and made of the
-    extent of the survey. The bed belongs into the folder beside the config: as bed.asc, and as points along a
-    centreline. InputError.
+    extent of the survey.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the measurements.
+    target : Path
+        Of the config; the bed belongs into the folder beside it: as bed.asc, and as points along a centreline.
+    site : FieldSite
+    place : Placement
+
+    Returns
+    -------
+    Ground
+
+    Raises
+    ------
+    InputError
+        If the survey cannot be read, or makes no grid.
     """
     path = _file_of(folder, site.bed, "bed")
     given = dict(site.bed.model_extra or {}) if site.bed is not None else {}
@@ -230,7 +247,27 @@ def _file_of(folder: Path, given: FileOfSite | None, key: str) -> Path:
 
 
 def grid_of_terrain(path: Path, terrain: Terrain, asked: SiteGrid | None, place: Placement) -> Tree:
-    """The grid of the site file, else of the extent of the survey; along a centreline no further than the line goes."""
+    """The grid of the site file, else of the extent of the survey; along a centreline no further than the line goes.
+
+    Parameters
+    ----------
+    path : Path
+        Of the survey, for messages.
+    terrain : Terrain
+    asked : SiteGrid or None
+        What the site file states.
+    place : Placement
+
+    Returns
+    -------
+    Tree
+        Keys x, y and cell [m].
+
+    Raises
+    ------
+    InputError
+        If the bed has no extent along or across, or would have more than MOST_LEVELS levels.
+    """
     west, east, south, north = terrain.extent
     given = asked or SiteGrid()
     if place.line is not None:

@@ -47,9 +47,27 @@ class BoatProfile:
 def stations_of_transect(
     path: Path, options: FileOptions, profiles: Sequence[BoatProfile], *form: FileNote
 ) -> MeasuredRows:
-    """Stations along the straight line that fits the transect, each the mean of the ensembles around it.
+    """Stations along the straight line that fits a transect, each the mean of the ensembles around it.
 
-    `start` of the file, in the coordinates of the site, is where the boat started. InputError.
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    options : FileOptions
+        With `start`, where the boat started, in the coordinates of the site [m].
+    profiles : sequence of BoatProfile
+    *form : FileNote
+        How they were read.
+
+    Returns
+    -------
+    MeasuredRows
+        Velocities to the east and north with their standard errors [m/s]; each ensemble for itself on a short transect.
+
+    Raises
+    ------
+    InputError
+        Without `start`, or with fewer than FEWEST_ENSEMBLES ensembles of a place and velocities.
     """
     if options.start is None:
         raise InputError(
@@ -99,9 +117,22 @@ def refuse_leaps(path: Path, profiles: Sequence[BoatProfile]) -> None:
 
 
 def depth_mean(ensemble: BoatProfile) -> tuple[float, float]:
-    """U = a h^p / (p + 1), with the a that gives the measured cells their mean under u = a z^p [m/s].
+    """U = a h^p / (p + 1), with the a that gives the measured cells their mean under u = a z^p
 
-    Source: Chen (1991), doi 10.1061/(ASCE)0733-9429(1991)117:3(371); makers' programs do so above and below the cells.
+    Makers' programs do so above and below the cells.
+
+    Parameters
+    ----------
+    ensemble : BoatProfile
+
+    Returns
+    -------
+    float, float
+        To the east and north [m/s].
+
+    References
+    ----------
+    Chen (1991), doi:10.1061/(ASCE)0733-9429(1991)117:3(371).
     """
     shape = ensemble.height**PROFILE_POWER
     a = ensemble.velocity.mean(axis=0) / shape.mean()

@@ -199,7 +199,24 @@ def _outlines_and_properties(
 
 
 def planted_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = NONE_NAMED) -> list[NamedPolygon]:
-    """Polygons of plants. InputError as `read_polygons`, and for one without stems among others that have."""
+    """Polygons of plants.
+
+    Parameters
+    ----------
+    path : Path
+    frame : Frame or None
+    columns : mapping of str
+        Headings of `stems` and `name`.
+
+    Returns
+    -------
+    list of NamedPolygon
+
+    Raises
+    ------
+    InputError
+        As `read_polygons`, and for one without stems among others that have.
+    """
     found = read_polygons(path, frame, columns)
     counted = any(one.density is not None for one in found)
     for one in found:
@@ -460,10 +477,23 @@ def drawn_placement(folder: Path, site: FieldSite) -> tuple[DrawnCentreline | No
 
 
 def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: Frame | None) -> DrawnCentreline:
-    """The centreline of a site file, brought from the map into the frame: of a file, points, or parts and arcs.
+    """The centreline of a site file, brought from the map into the frame.
 
-    A file is a table of x and y, a line of GeoJSON, or of a shapefile; upstream first. InputError for a file that is
-    not there, or holds no line.
+    Parameters
+    ----------
+    folder : Path
+    given : FileOfSite or CentrelineShape
+        A file, a table of x and y, a line of GeoJSON, or of a shapefile, upstream first; or points, or parts and arcs.
+    frame : Frame or None
+
+    Returns
+    -------
+    DrawnCentreline
+
+    Raises
+    ------
+    InputError
+        For a file that is not there, or holds no line.
     """
     columns: Tree = {}
     units: Tree = {}
