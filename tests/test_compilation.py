@@ -6,9 +6,11 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from house import FILES, PACKAGE
+from reach import COARSE, here, write_reach
 
 from vegglue.compilation import SHARED, _stamp, compiled, shapes_loops
 from vegglue.wording.phases import COMPILING
@@ -155,3 +157,20 @@ def test_the_first_command_says_that_it_compiles(tmp_path: Path) -> None:
         for _ in range(2)
     ]
     assert said == [[f"calibrating{COMPILING}", "calibrating"], ["calibrating", "calibrating"]]
+
+
+@pytest.mark.parametrize(
+    "command", [("infer",), ("plan",), ("diagnose",), ("simulate", "--members", "32")], ids=lambda words: words[0]
+)
+def test_every_command_that_solves_flows_says_that_it_compiles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    """And it says so before it solves the first one, on a machine where nothing is kept."""
+    begun: list[None] = []
+    monkeypatch.setattr("vegglue.engine.model.rates", SimpleNamespace(signatures=()))
+    monkeypatch.setattr("vegglue.engine.model.is_kept", lambda loop: False)
+    monkeypatch.setattr("vegglue.engine.model.compile_beside", lambda: begun.append(None))
+    config = write_reach(tmp_path, COARSE, ("experiment: June}", "experiment: June, standard_error: 0.02}"))
+    first, *_ = here(tmp_path, *command, config.name, "--jobs", "1").stdout.splitlines()
+    assert COMPILING.strip() in first
+    assert begun

@@ -45,6 +45,7 @@ from vegglue.diagnosis.plan_model import (
 )
 from vegglue.diagnosis.plan_search import NAMED_AT, chances_named, first_competition, plan_search
 from vegglue.engine.interface import Model, Point, responses
+from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError
 from vegglue.normal_range import NORMAL95
 from vegglue.progress import Progress, Watch, silent
@@ -119,7 +120,7 @@ def plan_measurements(
         noise_of(at_hand)  # raises InputError if a station states no error
     base = planned_pieces(model, planned)
     possible = possible_pieces(model, planned, at_hand, base)
-    watch(Progress(COMPUTING_FINGERPRINTS))
+    watch(Progress(with_compilation(COMPUTING_FINGERPRINTS)))
     wide = plan_model(model, planned, at_hand, base, possible)
     question = _question(wide.candidates, about, size, between)
     proposed = not len(at_hand) and not base

@@ -20,6 +20,7 @@ from vegglue.calibration.noise import Noise, covariance_of
 from vegglue.case.parameter_space import sample_prior, theta_at
 from vegglue.case.schema import Case
 from vegglue.engine.interface import Model, predict
+from vegglue.engine.model import with_compilation
 from vegglue.inference.glue import check_stations, efficiency
 from vegglue.inference.homogeneity import transfer
 from vegglue.inference.importance_sampling import LogDensity, Sample, mixture_at_modes, sample
@@ -91,7 +92,7 @@ def refine(
     """
     case, station = model.case, model.station
     if ensemble is None:
-        watch(Progress(TRYING_POINTS))
+        watch(Progress(with_compilation(TRYING_POINTS)))
         tried = points_of_prior(model)
     else:
         check_stations(ensemble, station, case.source)

@@ -8,6 +8,7 @@ from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.diagnosis.comparison import without_stations
+from vegglue.engine.model import with_compilation
 from vegglue.errors import InputError, shown_command, shown_path
 from vegglue.inference.command_ensemble import refuse_useless
 from vegglue.measurements.plant_survey import read_survey, rigid_cylinder
@@ -55,7 +56,7 @@ def report(
     run = case_run(case, runs, watch=watch)
     sized = run.of(as_solved(run.case, run.folder)) if members is None else run.sized(members)
     known = results_of(sized, run)
-    run.watch(Progress(SOLVING_FLOW.format(run.case.name)))
+    run.watch(Progress(with_compilation(SOLVING_FLOW.format(run.case.name))))
     flow = median_flow(sized, known.posterior)
     run.watch(Progress(DRAWING.format(run.case.name)))
     return write_report(replace(known, flow=flow))
