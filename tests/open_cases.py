@@ -1,10 +1,18 @@
 """The sets of an independent code in data/open_cases, and the loop on them as a user has it: `vegglue import`, and
-nothing edited by hand.
+nothing edited by hand but the size of cells.
+
+On cells twice as long and as wide as those that `import` proposes, the loop gives the same verdicts in four tenths of
+the time, and of open-e a mixing length that is too short. On proposed cells the tests take open-b (`test_documents`)
+and open-e, and `python tests/open_cases.py` all of them.
 
 That code has Baptist's law, the floor of 1.3 in the bank law and the rule for emergent plants in common with vegglue,
 and kappa was chosen on open-a: not tested by them.
 """
 
+import json
+import sys
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
@@ -30,14 +38,23 @@ def imported(name: str, folder: Path) -> Case:
     return load_case(target)
 
 
-def looked_into(name: str, folder: Path) -> Diagnosis:
-    """What is said of an open case; read where it has been said in this folder before."""
-    return diagnose(imported(name, folder), runs=folder / "runs", watch=print)
+def on_larger_cells(name: str, folder: Path) -> Case:
+    """An open case on cells twice as long and as wide as proposed."""
+    config = imported(name, folder).source
+    tree = yaml.safe_load(config.read_text(encoding="utf-8"))
+    tree["grid"] |= {"cell": [2.0 * side for side in tree["grid"]["cell"]]}
+    config.write_text(yaml.safe_dump(tree), encoding="utf-8")
+    return load_case(config)
 
 
-def extended(name: str, folder: Path) -> StepwiseExtension:
-    """An open case with what its diagnosis names, which is read where there is one in this folder."""
-    return extend_stepwise(imported(name, folder), runs=folder / "runs", watch=print)
+def looked_into(case: Case) -> Diagnosis:
+    """What is said of an open case; read where it has been said before."""
+    return diagnose(case, runs=case.source.parent / "runs", watch=print)
+
+
+def extended(case: Case) -> StepwiseExtension:
+    """An open case with what its diagnosis names, which is read where there is one."""
+    return extend_stepwise(case, runs=case.source.parent / "runs", watch=print)
 
 
 def assert_found(found: Diagnosis, hidden: str, true: float) -> None:
@@ -59,3 +76,16 @@ def assert_better(grown: StepwiseExtension, added: int) -> None:
     assert held_out_rmse(after) < held_out_rmse(before)
     assert held_out_rmse(after, "experiments") < held_out_rmse(before, "experiments")
     assert after.validation < min(before.validation, WANTED)
+
+
+def main(names: Sequence[str]) -> None:
+    """What is said of each open case on the cells that `import` proposes, beside what is hidden in it."""
+    for name in names:
+        hidden = json.loads((OPEN_CASES / name / "answer.json").read_text(encoding="utf-8"))["hidden"]
+        with tempfile.TemporaryDirectory() as folder:
+            found = diagnose(imported(name, Path(folder)), runs=Path(folder) / "runs")
+        print(f"{name} ({hidden}): {found.verdict.sentence}", flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:] or sorted(path.name for path in OPEN_CASES.iterdir() if path.is_dir()))

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from open_cases import OPEN_CASES, looked_into
+from open_cases import OPEN_CASES, looked_into, on_larger_cells
 
 from vegglue.case.config import load_case
 from vegglue.importers.field_folder import case_from_folder
@@ -17,13 +17,13 @@ pytestmark = pytest.mark.slow
 
 
 def test_where_nothing_is_hidden_nothing_is_found(campaigns: Path) -> None:
-    found = looked_into("open-a", campaigns)
+    found = looked_into(on_larger_cells("open-a", campaigns))
     assert found.verdict.kind == "nothing-missing", found.verdict.sentence
 
 
 @pytest.mark.parametrize(("name", "kind", "offset"), [("open-j", "probe", 0.05), ("open-k", "gauge", -0.015)])
 def test_an_instrument_that_is_off_is_set_aside_alone(name: str, kind: str, offset: float, campaigns: Path) -> None:
-    found = looked_into(name, campaigns)
+    found = looked_into(on_larger_cells(name, campaigns))
     (faulty,) = found.instruments
     assert found.verdict.kind == "instrument", found.verdict.sentence
     assert (faulty.kind, found.steps, found.places) == (kind, (), ())

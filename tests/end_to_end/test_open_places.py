@@ -3,13 +3,13 @@
 from pathlib import Path
 
 import pytest
-from open_cases import assert_better, extended, looked_into
+from open_cases import assert_better, extended, looked_into, on_larger_cells
 
 pytestmark = pytest.mark.slow
 
 
 def test_something_unlisted_is_none_of_these_and_has_a_place(campaigns: Path) -> None:
-    found = looked_into("open-f", campaigns)
+    found = looked_into(on_larger_cells("open-f", campaigns))
     location = found.verdict.anomaly
     assert found.verdict.kind == "none-of-these", found.verdict.sentence
     assert location is not None
@@ -18,7 +18,7 @@ def test_something_unlisted_is_none_of_these_and_has_a_place(campaigns: Path) ->
 
 @pytest.mark.parametrize(("name", "term", "x", "y"), [("open-i", "bed", 47.0, -0.5), ("open-f", "drag", 33.0, -0.6)])
 def test_a_place_is_of_the_right_term(name: str, term: str, x: float, y: float, campaigns: Path) -> None:
-    found = looked_into(name, campaigns)
+    found = looked_into(on_larger_cells(name, campaigns))
     (place,) = found.places
     assert found.verdict.kind == "none-of-these", found.verdict.sentence
     assert ((place.x - x) ** 2 + (place.y - y) ** 2) ** 0.5 < 1.5
@@ -27,4 +27,4 @@ def test_a_place_is_of_the_right_term(name: str, term: str, x: float, y: float, 
 
 
 def test_a_place_is_added(campaigns: Path) -> None:
-    assert_better(extended("open-i", campaigns), 1)
+    assert_better(extended(on_larger_cells("open-i", campaigns)), 1)
