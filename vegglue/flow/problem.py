@@ -163,7 +163,7 @@ class Problem:
     geometry: ChannelGeometry | None = None  # what effects see of the channel; None without effects
     walls: SideWalls = SMOOTH_WALLS
     bend: Bend | None = None  # curvature of a grid along a centreline; None if it is straight
-    # Of rows that were cut out, `bed_half_range` of the whole grid; else empty
+    # `bed_half_range` where it is known, of rows that were cut out that of the whole grid; else empty
     half_range: Array = field(default_factory=lambda: EMPTY)
 
     @property

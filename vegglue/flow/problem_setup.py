@@ -94,7 +94,8 @@ def with_effects_of(case: Case, site: Site, experiment: str, theta: Theta, like:
     like : Problem
         Of the other case, of the same m members.
     """
-    return replace(like, **_under_effects(case, in_experiment(site, experiment), experiment, theta))
+    changed = _under_effects(case, in_experiment(site, experiment), experiment, theta)
+    return replace(like, half_range=like.bed_half_range, **changed)  # no effect changes the bed itself: known once
 
 
 def _members(theta: Theta) -> int:
