@@ -9,10 +9,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from house import FILES, PACKAGE
+from house import FILES, PACKAGE, tree_of
 from reach import COARSE, here, write_reach
 
-from vegglue.compilation import SHARED, _stamp, compiled, shapes_loops
+from vegglue.compilation import SHARED, _stamp, compiled, compiled_on_views, shapes_loops
 from vegglue.wording.phases import COMPILING
 
 CHEZY = """
@@ -124,6 +124,30 @@ def test_loops_use_nothing_of_the_package_but_loops_and_shared_constants() -> No
         loops = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.decorator_list]
         bodies = [part for loop in loops for statement in loop.body for part in ast.walk(statement)]
         assert not foreign & {part.id for part in bodies if isinstance(part, ast.Name)}, path
+
+
+def test_loops_on_views_give_numbers_to_loops_that_count() -> None:
+    """A view of which no reference was counted, given to a loop that counts, is freed while it is used."""
+    loops = {
+        node.name: (node, {part.id for part in node.decorator_list if isinstance(part, ast.Name)})
+        for path in filter(shapes_loops, FILES)
+        for node in tree_of(path).body
+        if isinstance(node, ast.FunctionDef)
+    }
+    on_views = {name for name, (_, decorators) in loops.items() if compiled_on_views.__name__ in decorators}
+    called = {
+        part.func.id
+        for name, (node, decorators) in loops.items()
+        if decorators and name not in on_views
+        for part in ast.walk(node)
+        if isinstance(part, ast.Call) and isinstance(part.func, ast.Name)
+    }
+    assert {"_momentum_x", "_momentum_y"} <= on_views & called
+    for name in sorted(on_views & called):
+        node, _ = loops[name]
+        given = any(isinstance(part, ast.Return) and part.value is not None for part in ast.walk(node))
+        kinds = {part.id for part in ast.walk(node.returns) if isinstance(part, ast.Name)} if node.returns else set()
+        assert not given or (kinds and kinds <= {"tuple", "float", "int", "bool"}), name
 
 
 def test_a_file_depends_on_those_below_it_only(tmp_path: Path) -> None:

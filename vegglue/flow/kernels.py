@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.compilation import compiled, compiled_inside
+from vegglue.compilation import compiled, compiled_inside, compiled_on_views
 from vegglue.effects.physical_constants import GRAVITY
 from vegglue.flow.wet_and_dry import afloat, depths
 
@@ -39,7 +39,7 @@ class Bend(NamedTuple):
     dy: float
 
 
-@compiled_inside
+@compiled_on_views
 def _at_cell(bend: Bend | None, column: int, rows: float) -> float:
     """J [-] in a column of cells, so many rows north of the south edge; 1 on a straight grid."""
     if bend is None:
@@ -47,7 +47,7 @@ def _at_cell(bend: Bend | None, column: int, rows: float) -> float:
     return 1.0 - bend.at_cells[column] * (bend.south + rows * bend.dy)
 
 
-@compiled_inside
+@compiled_on_views
 def _at_face(bend: Bend | None, face: int, rows: float) -> float:
     """J [-] at the west-east faces, so many rows north of the south edge; 1 on a straight grid."""
     if bend is None:
@@ -67,7 +67,7 @@ def _columns_of(bend: Bend | None, first: int, stop: int) -> Bend | None:
 THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
 
 
-@compiled_inside
+@compiled_on_views
 def _upwind(flux: float, far_left: float, left: float, right: float, far_right: float) -> float:
     """Third-order upwind-biased value between `left` and `right` (kappa = 1/3; van Leer 1985)."""
     from_left = left + (right - left) * THIRD + (left - far_left) * SIXTH
@@ -75,7 +75,7 @@ def _upwind(flux: float, far_left: float, left: float, right: float, far_right: 
     return from_left if flux > 0.0 else from_right
 
 
-@compiled_inside
+@compiled_on_views
 def _upwind_downstream(flux: float, far_left: float, left: float, right: float) -> float:
     """The same where the flux runs downstream; first order against it, so that the Jacobian's blocks stay narrow."""
     return left + (right - left) * THIRD + (left - far_left) * SIXTH if flux > 0.0 else right
@@ -88,20 +88,20 @@ def _flat(values):
     return values.reshape((n, rows * m))
 
 
-@compiled_inside
-def _end_of_rows(bend, first, size, m):
+@compiled_on_views
+def _end_of_rows(bend, first: int, size: int, m: int) -> int:
     """Where in a column what lies along one row, and is as long, ends: at its end, where the grid is straight."""
     return size if bend is None else first + m
 
 
-@compiled_inside
+@compiled_on_views
 def _straight_on(out, last, before_it):
     """Values (rows m,) one cell beyond the last: second order where a further neighbour is missing."""
     for t in range(out.size):
         out[t] = 2.0 * last[t] - before_it[t]
 
 
-@compiled_inside
+@compiled_on_views
 def _beyond_outlet(out, last, before_it, carrier):
     """Values (rows m,) one cell beyond the outlet: straight on where water leaves; where it enters, as in the last.
 
@@ -111,14 +111,14 @@ def _beyond_outlet(out, last, before_it, carrier):
         out[t] = 2.0 * last[t] - before_it[t] if carrier[t] > 0.0 else last[t]
 
 
-@compiled_inside
+@compiled_on_views
 def _carrying(out, flux, depth, other_flux, other_depth):
     """Velocity [m/s] that carries momentum between two faces: their fluxes over their depths."""
     for t in range(out.size):
         out[t] = (flux[t] + other_flux[t]) / (depth[t] + other_depth[t])
 
 
-@compiled_inside
+@compiled_on_views
 def _shear_at_corners(out, m, f, u, v, viscosity, corner, per_x, per_y, bend):
     """h nu (du/dy + dv/dx) [m3/s2] at the corners ((ny + 1) m,) of west-east faces f; none at walls and ends."""
     nx, n = viscosity.shape
@@ -138,7 +138,7 @@ def _shear_at_corners(out, m, f, u, v, viscosity, corner, per_x, per_y, bend):
             found[t] = nu * depth[t] * turn
 
 
-@compiled_inside
+@compiled_on_views
 def _strain_along(out, m, f, u, v, viscosity, cell, per_x, bend):
     """2 h nu du/dx [m3/s2] of the cells (ny m,) of column f; none beyond the outlet."""
     if f == cell.shape[0]:
@@ -156,33 +156,35 @@ def _strain_along(out, m, f, u, v, viscosity, cell, per_x, bend):
                 out[t] -= 2.0 * nu[t] * h[t] * turned
 
 
-@compiled_inside
+@compiled_on_views
 def _beside_x(out, bend, f, m, per_x):
-    """1 / (J dx) [1/m] of west-east face f, and (J / that J)^2 at its south and its north end [-], into (3, ny m)."""
-    for j in range(out.shape[1] // m):
+    """1 / (J dx) [1/m] of west-east face f, and (J / that J)^2 at its south and north end [-], into (ny m,) each."""
+    per_length, south, north = out
+    for j in range(per_length.size // m):
         stretch = _at_face(bend, f, j + 0.5)
         lift_s, lift_n = _at_face(bend, f, j) / stretch, _at_face(bend, f, j + 1) / stretch
         for t in range(j * m, j * m + m):
-            out[0, t], out[1, t], out[2, t] = per_x / stretch, lift_s * lift_s, lift_n * lift_n
+            per_length[t], south[t], north[t] = per_x / stretch, lift_s * lift_s, lift_n * lift_n
 
 
-@compiled_inside
+@compiled_on_views
 def _beside_y(out, bend, i, m, per_x):
-    """The fluxes of `_south_of` for the rows 1 .. ny - 1 of column i, into (3, (ny - 1) m)."""
-    for j in range(out.shape[1] // m):
-        per_length, lift_s, lift_n = _south_of(bend, i, j + 1, per_x)
+    """The fluxes of `_south_of` for the rows 1 .. ny - 1 of column i, into ((ny - 1) m,) each."""
+    per_length, south, north = out
+    for j in range(per_length.size // m):
+        there, lift_s, lift_n = _south_of(bend, i, j + 1, per_x)
         for t in range(j * m, j * m + m):
-            out[0, t], out[1, t], out[2, t] = per_length, lift_s, lift_n
+            per_length[t], south[t], north[t] = there, lift_s, lift_n
 
 
-@compiled_inside
-def _south_of(bend, i, j, per_x):
+@compiled_on_views
+def _south_of(bend, i: int, j: float, per_x: float) -> tuple[float, float, float]:
     """1 / (J dx) [1/m] of the south face of a cell, and J / that J in the cells south and north of it [-]."""
     stretch = _at_cell(bend, i, j)
     return per_x / stretch, _at_cell(bend, i, j - 0.5) / stretch, _at_cell(bend, i, j + 0.5) / stretch
 
 
-@compiled_inside
+@compiled_on_views
 def _with_rows_beyond(out, row, m):
     """Values (rows m,) with the first and the last row twice more at their ends, into out ((rows + 4) m,)."""
     n = row.size
@@ -192,13 +194,13 @@ def _with_rows_beyond(out, row, m):
         out[t], out[n + 2 * m + t] = row[t % m], row[n - m + t % m]
 
 
-@compiled_inside
+@compiled_on_views
 def _rows_around(wide, m):
     """Of such a column what stands two rows and one south of each row, there, and one and two rows north."""
     return wide[: -4 * m], wide[m : -3 * m], wide[2 * m : -2 * m], wide[3 * m : -m], wide[4 * m :]
 
 
-@compiled_inside
+@compiled_on_views
 def _level_drop(out, f, level, outlet_level):
     """Rise of the level [m] over the east face f of cells (ny m,), from the last ones twice that to the outlet."""
     m = outlet_level.size
@@ -218,7 +220,7 @@ REST_SPEED = 1e-3
 STRIP, HALO = 40, 3
 
 
-@compiled_inside
+@compiled_on_views
 def _neighbours_of_u(far, near, east, f, u, carrier, flux, face, cell):
     """u [m/s] two faces and one west of face f and one east of it, (ny m,) each; where a side is nearer, into what is
     given.
@@ -240,13 +242,13 @@ def _neighbours_of_u(far, near, east, f, u, carrier, flux, face, cell):
     return u[f - 2] if f > 2 else far, west, u[f + 1] if f < nx else east
 
 
-@compiled_inside
+@compiled_on_views
 def _turned(out, values):
     for t in range(out.size):
         out[t] = -values[t]
 
 
-@compiled_inside
+@compiled_on_views
 def _neighbours_of_v(far, near, east, m, i, v, carrier):
     """v [m/s] two columns and one west of column i and one east of it, ((ny + 1) m,) each; where a side is nearer, into
     what is given.
@@ -264,15 +266,20 @@ def _neighbours_of_v(far, near, east, m, i, v, carrier):
     return v[i - 2] if i > 1 else far, v[i - 1] if i > 0 else near, v[i + 1] if i < last else east
 
 
-@compiled_inside
-def _momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy, bend):
-    """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes."""
+@compiled_on_views
+def _momentum_x(
+    out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy, bend, work
+):
+    """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes,
+    work (14, rows m or more) is overwritten.
+    """
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
     (nx, n), ny, m = level.shape, outlet.size, outlet_level.size
-    west, east, before, behind, drop = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    side, shear, wide = np.empty(n + m), np.empty(n + m), np.empty(n + 4 * m)
-    ends, lengths = np.empty((3, n)), np.empty((3, n))
+    west, east, before, behind, drop = work[0, :n], work[1, :n], work[2, :n], work[3, :n], work[4, :n]
+    side, shear, wide = work[5, : n + m], work[6, : n + m], work[7, : n + 4 * m]
+    ends = work[8, :n], work[9, :n], work[10, :n]
+    lengths = work[11, :n], work[12, :n], work[13, :n]
     _beside_x(lengths, bend, first + 1, m, per_x)
     _carrying(east, flux_x[first], face_x[first], flux_x[first + 1], face_x[first + 1])
     _strain_along(behind, m, first, u, v, viscosity, cell, per_x, bend)
@@ -295,7 +302,7 @@ def _momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, out
             (v[a, :-m], v[a, m:], v[b, :-m], v[b, m:]),
             (before, behind, shear[:-m], shear[m:], per_y),
             (drag[a], drag[b], cell[a], cell[b], face_x[f], drop, half_per_film),
-            (lengths[0], lengths[1], lengths[2]),
+            lengths,
             bend,
             f,
             dx,
@@ -307,7 +314,7 @@ def _momentum_x(out, offset, first, stop, level, u, v, wet, drag, viscosity, out
                         out[offset + a - first, 2, t] = u[f, t]
 
 
-@compiled_inside
+@compiled_on_views
 def _u_of_column(out, of_u, carriers, of_v, stresses, column, lengths, bend, f, dx):
     """`_momentum_x` of one column; all are (ny m,) but per_y and half_per_film."""
     u_ss, u_s1, u_here, u_n1, u_nn, u_ww, u_w1, u_e1 = of_u
@@ -337,15 +344,20 @@ def _u_of_column(out, of_u, carriers, of_v, stresses, column, lengths, bend, f, 
         out[t] = moved + GRAVITY * drop[t] * per_length[t] + pulled
 
 
-@compiled_inside
-def _momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, film, dx, dy, bend):
-    """Rate R_v [m/s2] on the south faces of columns first .. stop - 1, into out[offset ..]; rows 1 .. ny - 1 only."""
+@compiled_on_views
+def _momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, film, dx, dy, bend, work):
+    """Rate R_v [m/s2] on the south faces of columns first .. stop - 1, into out[offset ..]; rows 1 .. ny - 1 only;
+    work as `_momentum_x`.
+    """
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
     n = level.shape[1]
-    west, east, side, strain = np.empty(n - m), np.empty(n - m), np.empty(n), np.zeros(n)
-    before, behind, wide = np.empty(n + m), np.empty(n + m), np.empty(n + 5 * m)
-    ends, lengths = np.empty((3, n + m)), np.empty((3, n - m))
+    west, east, side, strain = work[0, : n - m], work[1, : n - m], work[2, :n], work[3, :n]
+    before, behind, wide = work[4, : n + m], work[5, : n + m], work[6, : n + 5 * m]
+    ends = work[7, : n + m], work[8, : n + m], work[9, : n + m]
+    lengths = work[10, : n - m], work[11, : n - m], work[12, : n - m]
+    for t in range(n):
+        strain[t] = 0.0
     _beside_y(lengths, bend, first, m, per_x)
     _carrying(east, flux_x[first, :-m], face_x[first, :-m], flux_x[first, m:], face_x[first, m:])
     _shear_at_corners(behind, m, first, u, v, viscosity, corner, per_x, per_y, bend)
@@ -368,14 +380,14 @@ def _momentum_y(out, offset, first, stop, m, level, u, v, wet, drag, viscosity, 
             (before[m:-m], behind[m:-m], strain[:-m], strain[m:], viscosity[i, :-m], viscosity[i, m:], per_y),
             (drag[i, :-m], drag[i, m:], cell[i, :-m], cell[i, m:], face_y[i, m:-m], half_per_film),
             (level[i, :-m], level[i, m:]),
-            (lengths[0], lengths[1], lengths[2]),
+            lengths,
             bend,
             i,
             dx,
         )
 
 
-@compiled_inside
+@compiled_on_views
 def _v_of_column(out, of_v, carriers, of_u, stresses, column, levels, lengths, bend, i, dx):
     """`_momentum_y` of one column; all are ((ny - 1) m,) but per_y and half_per_film."""
     v_ss, v_s1, v_here, v_n1, v_nn, v_ww, v_w1, v_e1 = of_v
@@ -565,6 +577,7 @@ def rates(
     """
     nx, _, ny, m = state.shape
     out, friction, mixing = np.empty((nx, 3, ny * m)), _flat(drag), _flat(viscosity)
+    work = np.empty((14, ny * m + 5 * m))
     for first in range(0, nx, STRIP):
         stop = min(first + STRIP, nx)
         a, b = max(first - HALO, 0), min(stop + HALO, nx)
@@ -575,8 +588,8 @@ def rates(
         wet = (_flat(cell), _flat(face_x), _flat(face_y), _flat(corner), flux_x, flux_y)
         lo, hi, here, law = first - a, stop - a, _columns_of(bend, a, b), (friction[a:b], mixing[a:b])
         _continuity(out, first, lo, hi, m, flux_x, flux_y, dx, dy, here)
-        _momentum_y(out, first, lo, hi, m, *flow, wet, *law, film, dx, dy, here)
-        _momentum_x(out, first, lo, hi, *flow, wet, *law, outlet, outlet_level, film, dx, dy, here)
+        _momentum_y(out, first, lo, hi, m, *flow, wet, *law, film, dx, dy, here, work)
+        _momentum_x(out, first, lo, hi, *flow, wet, *law, outlet, outlet_level, film, dx, dy, here, work)
         for i in range(first, stop):  # not by slices: to assign arrays takes seconds to compile
             for k in range(m):
                 out[i, 1, k] = state[i, 1, 0, k]
