@@ -17,6 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # where `built_models` lies
+
 from built_models import model_of
 
 from vegglue.calibration.fit import fit

@@ -7,12 +7,16 @@ ensemble. Seconds of one core. `wide.py` measures the diagnosis of the same reac
 import argparse
 import os
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 from bench import timed
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # where `built_models` lies
+
 from built_models import model_of
 
 from vegglue.case.config import load_case

@@ -8,8 +8,8 @@ import pytest
 
 STUDIES = Path(__file__).parent
 NAMES = (
-    "bench", "beside", "blind", "blind_lengths", "confluence", "drawn_sites", "fuzz", "laws", "law_alarms", "natural",
-    "peer", "scale", "sensitivity", "loop", "startup", "wide",
+    "bench", "beside", "blind", "blind_lengths", "confluence", "drawn_sites", "fuzz", "growth", "laws", "law_alarms",
+    "natural", "peer", "scale", "sensitivity", "surrogate", "loop", "startup", "wide",
 )  # fmt: skip
 # One process reads all, as imports take seconds; the last name on standard output is the one that failed.
 READ = """
