@@ -12,8 +12,7 @@ from vegglue.calibration.fit import fit
 from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
 from vegglue.case.parameter_space import theta_at
-from vegglue.engine import newton
-from vegglue.engine.interface import Model, linearise, predict
+from vegglue.engine.interface import Model, linearise
 from vegglue.engine.model import coarser
 from vegglue.engine.newton import SteadyFlow, predict_near
 from vegglue.flow.jacobian import Factors
@@ -37,16 +36,6 @@ def test_slopes_are_those_of_solved_members() -> None:
     steps = 0.01 * np.eye(4)
     measured = (predict_near(model, point, z + steps) - predict_near(model, point, z - steps)) / 0.02
     assert point.slope == pytest.approx(measured.T, abs=2e-4)
-
-
-def test_a_member_out_of_reach_is_solved_from_its_point(monkeypatch: pytest.MonkeyPatch) -> None:
-    model, z = twin(), np.array([[0.5, -0.6, 1.0, 0.3]])
-    point = linearise(model, np.zeros(4))
-    assert point is not None
-    expected = predict(model, [point], z)
-    monkeypatch.setattr(newton, "predict_near", lambda _model, _point, z: np.full((len(z), len(model.station)), np.nan))
-    monkeypatch.setattr(newton, "_predict_alone", lambda *_: pytest.fail("solved from nothing"))
-    assert predict(model, [point], z) == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_point_leads_to_one_on_narrower_cells() -> None:

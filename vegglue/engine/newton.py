@@ -312,12 +312,6 @@ def _predict_members(model: Model, points: Sequence[Point], z: Array) -> Array:
     for (_, part), prediction in zip(sets, parallel_map(partial(predict_near, model), tasks), strict=True):
         found[part] = prediction
     left, experiments = np.flatnonzero(np.isnan(found).any(axis=1)), list(model.case.experiments)
-    if left.size == 1:  # from the point again, with factors of its own, which several would share
-        near, there = points[int(nearest[left[0]])], z[left[0]]
-        ends = parallel_map(partial(_steady, model), [(one, there, near) for one in experiments])
-        for experiment, end in zip(experiments, ends, strict=True):
-            found[left, model.rows[experiment]] = np.nan if end is None else end[1]
-        left = left[np.isnan(found[left]).any(axis=1)]
     if left.size:  # as members of an ensemble are solved
         alone = np.full((left.size, len(model.station)), np.nan)
         readings_of = parallel_map(partial(_predict_alone, model), [(one, z[left]) for one in experiments])
