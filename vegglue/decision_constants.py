@@ -191,6 +191,10 @@ class DecisionConstants:
         4.0, "sections", CHOSEN, "up to which same_kind_odds of another name without one of them are a doubt; of more "
         "one hardly decides, and strong_odds are needed: these after C of docs/measured.md without t0",
     )  # fmt: skip
+    fingerprint_elsewhere: float = _constant(
+        0.5, "-", CHOSEN, "share of a name's squared fingerprint that other sections must hold for one without which "
+        "another name leads to be a doubt: after a drawn reach whose inflow had 80 % of it in one section",
+    )  # fmt: skip
     model_error_evidence: float = _constant(
         3.3, "-", DERIVED, "rise of the log-likelihood above which the model needs more error of its own than it is "
         "allowed: half of the 99 % point of chi2 with one degree of freedom",

@@ -413,7 +413,8 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
     NameHangsOnSection or None
         None if there is no such section, if no effect was accepted first or a place beside it, or if another effect
         leads with all sections, too: then refits have decided, not first order. A section counts once for each
-        experiment, but not if it holds most of the squared fingerprint: what acts there alone is not seen without it.
+        experiment, and only if the others hold fingerprint_elsewhere of the squared fingerprint: what acts in one
+        section alone cannot be seen without it.
     """
     base, prints = first.base, first.fingerprints
     used = base.model.station.iloc[base.noise.rows]
@@ -430,7 +431,6 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
     point, plausible = base.fitted.point, np.array([one.plausible_gain for one in prints.amplitudes])
     columns = base.noise.used(point.slope), base.noise.used(prints.values)
     residual = base.noise.residual(point.prediction)
-
     own_column = first.best_column(names.index(step.accepted))
 
     def leading(kept: Array) -> tuple[str, float, float]:
@@ -455,7 +455,7 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
     clearest = None
     for section in sections:
         name, ahead, left = leading(section_of != section)
-        if name not in together and ahead > least and left > 0.5 * whole:
+        if name not in together and ahead > least and left > constants().fingerprint_elsewhere * whole:
             told = str(used["section"].to_numpy()[section_of == section][0])
             least, clearest = ahead, NameHangsOnSection(step.accepted, told, name)
     return clearest
