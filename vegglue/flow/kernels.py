@@ -215,8 +215,9 @@ def _level_drop(out, f, level, outlet_level):
 # Speed [m/s] below which friction becomes linear, so that its derivative exists at rest. Chosen, not measured, below
 # what instruments resolve: larger ones add friction to slow water, smaller ones sharpen the bend that Newton meets.
 REST_SPEED = 1e-3
-# Columns computed together, so that what lies between fits the cache (chosen, not measured; no number hangs on it), and
-# those beside them they look at: upwinding looks two columns upstream, and depths of their faces one further.
+# Columns computed together, so that what lies between fits the cache: of 4 to 80, 40 take least for 1 to 16 members. No
+# number hangs on it. And those beside them they look at: upwinding looks two columns upstream, and depths of their
+# faces one further.
 STRIP, HALO = 40, 3
 
 
@@ -270,8 +271,8 @@ def _neighbours_of_v(far, near, east, m, i, v, carrier):
 def _momentum_x(
     out, offset, first, stop, level, u, v, wet, drag, viscosity, outlet, outlet_level, film, dx, dy, bend, work
 ):
-    """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes,
-    work (14, rows m or more) is overwritten.
+    """Rate R_u [m/s2] on the east faces of columns first .. stop - 1, into out[offset ..]; wet = depths and fluxes.
+    Of `work`, (14, (ny + 5) m), nothing is kept from one call to the next.
     """
     per_x, per_y, half_per_film = 1.0 / dx, 1.0 / dy, 0.5 / film
     cell, face_x, face_y, corner, flux_x, flux_y = wet
