@@ -69,10 +69,10 @@ def an_anomaly(**fields: Any) -> LocalAnomaly:
     return replace(usual, **fields)
 
 
-def a_patch(**fields: Any) -> LocalAnomaly:
-    """Plants that are not on the map; fields: to be changed."""
+def a_patch(angle: float = -15.0, **fields: Any) -> LocalAnomaly:
+    """Plants that are not on the map, so many degrees off x; fields: to be changed."""
     outline = PatchOutline(
-        angle=-5.0, height=0.9, proportional=0.0, length_error=0.6, width_error=0.2, angle_error=4.0, like="reeds"
+        angle=angle, height=0.9, proportional=0.0, length_error=0.6, width_error=0.2, angle_error=4.0, like="reeds"
     )
     usual = an_anomaly(
         effect="unlisted_patch", length=3.0, width=1.25, unit="-", amplitude=4.0, interval95=(3.0, 5.5), plausible=5.0,

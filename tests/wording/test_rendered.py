@@ -214,6 +214,9 @@ VERDICTS: dict[str, Diagnosis] = {
         ),
     )),
     "plants that are not on the map": brook(kind="none-of-these", effects=(), places=(a_patch(),)),
+    "plants along the channel that are not on the map": brook(
+        kind="none-of-these", effects=(), places=(a_patch(angle=5.0),)
+    ),
     "a field": brook(kind="none-of-these", effects=(), field=EVERY_KIND.field),
     "a law": brook(kind="none-of-these", effects=(), laws=candidate_laws_of("law_bank_speed_step")),
     "a law or an effect": brook(kind="one-of", laws=candidate_laws_of("law_bank_speed_step", calibrated=True)),
