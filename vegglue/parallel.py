@@ -65,7 +65,6 @@ def as_finished(work: Callable[..., Any], tasks: Iterable[tuple[Any, ...]], jobs
     ----------
     work : callable
         Best holds what all tasks share, as functools.partial does: it then travels once to each process of a cluster.
-    tasks : iterable of tuple
     jobs : int
         Number of processes, -1 for one on every core.
 
@@ -108,8 +107,6 @@ def parallel_map(
 
     Parameters
     ----------
-    work : callable
-    tasks : iterable of tuple
     finished : callable
         Is called with the number of tasks that are done.
 
@@ -175,7 +172,6 @@ def in_threads(
     ----------
     work : callable
         What it raises ends all tasks, and is raised here.
-    tasks : iterable of tuple
     finished : callable
         Is called with the number of tasks that are done.
 
@@ -227,11 +223,6 @@ def in_threads(
 
 def submit(work: Callable[..., Any], *task: Any) -> Callable[[], Any]:
     """Start work(*task) in a thread that `at_most` can spare, else do it when the result is needed.
-
-    Parameters
-    ----------
-    work : callable
-    *task : object
 
     Returns
     -------

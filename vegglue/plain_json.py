@@ -6,16 +6,7 @@ from typing import Any
 
 
 def plain(value: Any) -> Any:
-    """The value in what JSON knows: arrays as lists, paths as text, infinite and undefined numbers as null.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    dict, list, str, int, float, bool or None
-    """
+    """The value in what JSON knows: arrays as lists, paths as text, infinite and undefined numbers as null."""
     if hasattr(value, "tolist"):  # of numpy, which need not be imported for this
         value = value.tolist()
     if isinstance(value, Mapping):

@@ -35,7 +35,6 @@ def why_unreadable(path: Path, size: int, *state: int, by: str) -> str | None:
 
     Parameters
     ----------
-    path : Path
     size : int
         Size of the file [bytes].
     state : int

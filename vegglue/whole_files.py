@@ -94,8 +94,6 @@ def write_file(path: Path, content: bytes, advice: str) -> None:
 
     Parameters
     ----------
-    path : Path
-    content : bytes
     advice : str
         End of the sentence if it fails.
 

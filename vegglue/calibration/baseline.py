@@ -61,9 +61,6 @@ class Baseline:
 
     Attributes
     ----------
-    model : Model
-    noise : Noise
-    fitted : MapEstimate
     coarse : Model or None
         On cells of twice the size, None if the grid cannot be coarsened.
     on_coarse : Point or None
@@ -83,8 +80,6 @@ class SearchModel:
 
     Attributes
     ----------
-    model : Model
-    noise : Noise
     point : Point
         At the MAP estimate.
     """
@@ -209,10 +204,6 @@ def places_of_prior(parameters: int) -> Array:
 def under_error_of_grid(trial: Baseline) -> Baseline:
     """The model calibrated on its own cells from a trial, the error of its grid computed again where that ends.
 
-    Parameters
-    ----------
-    trial : Baseline
-
     Returns
     -------
     Baseline
@@ -231,7 +222,6 @@ def grid_difference(point: Point, on_coarse: Point | None) -> Array:
 
     Parameters
     ----------
-    point : Point
     on_coarse : Point or None
         At the same z; None if no steady flow is found there.
 
@@ -254,10 +244,6 @@ def with_coarse_point(base: Baseline) -> Baseline:
 def with_own_error(base: Baseline) -> Baseline:
     """The baseline with the model's own error M as the case allows it, computed at its point, and calibrated under it.
 
-    Parameters
-    ----------
-    base : Baseline
-
     Returns
     -------
     Baseline
@@ -277,13 +263,8 @@ def with_own_error_again(base: Baseline, z: Array) -> Baseline:
 
     Parameters
     ----------
-    base : Baseline
     z : ndarray (p,)
         Where coarse cells gave it. If sides of patches may lie off it is computed anew in any case.
-
-    Returns
-    -------
-    Baseline
     """
     if base.noise.model_error.any() and not base.model.case.model_error.edges:
         moved = np.abs(base.fitted.point.z - z) / np.sqrt(np.diag(base.fitted.covariance))
@@ -298,24 +279,14 @@ def with_own_error_at(noise: Noise, coarse: Model, point: Point) -> Noise:
 
     Parameters
     ----------
-    noise : Noise
-    coarse : Model
     point : Point
         Of the coarse model.
-
-    Returns
-    -------
-    Noise
     """
     return with_model_error(noise, model_error_columns(coarse, point, coarse.case.model_error))
 
 
 def model_that_errs(base: Baseline) -> SearchModel:
     """The model on the cells on which its own error is computed.
-
-    Parameters
-    ----------
-    base : Baseline
 
     Returns
     -------
@@ -336,13 +307,8 @@ def with_error_there(where: SearchModel, cells: CellResponses | None = None) -> 
 
     Parameters
     ----------
-    where : SearchModel
     cells : CellResponses, optional
         To the terms of `terms_that_err`, if they are known.
-
-    Returns
-    -------
-    SearchModel
     """
     columns = model_error_columns(where.model, where.point, where.model.case.model_error, cells)
     return replace(where, noise=with_model_error(where.noise, columns))
@@ -350,10 +316,6 @@ def with_error_there(where: SearchModel, cells: CellResponses | None = None) -> 
 
 def search_model(base: Baseline) -> SearchModel:
     """y_coarse = y - (f - f_coarse): the model on cells of twice the size, with the residuals of the fine one.
-
-    Parameters
-    ----------
-    base : Baseline
 
     Returns
     -------
@@ -370,10 +332,6 @@ def search_model(base: Baseline) -> SearchModel:
 
 def coarse_search(base: Baseline) -> tuple[Model, Point] | None:
     """The model on cells of twice the size on which missing effects are searched.
-
-    Parameters
-    ----------
-    base : Baseline
 
     Returns
     -------
@@ -414,10 +372,6 @@ def log_evidence(base: Baseline) -> float:
 def for_prediction(base: Baseline) -> Baseline:
     """The model calibrated for predictions on its own grid: c = 0, errors of the grid independent between stations.
 
-    Parameters
-    ----------
-    base : Baseline
-
     Returns
     -------
     Baseline
@@ -436,10 +390,6 @@ def kept_baseline(model: Model) -> Baseline:
     ----------
     model : Model
         One with code of the user, an engine or effects, is calibrated each time: it may have changed.
-
-    Returns
-    -------
-    Baseline
 
     Raises
     ------
@@ -475,7 +425,6 @@ class CommandPlace:
 
     Attributes
     ----------
-    model : Model
     z : ndarray (p,)
         That place [standard deviations of the prior].
     settled : bool
@@ -506,14 +455,8 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
 
     Parameters
     ----------
-    runs : CommandRuns
-    model : Model
     watch : callable
         Is called with each phase, and with the number of runs that are done.
-
-    Returns
-    -------
-    CommandPlace
 
     Raises
     ------

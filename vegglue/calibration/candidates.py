@@ -45,8 +45,6 @@ class Candidate:
 
     Attributes
     ----------
-    effect : Effect
-    experiments, sections, devices : tuple of str
     at : tuple of str
         Its patch or its place, as a target of `EffectIdentity`.
     fixed : tuple of (str, float)
@@ -146,7 +144,6 @@ def candidates_of(case: Case, station: pd.DataFrame) -> list[Candidate]:
 
     Parameters
     ----------
-    case : Case
     station : DataFrame
         All stations.
 
@@ -188,13 +185,8 @@ def missing_needs(case: Case, station: pd.DataFrame) -> set[Need]:
 
     Parameters
     ----------
-    case : Case
     station : DataFrame
         All stations.
-
-    Returns
-    -------
-    set of Need
     """
     used = station[station["used"]]
     kinds = [kind_of(str(name)) for name in used["kind"].unique()]
@@ -222,11 +214,6 @@ def missing_needs(case: Case, station: pd.DataFrame) -> set[Need]:
 def at_work(case: Case, candidate: Candidate) -> bool:
     """Whether this effect acts in the case just where the candidate does, whatever its key is there.
 
-    Parameters
-    ----------
-    case : Case
-    candidate : Candidate
-
     Returns
     -------
     bool
@@ -253,7 +240,6 @@ def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
 
     Parameters
     ----------
-    case : Case
     station : DataFrame
         All stations.
 
@@ -274,10 +260,6 @@ def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
 
 def candidates_in_case(case: Case) -> dict[str, Candidate]:
     """The effects of a case as candidates.
-
-    Parameters
-    ----------
-    case : Case
 
     Returns
     -------
@@ -322,10 +304,6 @@ def place_candidate(
         A plausible size [unit of the amplitude].
     above_off : bool
         Whether the amplitude may only lie above off.
-
-    Returns
-    -------
-    Candidate
     """
     at = EffectIdentity.at_place(effect.name, place["x"], place["y"]).target
     return Candidate(effect, at=at, fixed=tuple(place.items()), scale=scale, above_off=above_off)
@@ -336,15 +314,10 @@ def effect_entry(candidate: Candidate, amplitude: Value, shapes: Mapping[str, fl
 
     Parameters
     ----------
-    candidate : Candidate
     amplitude : float or str
         A number, or the name of a parameter; then the `free` shapes are parameters, too.
     shapes : mapping of float
         Values of shapes [unit of each], the default of others.
-
-    Returns
-    -------
-    EffectEntry
     """
     effect, shapes = candidate.effect, {**dict(candidate.fixed), **shapes}
     free = candidate.free if isinstance(amplitude, str) else {}
@@ -363,14 +336,8 @@ def with_effect(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -
 
     Parameters
     ----------
-    case : Case
-    candidate : Candidate
     shapes : mapping of float
         Values of its other shapes [unit of each], for those that are not fixed.
-
-    Returns
-    -------
-    Case
     """
     effects = {**case.effects, candidate.key: effect_entry(candidate, candidate.parameter, shapes)}
     parameters = {**case.parameters, **candidate.priors}
@@ -382,14 +349,8 @@ def cause_of(case: Case, candidate: Candidate, shapes: Mapping[str, float]) -> C
 
     Parameters
     ----------
-    case : Case
-    candidate : Candidate
     shapes : mapping of float
         Values of its shapes [unit of each], for those that are not fixed.
-
-    Returns
-    -------
-    Cause
     """
     shapes_as_numbers = tuple(replace(one, sd=0.0) for one in candidate.effect.shapes)
     candidate = replace(candidate, effect=replace(candidate.effect, shapes=shapes_as_numbers))
@@ -402,7 +363,6 @@ def start_amplitude(amplitude: Amplitude, gain: float) -> float:
 
     Parameters
     ----------
-    amplitude : Amplitude
     gain : float
         g [unit of the amplitude, to its power].
 
@@ -464,10 +424,6 @@ class Instrument:
 
 def plausible_offset(kind: InstrumentKind) -> float:
     """Plausible size of an instrument's offset: a reading that went wrong, or an instrument that is off.
-
-    Parameters
-    ----------
-    kind : InstrumentKind
 
     Returns
     -------
@@ -543,7 +499,6 @@ def error_columns(instrument: Instrument, value: Array) -> Array:
 
     Parameters
     ----------
-    instrument : Instrument
     value : ndarray (n,)
         y, measured at the used stations [unit of each].
 
@@ -562,7 +517,6 @@ def offset_columns(instruments: tuple[Instrument, ...], stations: int) -> Array:
 
     Parameters
     ----------
-    instruments : tuple of Instrument
     stations : int
         n, the used ones.
 

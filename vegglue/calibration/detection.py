@@ -265,10 +265,6 @@ def possible_measurements(own_variance: Array, nuisances: Array, traces: Array) 
         [J, U] [unit of the station].
     traces : ndarray (..., N, c)
         S [unit of the station per unit of gain].
-
-    Returns
-    -------
-    PossibleMeasurements
     """
     error = np.sqrt(own_variance)[..., None]
     nothing = np.zeros((*traces.shape[:-2], traces.shape[-1]))

@@ -76,7 +76,6 @@ class Places:
 
     Attributes
     ----------
-    term : Unlisted
     x, y : ndarray (spot,)
         Middles [m].
     length, width : ndarray (spot,)
@@ -127,7 +126,6 @@ class Fingerprints:
     ----------
     point : Point
         At which S is taken.
-    candidates : list of Candidate
     columns : list of ndarray of int
         Of each candidate.
     settings : list of dict of float
@@ -140,7 +138,6 @@ class Fingerprints:
         S [m/s or m per unit of gain].
     places : tuple of Places
         The spots of each term.
-    lines : SurveyedLines or None
     of_lines : ndarray (station, lines)
         By what a measurement exceeds its prediction for each m that a line is too high [unit of the station per m].
     """
@@ -179,10 +176,6 @@ def digits_of_place(half: float) -> int:
     ----------
     half : float
         Half length or half width of what lies there, the smaller one [m].
-
-    Returns
-    -------
-    int
     """
     return max(2, 1 - math.floor(math.log10(half)))
 
@@ -192,7 +185,6 @@ def fingerprints_of(search: SearchModel, half_width: float) -> Fingerprints:
 
     Parameters
     ----------
-    search : SearchModel
     half_width : float
         Of the floor of the channel [m].
 
@@ -251,8 +243,6 @@ def places_of(model: Model, point: Point, half_width: float, cells: CellResponse
 
     Parameters
     ----------
-    model : Model
-    point : Point
     half_width : float
         Of the floor of the channel [m].
     cells : CellResponses, optional
@@ -277,10 +267,6 @@ def places_of(model: Model, point: Point, half_width: float, cells: CellResponse
 def barriers(model: Model) -> GaussianBasis:
     """Spots even across the channel, as long as their effect states and as far apart.
 
-    Parameters
-    ----------
-    model : Model
-
     Returns
     -------
     GaussianBasis
@@ -298,9 +284,6 @@ def places_around(model: Model, point: Point, term: Unlisted, place: Mapping[str
 
     Parameters
     ----------
-    model : Model
-    point : Point
-    term : Unlisted
     place : mapping of float
         x, y, length and width [m].
     share : float
@@ -377,10 +360,6 @@ def _places_over(
 def least_depth(model: Model) -> float:
     """h_min = LEAST_DEPTH times the depth of the site: above it a cell counts as under water.
 
-    Parameters
-    ----------
-    model : Model
-
     Returns
     -------
     float
@@ -391,11 +370,6 @@ def least_depth(model: Model) -> float:
 
 def plausible_size(case: Case, term: Unlisted) -> float:
     """A plausible size of an unlisted object: a multiple of a scale of the site.
-
-    Parameters
-    ----------
-    case : Case
-    term : Unlisted
 
     Returns
     -------

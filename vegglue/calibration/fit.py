@@ -55,7 +55,6 @@ class MapEstimate:
 
     Attributes
     ----------
-    point : Point
     chi2 : float
         |W (y - f)|^2 [-].
     objective : float
@@ -138,8 +137,6 @@ def fit_from(model: Model, noise: Noise, z: Array, near: Point | None = None) ->
 
     Parameters
     ----------
-    model : Model
-    noise : Noise
     z : ndarray (p,)
     near : Point, optional
         To start the flow from.
@@ -185,7 +182,6 @@ def prediction_at(model: Model, z: Array, near: Point | None) -> Array | None:
 
     Parameters
     ----------
-    model : Model
     z : ndarray (p,)
     near : Point or None
         To start the flow from.
@@ -213,11 +209,6 @@ def at_point(noise: Noise, point: Point) -> MapEstimate:
 def chi2(noise: Noise, point: Point) -> float:
     """|W (y - f)|^2 over the used stations.
 
-    Parameters
-    ----------
-    noise : Noise
-    point : Point
-
     Returns
     -------
     float
@@ -231,7 +222,6 @@ def squared_misfit(noise: Noise, prediction: Array) -> float:
 
     Parameters
     ----------
-    noise : Noise
     prediction : ndarray (station,)
         f [unit of each station].
 
@@ -246,11 +236,6 @@ def squared_misfit(noise: Noise, prediction: Array) -> float:
 def objective(noise: Noise, point: Point) -> float:
     """|W (y - f)|^2 + |z|^2: -2 ln of likelihood times prior, up to a constant.
 
-    Parameters
-    ----------
-    noise : Noise
-    point : Point
-
     Returns
     -------
     float
@@ -261,11 +246,6 @@ def objective(noise: Noise, point: Point) -> float:
 
 def covariance(noise: Noise, point: Point) -> Array:
     """(J' W' W J + I)^-1,   J = df/dz: the covariance of z around a MAP estimate.
-
-    Parameters
-    ----------
-    noise : Noise
-    point : Point
 
     Returns
     -------
@@ -321,20 +301,12 @@ def freedom_of_misfit(readings: int, spread: Array) -> int:
         n.
     spread : ndarray (p, p)
         V, the covariance of z.
-
-    Returns
-    -------
-    int
     """
     return round(readings - determined(spread))
 
 
 def log_evidence_under(fitted: MapEstimate) -> float:
     """ln p(y) = -F/2 - ln|H|/2,   F the objective and H^-1 the covariance of z: Laplace's approximation.
-
-    Parameters
-    ----------
-    fitted : MapEstimate
 
     Returns
     -------
@@ -353,8 +325,6 @@ def interval95(model: Model, fitted: MapEstimate, name: str) -> tuple[float, flo
 
     Parameters
     ----------
-    model : Model
-    fitted : MapEstimate
     name : str
         Of parameter j.
 

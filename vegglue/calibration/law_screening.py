@@ -67,7 +67,6 @@ class LawInCase:
 
     Attributes
     ----------
-    law : Law
     candidate : Candidate
         With the references that are tried.
     seen : (float, float)
@@ -84,15 +83,10 @@ def laws_in_case(model: Model, point: Point, listed: Sequence[str]) -> list[LawI
 
     Parameters
     ----------
-    model : Model
     point : Point
         Of the flow.
     listed : sequence of str
         Candidate effects; laws that restate one are left out, as are laws of the case.
-
-    Returns
-    -------
-    list of LawInCase
     """
     water = _water_of(model, point)
     return [
@@ -108,16 +102,10 @@ def products_in_case(model: Model, point: Point, law: LawInCase, reference: floa
 
     Parameters
     ----------
-    model : Model
     point : Point
         Of the flow.
-    law : LawInCase
     reference : float or None
         Of that law, if it has one [unit of its quantity].
-
-    Returns
-    -------
-    list of LawInCase
     """
     water, change = _water_of(model, point), _change_of(law.law, law.seen, reference)
     products = [_in_case(product, water, reference, change) for product in PRODUCTS[law.law.name]]
@@ -258,7 +246,6 @@ class LawBeyondRange:
         Of its quantity.
     low, high : float
         The range [unit].
-    experiment : str
     share : float
         Of the cells that it acts on [-].
     at_sections : bool
@@ -280,7 +267,6 @@ def laws_beyond_their_range(model: Model, point: Point) -> Iterator[LawBeyondRan
 
     Parameters
     ----------
-    model : Model
     point : Point
         Of its flow.
 
@@ -327,7 +313,6 @@ class LawScreening:
     ----------
     listed : Screening
         Without laws.
-    laws : list of LawInCase
     kind : HypothesisKind
         Their score tests, of l columns.
     columns : list of ndarray of int
@@ -390,8 +375,6 @@ class LawFingerprints:
 
     Attributes
     ----------
-    listed : Fingerprints
-    laws : list of LawInCase
     every : Fingerprints
         Of both, listed effects first.
     """
@@ -408,15 +391,10 @@ def law_fingerprints(
 
     Parameters
     ----------
-    base : Baseline
     without : tuple of str
         Listed effects that are left out.
     known : Fingerprints, optional
         Of what is listed.
-
-    Returns
-    -------
-    LawFingerprints
     """
     search = search_model(base)
     found = known or fingerprints_of(search, half_width(base.model.site))
@@ -440,15 +418,10 @@ def screen_laws(base: Baseline, found: LawFingerprints, flagged: tuple[int, ...]
 
     Parameters
     ----------
-    base : Baseline
     found : LawFingerprints
         With one law at least.
     flagged : tuple of int
         Readings that are excluded, indices of used stations.
-
-    Returns
-    -------
-    LawScreening
     """
     full, count = screen(base, flagged, found.every, LAW_SEED), len(found.listed.settings)
     columns = [numbers - count for numbers in found.every.columns[len(found.listed.candidates) :]]
@@ -526,7 +499,6 @@ class ProductScreening:
     ----------
     full : Screening
         Of listed effects, of single laws and of products, in this order.
-    products : list of LawInCase
     kind : HypothesisKind
         Score tests of the products.
     law_of : ndarray of int
@@ -568,12 +540,6 @@ def _most_alike(near: Mapping[str, float]) -> tuple[str, ...]:
 def first_order_gain(kind: HypothesisKind, column: int, law: LawInCase) -> float:
     """g of a law by one of its columns, within LARGEST_GAIN plausible ones.
 
-    Parameters
-    ----------
-    kind : HypothesisKind
-    column : int
-    law : LawInCase
-
     Returns
     -------
     float
@@ -594,7 +560,6 @@ def screen_products(
         Calibrated with the law.
     listed : Fingerprints
         Of what is listed.
-    law : LawInCase
     reference : float or None
         Of the law, if it has one [unit of its quantity].
 

@@ -39,7 +39,6 @@ class LearnedBed:
 
     Attributes
     ----------
-    grid : Grid
     correction : ndarray (nx, ny)
         dz [m].
     before : ndarray (nx ny, k)
@@ -92,13 +91,8 @@ def bed_of_spots(learned: LearnedBed, x: Array, y: Array, length: Array, width: 
 
     Parameters
     ----------
-    learned : LearnedBed
     x, y, length, width : ndarray (spot,)
         x_0, y_0, l and w [m].
-
-    Returns
-    -------
-    BedOfSpots
     """
     grid = learned.grid
     along, across = (
@@ -120,10 +114,6 @@ def learned_bed(base: Baseline) -> LearnedBed | None:
     """dz = B F' C^-1 (y - f(z)) of a calibrated model, on the cells on which its own error was computed.
 
     Experiments with a bed of their own are left out: their flow does not depend on the bed of the others.
-
-    Parameters
-    ----------
-    base : Baseline
 
     Returns
     -------
@@ -161,7 +151,6 @@ def line_offset(loose: Baseline, line: SurveyedLine, tight: Baseline) -> tuple[f
     ----------
     loose : Baseline
         Calibrated without the level of the line.
-    line : SurveyedLine
     tight : Baseline
         With its level; its errors have no part of it.
 

@@ -85,7 +85,6 @@ class CellResponses:
 
     Attributes
     ----------
-    grid : Grid
     of : dict of ndarray (station, nx, ny)
         By term [unit of each station per that of the term].
     """
@@ -102,12 +101,6 @@ def excluded_terms(case: Case) -> set[Unlisted]:
 
 def cell_responses(model: Model, point: Point, terms: tuple[Term, ...]) -> CellResponses:
     """d prediction / d term in each cell, of all experiments in parallel.
-
-    Parameters
-    ----------
-    model : Model
-    point : Point
-    terms : tuple of Term
 
     Returns
     -------
@@ -157,15 +150,10 @@ def gaussian_basis(grid: Grid, length: float, width: float, cells: float = LEAST
 
     Parameters
     ----------
-    grid : Grid
     length, width : float
         l and w [m], made larger if they are less than `cells` cells.
     cells : float
         [-]
-
-    Returns
-    -------
-    GaussianBasis
     """
     length, width = max(length, cells * grid.dx), max(width, cells * grid.dy)
     x, y = (
@@ -180,15 +168,10 @@ def gaussian_basis_at(grid: Grid, x: Array, y: Array, length: float, width: floa
 
     Parameters
     ----------
-    grid : Grid
     x, y : ndarray (k,), (j,)
         Middles; there is a function at every pair [m].
     length, width : float
         l and w [m].
-
-    Returns
-    -------
-    GaussianBasis
     """
     along, across = (
         np.exp(-(((cells[None] - middles[:, None]) / radius) ** 2))
@@ -200,12 +183,6 @@ def gaussian_basis_at(grid: Grid, x: Array, y: Array, length: float, width: floa
 
 def responses_to_basis(responses: CellResponses, term: Term, basis: GaussianBasis) -> Array:
     """sum_cells d prediction / d term b_kj: responses to a size of one of each function.
-
-    Parameters
-    ----------
-    responses : CellResponses
-    term : Term
-    basis : GaussianBasis
 
     Returns
     -------
@@ -220,12 +197,6 @@ def responses_to_basis(responses: CellResponses, term: Term, basis: GaussianBasi
 
 def field_columns(responses: CellResponses, term: Term, basis: GaussianBasis) -> Array:
     """F with F F' the covariance of predictions under a smooth random field of variance one.
-
-    Parameters
-    ----------
-    responses : CellResponses
-    term : Term
-    basis : GaussianBasis
 
     Returns
     -------
@@ -279,10 +250,6 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError, cells: 
 def error_bases(model: Model) -> tuple[GaussianBasis, GaussianBasis]:
     """Basis functions of the errors of friction and of the bed.
 
-    Parameters
-    ----------
-    model : Model
-
     Returns
     -------
     GaussianBasis, GaussianBasis
@@ -313,7 +280,6 @@ def survey_error_columns(model: Model, cells: CellResponses) -> Array:
 
     Parameters
     ----------
-    model : Model
     cells : CellResponses
         To the bed.
 
@@ -370,9 +336,6 @@ def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: C
 
     Parameters
     ----------
-    model : Model
-    point : Point
-    allowed : ModelError
     cells : CellResponses
         To friction and, if sides of patches may lie off, to drag.
 
@@ -413,10 +376,6 @@ def site_error_columns(model: Model, point: Point, allowed: ModelError, cells: C
 
 def beside_walls(model: Model) -> Mask:
     """Which stations lie within a cell of a side wall.
-
-    Parameters
-    ----------
-    model : Model
 
     Returns
     -------

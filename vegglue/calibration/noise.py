@@ -182,13 +182,8 @@ def with_grid_error(noise: Noise, difference: Array) -> Noise:
 
     Parameters
     ----------
-    noise : Noise
     difference : ndarray (station,)
         f - f_coarse, to cells of twice the size [unit of each station].
-
-    Returns
-    -------
-    Noise
     """
     return _with_cholesky(replace(noise, grid_error=constants().grid_error_share * difference[noise.rows]))
 
@@ -206,13 +201,8 @@ def with_correlation(noise: Noise, correlation: float, scale: float) -> Noise:
 
     Parameters
     ----------
-    noise : Noise
     correlation, scale : float
         rho and s [-].
-
-    Returns
-    -------
-    Noise
     """
     certain = np.array([[correlation], [1.0]])
     return _with_cholesky(replace(noise, correlation=correlation, scale=scale, correlation_chances=certain))
@@ -228,13 +218,8 @@ def with_model_error(noise: Noise, columns: Array) -> Noise:
 
     Parameters
     ----------
-    noise : Noise
     columns : ndarray (station, k)
         See `model_error_columns` [unit of each station].
-
-    Returns
-    -------
-    Noise
     """
     used = noise.used(columns)
     return _with_cholesky(replace(noise, model_error=used @ used.T))
@@ -245,13 +230,8 @@ def with_more_error(noise: Noise, columns: Array) -> Noise:
 
     Parameters
     ----------
-    noise : Noise
     columns : ndarray (n, k)
         Of the used stations [unit of each].
-
-    Returns
-    -------
-    Noise
     """
     return _with_cholesky(replace(noise, model_error=noise.model_error + columns @ columns.T))
 
@@ -261,13 +241,8 @@ def with_unknown_errors(noise: Noise, columns: Array) -> Noise:
 
     Parameters
     ----------
-    noise : Noise
     columns : ndarray (n, k)
         c, what it can add to its readings, of standard errors s; 0 elsewhere. See `candidates.error_columns`.
-
-    Returns
-    -------
-    Noise
     """
     largest = np.where(columns != 0.0, noise.error[:, None], 0.0).max()
     unknown = UNKNOWN_ERROR * largest * columns / np.abs(columns).max(axis=0)
@@ -276,12 +251,6 @@ def with_unknown_errors(noise: Noise, columns: Array) -> Noise:
 
 def draw_whitened_errors(noise: Noise, draws: int, random: np.random.Generator) -> Array:
     """W e,   e ~ N(0, cov(rho)),   rho drawn from its posterior probabilities.
-
-    Parameters
-    ----------
-    noise : Noise
-    draws : int
-    random : Generator
 
     Returns
     -------
@@ -303,10 +272,6 @@ def _with_cholesky(noise: Noise) -> Noise:
 def covariance_of(noise: Noise) -> Array:
     """s^2 D R D + E + M + O O', see the head of this file.
 
-    Parameters
-    ----------
-    noise : Noise
-
     Returns
     -------
     ndarray (n, n)
@@ -319,10 +284,6 @@ def covariance_of(noise: Noise) -> Array:
 
 def covariance_of_data(noise: Noise) -> Array:
     """s^2 D R D: the covariance of the measurements' own errors.
-
-    Parameters
-    ----------
-    noise : Noise
 
     Returns
     -------

@@ -86,7 +86,6 @@ class Screening:
         Score tests of candidates.
     kinds : tuple of HypothesisKind
         Evidence of listed effects, of places by term, and of `instruments`, in this order.
-    instruments : dict of tuple of Instrument
     errors : ndarray (draws, n)
         Whitened errors alone [-].
     """
@@ -204,16 +203,7 @@ def screen(
 
 
 def noise_given_all(base: Baseline) -> Noise:
-    """The noise that `screen` estimates, if nothing else of a screening is needed.
-
-    Parameters
-    ----------
-    base : Baseline
-
-    Returns
-    -------
-    Noise
-    """
+    """The noise that `screen` estimates, if nothing else of a screening is needed."""
     search = search_model(base)
     fingerprints = fingerprints_of(search, half_width(base.model.site))
     instruments = instruments_of(base.model.station.iloc[base.noise.rows])
@@ -227,13 +217,8 @@ def kind_of_listed(fingerprints: Fingerprints, projected: score_test.Projected) 
 
     Parameters
     ----------
-    fingerprints : Fingerprints
     projected : Projected
         Theirs (c columns).
-
-    Returns
-    -------
-    HypothesisKind
     """
     plausible = np.array([amplitude.plausible_gain for amplitude in fingerprints.amplitudes])
     prior = np.empty(plausible.size)
@@ -250,13 +235,8 @@ def kinds_of_places(
 
     Parameters
     ----------
-    fingerprints : Fingerprints
     in_places : mapping of Projected
         Of the spots of each term.
-
-    Returns
-    -------
-    list of HypothesisKind
     """
     kinds = []
     for one in fingerprints.places:
@@ -276,17 +256,12 @@ def kinds_of_instruments(
 
     Parameters
     ----------
-    noise : Noise
     instruments : mapping of tuple of Instrument
         By kind.
     projected : mapping of Projected
         Of the offsets of each kind that has any.
     flagged : tuple of int
         Excluded readings, indices of used stations: an instrument of these alone is known to be off, and of size 0.
-
-    Returns
-    -------
-    list of HypothesisKind
     """
     kinds = []
     for name, of_kind in projected.items():
@@ -341,7 +316,6 @@ def refit_start(screening: Screening, candidate: int, column: int) -> Array:
 
     Parameters
     ----------
-    screening : Screening
     candidate, column : int
         Of the fingerprints; g is the gain by the score of the column.
 
@@ -382,10 +356,6 @@ class ConditionalScreening:
 def conditional_screenings(screening: Screening) -> tuple[ConditionalScreening, ...]:
     """ln B of each effect from the places z' where one parameter that is off is back in the middle of its prior.
 
-    Parameters
-    ----------
-    screening : Screening
-
     Returns
     -------
     tuple of ConditionalScreening
@@ -415,10 +385,6 @@ def conditional_places(search: SearchModel) -> list[Array]:
     """z' = z - z_j V_j / V_jj: where a parameter that is off is back in the middle of its prior, and others follow it.
 
     V is the covariance of z. Amplitudes of effects do not count, see `with_rivals_again`.
-
-    Parameters
-    ----------
-    search : SearchModel
 
     Returns
     -------

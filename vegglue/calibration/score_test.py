@@ -105,10 +105,6 @@ def with_evidence(projected: Projected, residual: Array, columns: Array) -> Proj
         Whitened [-].
     columns : ndarray (rows, c)
         Whitened [per unit of amplitude].
-
-    Returns
-    -------
-    Projected
     """
     seen = np.vstack([projected.fingerprints, columns])
     length = np.linalg.norm(seen, axis=0)
@@ -121,7 +117,6 @@ def scores(projected: Projected, only_sign: np.ndarray) -> Array:
 
     Parameters
     ----------
-    projected : Projected
     only_sign : ndarray (c,) of int
         The only sign that an amplitude may have, 0 for both.
 
@@ -170,17 +165,12 @@ def family_of(projected: Projected, only_sign: np.ndarray, errors: Array, seed: 
 
     Parameters
     ----------
-    projected : Projected
     only_sign : ndarray (c,) of int
         As of `scores`.
     errors : ndarray (draws, n)
         Whitened errors alone [-].
     seed : int
         Of the rows of the prior.
-
-    Returns
-    -------
-    Family
     """
     drawn = with_more_rows(errors, projected.residual.size, seed) @ projected.units.astype(np.float32)
     squares = _signed(np.asarray(drawn, dtype=np.float64), only_sign) ** 2
@@ -196,7 +186,6 @@ def with_more_rows(errors: Array, rows: int, seed: int) -> Single:
         Whitened [-].
     rows : int
         All of them, n at least.
-    seed : int
 
     Returns
     -------
@@ -279,10 +268,6 @@ def fewest_groups(found: Sequence[list[int]], chance: Array, level: float) -> li
         Of each member [-].
     level : float
         The chance to be held [-].
-
-    Returns
-    -------
-    list of list of int
     """
     ranked = sorted(found, key=lambda group: -chance[group].sum())
     held = np.cumsum([chance[group].sum() for group in ranked])
@@ -291,10 +276,6 @@ def fewest_groups(found: Sequence[list[int]], chance: Array, level: float) -> li
 
 def cosines(projected: Projected) -> Array:
     """cos_ij = S_i' S_j / |S_i| |S_j| of projected fingerprints.
-
-    Parameters
-    ----------
-    projected : Projected
 
     Returns
     -------
@@ -309,7 +290,6 @@ def alike_groups(names: Sequence[Name], cosine: Array) -> list[list[Name]]:
 
     Parameters
     ----------
-    names : sequence of str or int
     cosine : ndarray (k, k)
         Of projected fingerprints, of each pair of names [-].
 
@@ -336,8 +316,6 @@ class HypothesisKind:
 
     Attributes
     ----------
-    name : str
-    projected : Projected
     log_prior : ndarray (c,)
         ln of the chance of each column before the data [-].
     size : ndarray (c,)
@@ -392,7 +370,6 @@ def kind_of_hypotheses(
 
     Parameters
     ----------
-    name : str
     projected : Projected
         Of c fingerprints.
     plausible : ndarray (c,)
@@ -401,10 +378,6 @@ def kind_of_hypotheses(
         Chance of each column before the data, above 0 [-].
     only_sign : ndarray (c,) of int, optional
         As of `scores`.
-
-    Returns
-    -------
-    HypothesisKind
     """
     if only_sign is None:
         only_sign = np.zeros(plausible.size, dtype=int)

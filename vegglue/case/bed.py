@@ -57,14 +57,6 @@ class Raster:
 def read_raster(path: Path) -> Raster:
     """The raster in an ESRI ASCII grid: a header, then rows of values from north (largest y) to south.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Raster
-
     Raises
     ------
     InputError
@@ -150,7 +142,6 @@ def nearest_at(raster: Raster, x: Array, y: Array) -> Array:
 
     Parameters
     ----------
-    raster : Raster
     x, y : (nx, 1), (1, ny), or both (nx, ny) [m]
     """
     i = np.clip(np.rint((x - raster.x[0]) / raster.size).astype(int), 0, raster.x.size - 1)
@@ -188,11 +179,6 @@ def survey_levels(path: Path, x: Array, y: Array) -> Array:
 def read_points(path: Path, columns: Sequence[str] = ("x", "y", "z")) -> Array:
     """Columns of a CSV file, (points, columns) [m].
 
-    Parameters
-    ----------
-    path : Path
-    columns : sequence of str
-
     Raises
     ------
     InputError
@@ -222,7 +208,6 @@ def read_bed_survey(path: Path, loose: Sequence[int] = ()) -> BedSurvey:
 
     Parameters
     ----------
-    path : Path
     loose : sequence of int
         See `BedSurvey`.
 
@@ -273,8 +258,6 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
 
     Parameters
     ----------
-    layer : BedLayer
-    grid : Grid
     upstream : [m]
         x_0, that of the upstream edge of the case.
 
@@ -326,11 +309,6 @@ def spline_places(grid: Grid, covariances: Sequence[CovarianceOfBed]) -> tuple[A
 
     SPACING of their shortest length apart, or as many as there are cells.
 
-    Parameters
-    ----------
-    grid : Grid
-    covariances : sequence of CovarianceOfBed
-
     Returns
     -------
     x, y : (a,), (b,) [m]
@@ -353,7 +331,6 @@ def to_cells(values: Array, x: Array, y: Array, grid: Grid) -> Array:
     values : (a b, k)
     x, y : (a,), (b,) [m]
         See `spline_places`.
-    grid : Grid
     """
     from scipy.interpolate import make_interp_spline  # late: a case without a survey need not wait for it
 
@@ -370,8 +347,6 @@ def bed_levels(case: Case, grid: Grid, experiment: str = "") -> Array:
 
     Parameters
     ----------
-    case : Case
-    grid : Grid
     experiment : str
         Whose own layers come after those of the case, if it is named and has some.
 

@@ -44,7 +44,6 @@ class SurveyedLayer:
     ----------
     index : int
         Among the layers.
-    covariances : tuple of CovarianceOfBed
     read : BedSurvey
         The survey as read.
     level : ndarray (nx ny,)
@@ -144,11 +143,6 @@ def surveyed_lines(case: Case, grid: Grid) -> SurveyedLines:
 
     The outermost lines are no candidates: beyond them the bed may go on otherwise. Of 220 drawn surveys without a wrong
     line 5 % had one that was off by more than 4.5 standard errors, always an outermost one.
-
-    Parameters
-    ----------
-    case : Case
-    grid : Grid
 
     Raises
     ------

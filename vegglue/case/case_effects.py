@@ -21,9 +21,7 @@ def value_of(value: Value, theta: Theta, members: int) -> Array:
 
     Parameters
     ----------
-    value : float or str
     theta : mapping of str to (members,)
-    members : int
     """
     if isinstance(value, str):
         return np.array(theta[value], dtype=np.float64)
@@ -56,11 +54,8 @@ def active_effects(case: Case, experiment: str, theta: Theta, members: int) -> t
 
     Parameters
     ----------
-    case : Case
-    experiment : str
     theta : mapping of str to (members,)
         Values of the parameters in their units.
-    members : int
     """
     order = list(library(case.effect_file))
     here = [

@@ -32,10 +32,8 @@ def channel_geometry(case: Case, site: Site, experiment: str) -> ChannelGeometry
 
     Parameters
     ----------
-    case : Case
     site : Site
         On this or another grid.
-    experiment : str
     """
     stems = np.array([patch.stems for patch in case.plants.patches])
     relative = tuple((stems / stems.mean()).tolist()) if stems.size else ()
@@ -57,8 +55,6 @@ def discharges_upstream_of(case: Case, experiment: Experiment, x: float) -> list
 
     Parameters
     ----------
-    case : Case
-    experiment : Experiment
     x : [m]
 
     Returns
@@ -204,8 +200,6 @@ def expected_depth(case: Case, site: Site, experiment: Experiment) -> Array:
 
     Parameters
     ----------
-    case : Case
-    site : Site
     experiment : Experiment
         Its level is a number, or the middle of a prior.
     """
@@ -222,7 +216,6 @@ def chezy(case: Case, of: FrictionClass, coefficient: float, depth: float) -> fl
     ----------
     case : Case
         Of which the least 12 h/k_s is.
-    of : FrictionClass
     coefficient : [s m^(-1/3), m or m^1/2/s]
     depth : h [m]
     """
@@ -252,7 +245,6 @@ def site_scales(case: Case, site: Site | None = None) -> SiteScales:
 
     Parameters
     ----------
-    case : Case
     site : Site, optional
         On its grid, if it is at hand.
     """

@@ -51,10 +51,6 @@ def centreline_of(shape: CentrelineShape) -> Centreline:
 
     Through points it is a natural cubic spline, its parameter the length of the polygon. Straight parts and arcs follow
     each other, in pieces whose chords are ds sin(dtheta/2) / (dtheta/2) long.
-
-    Parameters
-    ----------
-    shape : CentrelineShape
     """
     if shape.points is not None:
         from scipy.interpolate import CubicSpline  # late: a straight grid need not wait for it
@@ -87,7 +83,6 @@ def on_map(line: Centreline, s: Array, n: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    line : Centreline
     s, n : [m]
         Places along it and to its left, of shapes that broadcast.
 
@@ -106,7 +101,6 @@ def along_and_across(line: Centreline, x: Array, y: Array) -> tuple[Array, Array
 
     Parameters
     ----------
-    line : Centreline
     x, y : (n,) [m]
     """
     size = max(DISTANCES_AT_ONCE // line.x.size, 1)
@@ -156,7 +150,6 @@ class Grid:
         Centres of the cells [m]. With a centreline, x runs along it and y across, positive to its left.
     dx, dy : float
         Size of a cell [m], with a centreline on it.
-    centreline : Centreline or None
     """
 
     x: Array
@@ -168,10 +161,6 @@ class Grid:
 
 def build_grid(case: Case) -> Grid:
     """x_i = x_0 + (i + 1/2) dx and y_j = y_0 + (j + 1/2) dy: the grid of a case.
-
-    Parameters
-    ----------
-    case : Case
 
     Raises
     ------
@@ -196,10 +185,6 @@ def build_grid(case: Case) -> Grid:
 def filter_width_of(case: Case) -> float:
     """Delta = (dx dy)^(1/2) of the cells of a case [m], if it names no other: below it eddies are not resolved.
 
-    Parameters
-    ----------
-    case : Case
-
     References
     ----------
     Deardorff (1970), doi:10.1017/S0022112070000691, in two dimensions; not checked against it.
@@ -213,7 +198,6 @@ def on_cells(case: Case, cell: tuple[float, float]) -> Case:
 
     Parameters
     ----------
-    case : Case
     cell : (dx, dy) [m]
     """
     grid = case.grid.model_copy(update={"cell": cell, "filter_width": filter_width_of(case)})
@@ -227,12 +211,7 @@ def centreline_in(case: Case) -> Centreline | None:
 
 
 def curvature_of(grid: Grid) -> Array:
-    """kappa = dtheta/ds of the centreline in each column of cells, (nx,) [1/m], positive where it turns left.
-
-    Parameters
-    ----------
-    grid : Grid
-    """
+    """kappa = dtheta/ds of the centreline in each column of cells, (nx,) [1/m], positive where it turns left."""
     if grid.centreline is None:
         return np.zeros(grid.x.size)
     edges = np.append(grid.x - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx)
@@ -240,12 +219,7 @@ def curvature_of(grid: Grid) -> Array:
 
 
 def cell_stretch(grid: Grid) -> Array:
-    """J = 1 - y kappa, the length of a cell over that on the centreline, (nx, ny) [-]; (1, 1) on a straight grid.
-
-    Parameters
-    ----------
-    grid : Grid
-    """
+    """J = 1 - y kappa, the length of a cell over that on the centreline, (nx, ny) [-]; (1, 1) on a straight grid."""
     if grid.centreline is None:
         return np.ones((1, 1))
     return np.asarray(1.0 - curvature_of(grid)[:, None] * grid.y)

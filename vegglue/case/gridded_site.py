@@ -26,12 +26,10 @@ class Site:
 
     Attributes
     ----------
-    grid : Grid
     bed : ndarray (nx, ny)
         Level of the bed [m].
     friction_class : ndarray of int (nx, ny)
         Index into `class_names`.
-    class_names : tuple of str
     patch : ndarray of int (nx, ny)
         Index into the patches of the case, of the one that covers most of a cell, -1 without plants.
     cover : ndarray (nx, ny)
@@ -108,10 +106,6 @@ def in_experiment(site: Site, experiment: str) -> Site:
 def build_site(case: Case) -> Site:
     """The site of a case on its grid.
 
-    Parameters
-    ----------
-    case : Case
-
     Returns
     -------
     Site
@@ -146,7 +140,6 @@ def cells_at(site: Site, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray
 
     Parameters
     ----------
-    site : Site
     x, y : (n,) [m]
 
     Returns

@@ -27,7 +27,6 @@ def quantile(prior: Parameter, probability: ArrayLike) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    prior : Parameter
     probability : array_like
         Shares [-]; at 0 and 1 the result is a bound of the prior, which may be infinite.
 
@@ -66,7 +65,6 @@ def probability(prior: Parameter, value: ArrayLike) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    prior : Parameter
     value : array_like
         x [unit of the prior].
 
@@ -102,11 +100,6 @@ def _standard_bounds(mean: float, sd: float, low: float | None, high: float | No
 def sample_prior(parameters: Mapping[str, Parameter], members: int, seed: int) -> dict[str, NDArray[np.float64]]:
     """x_ij = F_j^-1(s_ij) with s the `sobol_points`.
 
-    Parameters
-    ----------
-    parameters : mapping of str to Parameter
-    members, seed : int
-
     Returns
     -------
     dict of str to (members,) [unit of its prior]
@@ -119,10 +112,6 @@ def sample_prior(parameters: Mapping[str, Parameter], members: int, seed: int) -
 
 def sobol_points(parameters: int, members: int, seed: int) -> NDArray[np.float64]:
     """s_ij, the first points of the scrambled Sobol' sequence in the unit cube.
-
-    Parameters
-    ----------
-    parameters, members, seed : int
 
     Returns
     -------
@@ -161,7 +150,6 @@ def theta_at(case: Case, z: Array) -> dict[str, Array]:
 
     Parameters
     ----------
-    case : Case
     z : (m, p) or (p,) [-]
         Held within FURTHEST of 0.
     """
@@ -173,7 +161,6 @@ def z_at(case: Case, theta: dict[str, Array]) -> Array:
 
     Parameters
     ----------
-    case : Case
     theta : dict of str to (m,) [its unit]
     """
     columns = [_normal(prior, theta[name]) for name, prior in case.parameters.items()]
@@ -185,7 +172,6 @@ def z_of(prior: Parameter, value: float) -> float:
 
     Parameters
     ----------
-    prior : Parameter
     value : [unit of the prior]
     """
     return float(_normal(prior, np.array([value]))[0])
@@ -224,10 +210,6 @@ def sobol_sample(case: Case) -> PriorSample:
     ----------
     case : Case
         With the priors F_j, the number of members and the seed.
-
-    Returns
-    -------
-    PriorSample
     """
     return sample_at(case, sobol_points(len(case.parameters), case.simulate.members, case.simulate.seed))
 
@@ -242,7 +224,6 @@ def sample_of(case: Case, theta: Mapping[str, Array]) -> PriorSample:
 
     Parameters
     ----------
-    case : Case
     theta : mapping of str to (m,) [its unit]
     """
     values = {name: np.asarray(theta[name], dtype=np.float64) for name in case.parameters}
@@ -255,7 +236,6 @@ def parameters_at(case: Case, points: Array) -> dict[str, Array]:
 
     Parameters
     ----------
-    case : Case
     points : s (m, p) [-]
     """
     return {name: quantile(prior, points[:, j]) for j, (name, prior) in enumerate(case.parameters.items())}
@@ -271,7 +251,6 @@ def value_at(case: Case, value: Value, share: float) -> float:
 
     Parameters
     ----------
-    case : Case
     value : float or str
         A number, or the name of a parameter.
     share : float
@@ -290,7 +269,6 @@ def prior_range(case: Case, value: Value) -> Bounds:
 
     Parameters
     ----------
-    case : Case
     value : float or str
         A number, or the name of a parameter.
     """

@@ -60,10 +60,6 @@ def case_hash(case: Case) -> str:
 
     Its title and what is planned are not in it: no result depends on them.
 
-    Parameters
-    ----------
-    case : Case
-
     Returns
     -------
     str

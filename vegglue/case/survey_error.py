@@ -117,7 +117,6 @@ def correlation_of_bed(places: Array, others: Array, along: float, across: float
     ----------
     places, others : (n, >= 2), (m, >= 2) [m]
     along, across : l_x, l_y [m]
-    rough : bool
     """
     from scipy.spatial.distance import cdist  # late: a case without a survey need not wait for it
 
@@ -221,11 +220,6 @@ def covariances_beside_wrong_line(survey: BedSurvey) -> list[CovarianceOfBed]:
 
 def left_out(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> tuple[Array, Array]:
     """(Q_ii)^-1 (Q z)_i of each line i: reading less prediction with it left out; of a point in no line, itself.
-
-    Parameters
-    ----------
-    survey : BedSurvey
-    covariances : sequence of CovarianceOfBed
 
     Returns
     -------

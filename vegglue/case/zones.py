@@ -24,11 +24,6 @@ def corners_of(case: Case, patch: Patch) -> Array:
     """Corners (x, y) of a patch in order around it in the coordinates of the grid, (corners, 2) [m].
 
     A polygon is given on the map: along a centreline its sides bend, so that they are cut into short ones.
-
-    Parameters
-    ----------
-    case : Case
-    patch : Patch
     """
     line = centreline_in(case)
     if patch.polygon is not None and line is not None:
@@ -94,12 +89,6 @@ def share_in_patch(case: Case, patch: Patch, grid: Grid) -> Array:
 
     Of a polygon: lengths within it along LINES_IN_ROW lines of each row. A line enters it where it crosses the outline
     for the first, third .. time, and leaves it in between.
-
-    Parameters
-    ----------
-    case : Case
-    patch : Patch
-    grid : Grid
     """
     if patch.polygon is None:
         along, across = _share_in_range(patch.x, grid.x, grid.dx), _share_in_range(patch.y, grid.y, grid.dy)
@@ -157,7 +146,6 @@ def slope(bed: Array, grid: Grid) -> Array:
     Parameters
     ----------
     bed : (nx, ny) [m]
-    grid : Grid
     """
     along, across = np.gradient(bed, grid.dx, grid.dy)
     return np.hypot(along / cell_stretch(grid), across)
@@ -168,8 +156,6 @@ def friction_classes(case: Case, grid: Grid, bed: Array) -> NDArray[np.int64]:
 
     Parameters
     ----------
-    case : Case
-    grid : Grid
     bed : (nx, ny) [m]
 
     Raises
@@ -246,11 +232,6 @@ def ranges_without_cells(case: Case, grid: Grid) -> Iterator[str]:
 
 def refuse_ranges_without_cells(case: Case, grid: Grid) -> None:
     """Refuse a grid on which an inflow or the outlet has no cell.
-
-    Parameters
-    ----------
-    case : Case
-    grid : Grid
 
     Raises
     ------

@@ -57,10 +57,6 @@ def candidate_effects_of(screening: Screening) -> dict[str, CandidateEffect]:
     s and a are those of `score_test`, F the objective under the errors as they are now: the prior of the amplitude is
     in all of them, as in those of a refit.
 
-    Parameters
-    ----------
-    screening : Screening
-
     Returns
     -------
     dict of CandidateEffect
@@ -115,10 +111,6 @@ def not_excluded(screening: Screening) -> tuple[tuple[str, ...], ...]:
 
     One is taken to be there, of UNDETECTED_LENGTHS, and at a possible size, see `score_test.chances`.
 
-    Parameters
-    ----------
-    screening : Screening
-
     Returns
     -------
     tuple of tuple of str
@@ -138,10 +130,6 @@ LAWS_HELD = 0.95
 
 def laws_beside(screening: Screening) -> LawScreening | None:
     """Laws screened beside all that is listed.
-
-    Parameters
-    ----------
-    screening : Screening
 
     Returns
     -------
@@ -169,8 +157,6 @@ def candidate_laws(
 
     Parameters
     ----------
-    first, last : Screening
-    found : SearchState
     beside_first, beside_last : callable
         `laws_beside` either screening; the first is begun before it is known whether it is needed.
     refitted : callable
@@ -264,7 +250,6 @@ def same_as_accepted(screening: LawScreening, accepted: Sequence[str]) -> NDArra
 
     Parameters
     ----------
-    screening : LawScreening
     accepted : sequence of str
         Names of effects.
 

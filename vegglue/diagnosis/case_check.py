@@ -19,12 +19,6 @@ def critical_remarks(case: Case, site: Site, observations: Observations) -> list
     Wrong units, signs, marks of missing values, outlets that no water reaches, and sections that carry another
     discharge than stated.
 
-    Parameters
-    ----------
-    case : Case
-    site : Site
-    observations : Observations
-
     Returns
     -------
     list of dataclass instances
@@ -53,7 +47,6 @@ def check_case(case: Case, site: Site, observations: Observations) -> list[objec
 
     Parameters
     ----------
-    case : Case
     site : Site
         Of the case, on its grid.
     observations : Observations

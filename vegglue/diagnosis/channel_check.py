@@ -77,10 +77,8 @@ class PatchAreaMissed:
 
     Attributes
     ----------
-    patch : str
     area, covered : float
         Of the patch and of its cells [m2].
-    beyond : BeyondGrid or None
     """
 
     patch: str
@@ -139,7 +137,6 @@ class SurveyLeftOut:
 
     Attributes
     ----------
-    count : int
     error, stated, straight : float
         Root mean square of errors, of stated ones, and of those of straight lines between the neighbours [m].
     most : float
@@ -206,10 +203,8 @@ class CanopyEmergent:
 
     Attributes
     ----------
-    stand : str
     height : (float, float)
         Within 95 % of the prior [m].
-    experiments : tuple of str
     depths : tuple of float
         Largest depth there in each experiment [m].
     always : bool
@@ -232,10 +227,8 @@ class CanopyUnlikeMeasured:
 
     Attributes
     ----------
-    section, experiment : str
     measured : float
         [m]
-    stand : str
     height : (float, float)
         95 % of the prior [m].
     """
@@ -253,7 +246,6 @@ class BankLawHeld:
 
     Attributes
     ----------
-    friction_class : str
     k_s : float
         [m]
     up_to : bool
@@ -452,12 +444,6 @@ def remarks_on_unnamed_banks(case: Case, site: Site) -> Iterator[SteepCellsLikeF
 def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> Iterator[object]:
     """Canopies above the expected water, stands that are dry, and heights that differ from those measured.
 
-    Parameters
-    ----------
-    case : Case
-    site : Site
-    observations : Observations
-
     Yields
     ------
     StandDry
@@ -496,11 +482,6 @@ def remarks_on_canopies(case: Case, site: Site, observations: Observations) -> I
 
 def remarks_on_bank_law(case: Case, site: Site) -> Iterator[BankLawHeld]:
     """Cells without plants in which 12 h / k_s of the law of the banks is held at its lower bound.
-
-    Parameters
-    ----------
-    case : Case
-    site : Site
 
     Yields
     ------

@@ -39,14 +39,8 @@ def candidate_named(case: Case, station: pd.DataFrame, name: str) -> Candidate:
 
     Parameters
     ----------
-    case : Case
     station : DataFrame
         All stations.
-    name : str
-
-    Returns
-    -------
-    Candidate
 
     Raises
     ------
@@ -124,11 +118,6 @@ def spread_over_its_error(anomaly: LocalAnomaly) -> LocalAnomaly:
 def candidate_at(case: Case, anomaly: LocalAnomaly) -> Candidate:
     """The effect that stands for a local anomaly, at its place.
 
-    Parameters
-    ----------
-    case : Case
-    anomaly : LocalAnomaly
-
     Returns
     -------
     Candidate
@@ -142,13 +131,8 @@ def with_additions(parent: Case, added: Sequence[tuple[Candidate, Mapping[str, f
 
     Parameters
     ----------
-    parent : Case
     added : sequence of (Candidate, mapping of float)
         Effects with values of their shapes [unit of each].
-
-    Returns
-    -------
-    Case
     """
     child = parent
     for candidate, shapes in added:
@@ -161,14 +145,8 @@ def child_tree(parent: Case, target: Path, added: Sequence[tuple[Candidate, Mapp
 
     Parameters
     ----------
-    parent : Case
-    target : Path
     added : sequence of (Candidate, mapping of float)
         Effects with values of their shapes [unit of each].
-
-    Returns
-    -------
-    Tree
 
     Raises
     ------
@@ -199,15 +177,10 @@ def relevelled_tree(parent: Case, relevelled: Case, target: Path) -> Tree:
 
     Parameters
     ----------
-    parent : Case
     relevelled : Case
         With that bed.
     target : Path
         File of the child; paths are relative to its folder.
-
-    Returns
-    -------
-    Tree
     """
     here, layers = target.resolve().parent, list[Tree]()
     for layer in relevelled.bed:

@@ -69,13 +69,8 @@ def held_out_errors(base: Baseline, held_out: Model) -> HeldOutErrors:
 
     Parameters
     ----------
-    base : Baseline
     held_out : Model
         The model at stations that no calibration uses.
-
-    Returns
-    -------
-    HeldOutErrors
 
     References
     ----------
@@ -130,7 +125,6 @@ def unseen_errors(base: Baseline, unseen: Model, there: Point) -> UnseenErrors |
 
     Parameters
     ----------
-    base : Baseline
     unseen : Model
         At these stations.
     there : Point
@@ -174,7 +168,6 @@ def errors_elsewhere(where: SearchModel, at_stations: Array, there: Array, point
 
     Parameters
     ----------
-    where : SearchModel
     at_stations, there : ndarray (stations, p + m)
         [J, M] and [J_e, M_e].
     point : Point
@@ -202,10 +195,6 @@ def largest_error_between(base: Baseline) -> float:
     e is that of `errors_elsewhere`, s^2 the mean square of the errors of data and site. What a survey leaves open of
     the bed, and where patches end, is in its cov and not in M_e: errors of the site that are stated are no room for a
     missing effect. A reading there would be judged by them, so that e counts in the errors of the data and of the site.
-
-    Parameters
-    ----------
-    base : Baseline
 
     Returns
     -------
@@ -321,10 +310,6 @@ MEASUREMENT = ["experiment", "kind", "section", "x", "y", "value"]
 def excluded_by(*found: Diagnosis) -> pd.DataFrame:
     """The measurements that any of the diagnoses has flagged.
 
-    Parameters
-    ----------
-    *found : Diagnosis
-
     Returns
     -------
     DataFrame
@@ -346,7 +331,6 @@ def without_stations(station: pd.DataFrame, aside: pd.DataFrame) -> pd.DataFrame
 
     Parameters
     ----------
-    station : DataFrame
     aside : DataFrame
         With the columns of MEASUREMENT, all of which have to be the same.
 
@@ -443,7 +427,6 @@ def held_out_rmse(score: ModelScore, by: By = "sections", untold: Collection[str
 
     Parameters
     ----------
-    score : ModelScore
     by : {"sections", "experiments"}
         What is left out in turn.
     untold : collection of str
@@ -465,10 +448,6 @@ def model_score_in_short(score: ModelScore) -> str:
 
 def model_score_json(score: ModelScore) -> dict[str, Any]:
     """Every number of a model that is printed.
-
-    Parameters
-    ----------
-    score : ModelScore
 
     Returns
     -------
@@ -503,7 +482,6 @@ def improvement(
 
     Parameters
     ----------
-    before, after : ModelScore
     by : {"sections", "experiments"}
         What is left out in turn.
     untold : collection of str
@@ -533,10 +511,6 @@ def improvement(
 
 def homogeneity(base: Baseline) -> dict[str, float]:
     """P that a parameter is the same in all experiments, each moved to by one linear step; the test of `transfer`.
-
-    Parameters
-    ----------
-    base : Baseline
 
     Returns
     -------

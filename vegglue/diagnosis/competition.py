@@ -274,9 +274,6 @@ def possible_change(model: Model, point: Point, term: Unlisted | Term, x: float,
 
     Parameters
     ----------
-    model : Model
-    point : Point
-    term : Unlisted or Term
     x, y : float
         [m]
 
@@ -306,10 +303,6 @@ def cannot_be(interval: tuple[float, float], possible: tuple[float, float]) -> b
     ----------
     interval, possible : (float, float)
         Low and high, in one unit; see `possible_change`.
-
-    Returns
-    -------
-    bool
     """
     return interval[0] > possible[1] or interval[1] < possible[0]
 
@@ -470,7 +463,6 @@ def found_patch(
 
     Parameters
     ----------
-    search : SearchModel
     places : Places
         Spots of drag.
     kind : HypothesisKind
@@ -580,7 +572,6 @@ class Hypothesis:
     ----------
     kind : str
         "effect", a term at a place, or an instrument's kind.
-    name : str
     log_evidence : float
         E [-], -inf of what cannot be.
     column : int
@@ -614,7 +605,6 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
 
     Parameters
     ----------
-    screening : Screening
     watch : callable
         Is called with each phase.
     elsewhere : float
@@ -707,7 +697,6 @@ def somewhere_of(screening: Screening, places: Places, ends: Sequence[tuple[int,
 
     Parameters
     ----------
-    screening : Screening
     places : Places
         The spots of the term.
     ends : sequence of (int, Refit)
@@ -737,7 +726,6 @@ def with_patch(screening: Screening, found: Sequence[Hypothesis]) -> list[Hypoth
 
     Parameters
     ----------
-    screening : Screening
     found : sequence of Hypothesis
         All so far. The plants are fitted from where most drag is promised, and from the place that has most evidence if
         that is a spot away.
@@ -777,8 +765,6 @@ def with_extent(screening: Screening, one: Hypothesis, outline: Mapping[str, flo
 
     Parameters
     ----------
-    screening : Screening
-    one : Hypothesis
     outline : mapping of float
         x, y, half length and half width [m] from which a fit starts besides that of the spot.
 
@@ -804,10 +790,6 @@ def with_extent(screening: Screening, one: Hypothesis, outline: Mapping[str, flo
 
 def chances_of(hypotheses: Sequence[Hypothesis]) -> Array:
     """p_j of each hypothesis to be what is missing, were it one of them: `tempered_probabilities`.
-
-    Parameters
-    ----------
-    hypotheses : sequence of Hypothesis
 
     Returns
     -------
@@ -882,7 +864,6 @@ def promising_spots(screening: Screening, places: Places, best: float) -> list[i
 
     Parameters
     ----------
-    screening : Screening
     places : Places
         The spots of one term.
     best : float
@@ -937,11 +918,6 @@ def under_larger_errors(evidence: Array, left: Array, before: float, readings: i
 
 def evidence_under_larger_errors(screening: Screening, hypotheses: Sequence[Hypothesis]) -> Array:
     """`under_larger_errors` of hypotheses, refitted or to first order.
-
-    Parameters
-    ----------
-    screening : Screening
-    hypotheses : sequence of Hypothesis
 
     Returns
     -------

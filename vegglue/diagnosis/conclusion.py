@@ -89,8 +89,6 @@ def misfit_zones(model: Model, noise: Noise, point: Point, excluded: Sequence[in
 
     Parameters
     ----------
-    model : Model
-    noise : Noise
     point : Point
         At which r = y - f is taken.
     excluded : sequence of int
@@ -174,8 +172,6 @@ def assemble_diagnosis(
 
     Parameters
     ----------
-    first, last : Screening
-    found : SearchState
     effects : mapping of CandidateEffect
         Every candidate by its name.
     held_out : Model or None
@@ -184,10 +180,6 @@ def assemble_diagnosis(
         `laws_beside` the first screening.
     watch : callable
         Is called with each phase.
-
-    Returns
-    -------
-    Diagnosis
     """
     refitted, measured_bed = partial(laws_beside_accepted, watch=watch), submit(_measured_bed, last, found)
     laws = candidate_laws(first, last, found, laws_beside_first, partial(laws_beside, last), refitted)
@@ -381,11 +373,6 @@ def _verdict(
 def single_readings(noise: Noise, found: SearchState) -> list[int]:
     """Single readings that are excluded.
 
-    Parameters
-    ----------
-    noise : Noise
-    found : SearchState
-
     Returns
     -------
     list of int
@@ -402,11 +389,6 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
 
     Odds are same_kind_odds for few_sections, strong_odds for more. Scores and evidence are those of the first screening
     without the rows of the section.
-
-    Parameters
-    ----------
-    first : Screening
-    found : SearchState
 
     Returns
     -------
@@ -466,11 +448,6 @@ def strained_without_a_section(base: Baseline, parameter: str) -> tuple[str, flo
 
     Calibrated again without the velocities of the section that moves it there most, to first order.
 
-    Parameters
-    ----------
-    base : Baseline
-    parameter : str
-
     Returns
     -------
     (str, float) or None
@@ -528,7 +505,6 @@ def mapped_places(case: Case, places: Sequence[tuple[float, float]]) -> Iterator
 
     Parameters
     ----------
-    case : Case
     places : sequence of (float, float)
         x, y [m].
 
@@ -554,7 +530,6 @@ def measured_stretch(case: Case, station: pd.DataFrame) -> Iterator[MeasuredStre
 
     Parameters
     ----------
-    case : Case
     station : DataFrame
         All stations.
 
@@ -597,10 +572,8 @@ def shear_layers(model: Model, point: Point, places: Sequence[LocalAnomaly]) -> 
 
     Parameters
     ----------
-    model : Model
     point : Point
         Whose flows hold the depth; at each place the experiment with the deepest water counts.
-    places : sequence of LocalAnomaly
 
     Yields
     ------
@@ -623,8 +596,6 @@ def significant_effects(last: Screening, found: SearchState, slack: float = 0.0)
 
     Parameters
     ----------
-    last : Screening
-    found : SearchState
     slack : float
         By how much scores are made smaller first [standard errors].
 
@@ -645,7 +616,6 @@ def misfit_of(first: Screening, last: Screening, flagged: tuple[int, ...]) -> Mi
 
     Parameters
     ----------
-    first, last : Screening
     flagged : tuple of int
         Excluded readings, indices among the used stations.
 
@@ -745,10 +715,6 @@ def field_goes_first(log_factor: float, gained: float) -> bool:
         E_field [-].
     gained : float
         E of all that was accepted [-].
-
-    Returns
-    -------
-    bool
     """
     ahead = (log_factor - max(gained, 0.0)) / tempering(np.array(log_factor))
     return bool(ahead > np.log(constants().field_odds))

@@ -141,15 +141,10 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
 
     Parameters
     ----------
-    model : Model
     watch : callable
         Is called with each phase.
     unseen : Model, optional
         The model at measurements that no calibration uses, with which silence has to agree.
-
-    Returns
-    -------
-    Diagnosis
 
     Raises
     ------
@@ -275,8 +270,6 @@ def branch_with(
 
     Parameters
     ----------
-    screening : Screening
-    hypotheses : sequence of Hypothesis
     j : int
         Which of them.
     found : SearchState

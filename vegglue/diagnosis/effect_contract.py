@@ -130,8 +130,6 @@ class Breach:
     ----------
     rule : ContractRule
         Which also states what the others hold.
-    name : str
-    values : tuple of float
     water : {"still", "moving", "backward", "no", ""}
     """
 
@@ -163,15 +161,10 @@ def trial(effect: Effect, own: Path | None = None, scale: float = 1.0) -> Trial:
 
     Parameters
     ----------
-    effect : Effect
     own : Path, optional
         The file of the effect, if it is a user's.
     scale : float
         Of all lengths of the channel [-].
-
-    Returns
-    -------
-    Trial
     """
     works = {effect.name: {"values": {effect.amplitude.name: AMPLITUDE}}}
     case = Case.model_validate(channel_at(scale) | {"source": Path("contract"), "effect_file": own, "effects": works})
@@ -230,7 +223,6 @@ def answer(tried: Trial, problem: Problem, state: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    tried : Trial
     problem : Problem
         Of m members.
     state : ndarray (nx, 3, ny, m)
@@ -259,7 +251,6 @@ def breaches(effect: Effect, own: Path | None = None, scale: float = 1.0) -> lis
 
     Parameters
     ----------
-    effect : Effect
     own : Path, optional
         The file of the effect, if it is a user's.
     scale : float

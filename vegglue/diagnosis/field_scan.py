@@ -51,7 +51,6 @@ class FieldHypothesis:
 
     Attributes
     ----------
-    term : Term
     over : GaussianBasis
         Its basis functions.
     size : float
@@ -98,7 +97,6 @@ def scanned_fields(search: SearchModel, half_width: float) -> tuple[list[FieldHy
 
     Parameters
     ----------
-    search : SearchModel
     half_width : float
         Of the floor of the channel [m].
 
@@ -132,7 +130,6 @@ def fields_by_evidence(search: SearchModel, half_width: float) -> tuple[list[Fie
 
     Parameters
     ----------
-    search : SearchModel
     half_width : float
         Of the floor of the channel [m].
 
@@ -162,14 +159,8 @@ def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypoth
 
     Parameters
     ----------
-    search : SearchModel
     responses : CellResponses
         Of the predictions to the term in each cell.
-    one : FieldHypothesis
-
-    Returns
-    -------
-    FieldMap
     """
     whole, residual = free_of_prior(search)
     along, across = one.over.along, one.over.across
@@ -194,10 +185,6 @@ def map_of_field(search: SearchModel, responses: CellResponses, one: FieldHypoth
 
 def free_of_prior(search: SearchModel) -> tuple[Array, Array]:
     """C + J J' and y - f(z) + J z: covariance and residual at the middle of the prior, to first order.
-
-    Parameters
-    ----------
-    search : SearchModel
 
     Returns
     -------

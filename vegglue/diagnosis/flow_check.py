@@ -67,7 +67,6 @@ class DischargeUnlike:
 
     Attributes
     ----------
-    experiment : str
     x : float
         Where it was measured [m].
     value : float
@@ -103,7 +102,6 @@ class OutletDry:
 
     Attributes
     ----------
-    experiment : str
     level, bed : float
         At the outlet, and the lowest of its bed [m].
     measured : bool
@@ -152,7 +150,6 @@ class Supercritical:
 
     Attributes
     ----------
-    experiment : str
     slope : float
         Of the floor [-].
     froude : float
@@ -189,7 +186,6 @@ class ComponentsExchanged:
 
     Attributes
     ----------
-    experiments : tuple of str
     along, across : float
         Median |u| and |v| of the first [m/s].
     """
@@ -205,7 +201,6 @@ class FlowUpstream:
 
     Attributes
     ----------
-    experiments : tuple of str
     median : float
         Of the first [m/s].
     on_centreline : bool
@@ -232,7 +227,6 @@ class LevelsRiseDownstream:
 
     Attributes
     ----------
-    experiments : tuple of str
     rises : tuple of float
         Of each [m].
     first, last : float
@@ -251,8 +245,6 @@ class VelocitiesTurned:
 
     Attributes
     ----------
-    side : str
-    experiments : tuple of str
     angles : tuple of float
         Mean of each experiment to that side [degrees].
     sections : int
@@ -309,7 +301,6 @@ def dry_outlets(case: Case, site: Site) -> dict[str, float]:
     ----------
     case : Case
         Of a prior the middle counts.
-    site : Site
 
     Returns
     -------
@@ -343,8 +334,6 @@ def remarks_on_measured_discharges(case: Case, site: Site, observations: Observa
 
     Parameters
     ----------
-    case : Case
-    site : Site
     observations : Observations
         Q, se: of the measured discharges.
 
@@ -398,8 +387,6 @@ def even_froude(case: Case, site: Site, experiment: Experiment, slope: float) ->
 
     Parameters
     ----------
-    case : Case
-    site : Site
     experiment : Experiment
         Whose whole discharge over the width of the floor is q, as if there were neither banks nor plants.
     slope : float
@@ -486,11 +473,6 @@ def _median(rows: pd.DataFrame) -> float:
 def exchanged_components(case: Case, observations: Observations) -> dict[str, tuple[float, float]]:
     """median|v| > median|u|: experiments with more water across than along, exchanged or of the map.
 
-    Parameters
-    ----------
-    case : Case
-    observations : Observations
-
     Returns
     -------
     dict of (float, float)
@@ -508,11 +490,6 @@ def rising_levels(case: Case, observations: Observations) -> dict[str, tuple[flo
 
     i and j are neighbours, or the first and the last gauge. The head of the fastest velocity u, which a widening may
     give back, counts between neighbours of more than two gauges.
-
-    Parameters
-    ----------
-    case : Case
-    observations : Observations
 
     Returns
     -------

@@ -41,10 +41,6 @@ OF_WALLS = HandbookRange(0.008, 0.018, "chow-walls")
 def parameter_doubts(base: Baseline) -> Iterator[EstimateAtBound | BeyondHandbook | EstimateOffPrior]:
     """Parameters at an end of their prior, beyond handbooks, or more than OFF_STATED off what was stated.
 
-    Parameters
-    ----------
-    base : Baseline
-
     Yields
     ------
     EstimateAtBound, BeyondHandbook or EstimateOffPrior

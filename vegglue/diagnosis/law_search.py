@@ -56,7 +56,6 @@ class LawFound:
 
     Attributes
     ----------
-    law : Law
     same_as : str
         The listed effect that it restates, '' for none.
     reference, first : float or None
@@ -234,13 +233,8 @@ def effect_text(laws: Sequence[LawFound], own: Path | None) -> str:
 
     Parameters
     ----------
-    laws : sequence of LawFound
     own : Path or None
         The file of the case's own effects, which are kept.
-
-    Returns
-    -------
-    str
 
     Raises
     ------
@@ -289,7 +283,6 @@ def product_beside(
         Without the law.
     listed : Fingerprints
         Of what is listed there.
-    law : LawInCase
     refit : Refit
         Of the law.
     watch : callable
@@ -340,15 +333,10 @@ def discover_laws(model: Model, without: Sequence[str], watch: Watch) -> Discove
 
     Parameters
     ----------
-    model : Model
     without : sequence of str
         Listed effects that do not compete.
     watch : callable
         Is called with each phase.
-
-    Returns
-    -------
-    Discovery
 
     Raises
     ------
@@ -364,7 +352,6 @@ def laws_beyond(base: Baseline, without: Sequence[str], watch: Watch) -> Discove
 
     Parameters
     ----------
-    base : Baseline
     without : sequence of str
         Listed effects that do not compete.
     watch : callable
@@ -423,7 +410,6 @@ def refitted_laws(screening: LawScreening, known: float, watch: Watch) -> tuple[
 
     Parameters
     ----------
-    screening : LawScreening
     known : float
         ln evidence of the best of all else [-].
     watch : callable
@@ -481,12 +467,10 @@ def laws_beside_accepted(
 
     Parameters
     ----------
-    screening : LawScreening
     accepted : sequence of str
         Names of listed effects.
     log_prior, known : float
         ln prior of the accepted effect, and ln evidence of the best of all but laws [-].
-    watch : callable
 
     Returns
     -------

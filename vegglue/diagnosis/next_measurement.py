@@ -55,7 +55,6 @@ class MeasurementPlan:
 
     Attributes
     ----------
-    name : str
     rows : ndarray of int
         Of its stations in the extended table.
     stations : DataFrame
@@ -85,7 +84,6 @@ class MeasurementWorth:
 
     Attributes
     ----------
-    plan : MeasurementPlan
     now, then : ndarray (rival,)
         The least D^2 between each rival and any other, now and with it [-].
     """
@@ -105,8 +103,6 @@ def worth_of_measurements(
 
     Parameters
     ----------
-    model : Model
-    noise : Noise
     here : Point
         The calibrated model.
     questions : sequence of sequence of (Candidate, dict of float, float)
@@ -166,7 +162,6 @@ def planned(model: Model, case: Case) -> tuple[Model, list[MeasurementPlan]]:
 
     Parameters
     ----------
-    model : Model
     case : Case
         That of the model with further experiments, each with the bed of the one it is like, which may have its own.
 
@@ -201,11 +196,6 @@ def surveys(model: Model, point: Point) -> list[MeasurementPlan]:
 
     are the columns that a line of bed levels takes: A the responses of the stations to the bed's errors, B_l these
     errors on the line, s the error of a level. Outlines of plants that are levelled in keep a fifth of their error.
-
-    Parameters
-    ----------
-    model : Model
-    point : Point
 
     Returns
     -------
@@ -298,7 +288,6 @@ def with_other_discharges(model: Model, lower: Sequence[float]) -> Case:
 
     Parameters
     ----------
-    model : Model
     lower : sequence of float
         Shares of the lowest discharge [-], beside HIGHER ones of the highest.
 

@@ -58,7 +58,6 @@ class RefitTrial:
 
     Attributes
     ----------
-    candidate : Candidate
     shapes : mapping of float
         Values of its shapes [unit of each].
     starts : tuple of ndarray (p + q,)
@@ -79,7 +78,6 @@ class Refit:
 
     Attributes
     ----------
-    candidate : Candidate
     shapes : mapping of float
         [unit of each]
     fitted : MapEstimate
@@ -111,8 +109,6 @@ def refits_of(search: SearchModel, trials: Sequence[RefitTrial], watch: Watch = 
 
     Parameters
     ----------
-    search : SearchModel
-    trials : sequence of RefitTrial
     watch : callable
         Is called with the number of refits that are done.
 
@@ -165,7 +161,6 @@ def calibrated_with(base: Baseline, best: Refit) -> Baseline | None:
 
     Parameters
     ----------
-    base : Baseline
     best : Refit
         On the cells of the search.
 
@@ -196,7 +191,6 @@ class Relevelled:
 
     Attributes
     ----------
-    base : Baseline
     log_factor : float
         ln B of an offset of that line against none, by survey and flow [-].
     offset, error : float
@@ -215,11 +209,6 @@ def relevelled(base: Baseline, line: SurveyedLine) -> Relevelled | None:
         ln B = ln p(y | its level unknown) - ln p(y | its level as surveyed) + ln B of the survey alone
 
     What the survey says of the offset is the prior of the flow in the first term, and counts once.
-
-    Parameters
-    ----------
-    base : Baseline
-    line : SurveyedLine
 
     Returns
     -------
@@ -255,7 +244,6 @@ def pruned(base: Baseline, earlier: list[str], watch: Watch) -> tuple[Baseline, 
 
     Parameters
     ----------
-    base : Baseline
     earlier : list of str
         Names of effects.
     watch : callable
@@ -290,10 +278,6 @@ def is_near_off(interval: tuple[float, float, float], off: float) -> bool:
         a and its 95 % range [its unit].
     off : float
         [its unit]
-
-    Returns
-    -------
-    bool
     """
     middle, low, high = interval
     return abs(middle - off) <= constants().needed_errors * (high - low) / (2.0 * NORMAL95)
@@ -304,7 +288,6 @@ def without_effect(base: Baseline, one: Candidate) -> Baseline | None:
 
     Parameters
     ----------
-    base : Baseline
     one : Candidate
         As it stands in the case.
 

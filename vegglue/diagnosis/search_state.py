@@ -41,7 +41,6 @@ class PriorWeight:
 
     Attributes
     ----------
-    name : str
     explained : float
         Fall of chi2 with it [-].
     log_prior : float
@@ -72,10 +71,6 @@ class Undecided:
 def rivals_in(undecided: Undecided) -> tuple[Rival, ...]:
     """Hypotheses of which none was accepted, as values.
 
-    Parameters
-    ----------
-    undecided : Undecided
-
     Returns
     -------
     tuple of Rival
@@ -103,8 +98,6 @@ class SearchState:
     ----------
     steps : tuple of Step
         Accepted effects.
-    places : tuple of LocalAnomaly
-    instruments : tuple of FaultyInstrument
     prior_weights : tuple of PriorWeight
         Of all that is held.
     flagged : tuple of int
@@ -210,18 +203,12 @@ def step_found(
 
     Parameters
     ----------
-    screening : Screening
-    hypotheses : sequence of Hypothesis
     accepted : int
         Which of them.
     further : Baseline
         The model with it.
     p : float
         Of the alarm [-].
-
-    Returns
-    -------
-    Step
     """
     chance = chances_of(hypotheses)
     found, groups = _groups_of_rivals(screening, hypotheses)
@@ -284,16 +271,10 @@ def place_followed_further(
 
     Parameters
     ----------
-    place : LocalAnomaly
-    followed : sequence of Hypothesis
     taken : int
         Which of them the place is.
     evidence : ndarray (k,)
         ln, of each followed [-].
-
-    Returns
-    -------
-    LocalAnomaly
     """
     odds = {
         _rival_name(one): tempered_odds(float(evidence[taken]), float(of_one))
@@ -313,15 +294,10 @@ def undecided_of(hypotheses: Sequence[Hypothesis], followed: Sequence[str], chan
 
     Parameters
     ----------
-    hypotheses : sequence of Hypothesis
     followed : sequence of str
         Names.
     chance : ndarray (k,)
         Of each followed, were it one of them [-]; together they keep the chance that they had.
-
-    Returns
-    -------
-    Undecided
     """
     told = dict(zip([one.name for one in hypotheses], map(float, chances_of(hypotheses)), strict=True))
     told = _shared_anew(told, followed, chance)
@@ -333,7 +309,6 @@ def with_chances(step: Step, accepted: str, told: Mapping[str, float]) -> Step:
 
     Parameters
     ----------
-    step : Step
     accepted : str
         An effect; in a group of its own if it is in none.
     told : mapping of float
@@ -363,9 +338,6 @@ def anomaly_found(screening: Screening, hypotheses: Sequence[Hypothesis], which:
 
     Parameters
     ----------
-    screening : Screening
-    hypotheses : sequence of Hypothesis
-    which : int
     refit : Refit
         Of that hypothesis.
 
@@ -408,7 +380,6 @@ def instrument_found(screening: Screening, best: Hypothesis, one: Instrument) ->
 
     Parameters
     ----------
-    screening : Screening
     best : Hypothesis
         Of a surveyed line the offset is that of the model without its level.
     one : Instrument
@@ -484,7 +455,6 @@ def with_alarm(screening: Screening, found: SearchState) -> SearchState:
     ----------
     screening : Screening
         Of the model with all that was found.
-    found : SearchState
 
     Returns
     -------
@@ -506,8 +476,6 @@ def with_rivals_again(
 
     Parameters
     ----------
-    base : Baseline
-    found : SearchState
     steps : sequence of Step
         Of effects that were accepted before what was last: an effect, something at a place, an instrument.
     effects : mapping of CandidateEffect
@@ -560,7 +528,6 @@ def leading_refit(screening: Screening, hypotheses: Sequence[Hypothesis]) -> int
 
     Parameters
     ----------
-    screening : Screening
     hypotheses : sequence of Hypothesis
         The most evidence first, a listed effect among them.
 
@@ -581,7 +548,6 @@ def refitted(hypotheses: Sequence[Hypothesis], effects: Mapping[str, CandidateEf
 
     Parameters
     ----------
-    hypotheses : sequence of Hypothesis
     effects : mapping of CandidateEffect
         By name.
 

@@ -50,7 +50,6 @@ class StationsOnLand:
 
     Attributes
     ----------
-    experiment : str
     places : int
         How many.
     first : (float, float)
@@ -74,7 +73,6 @@ class SharedPlaces:
 
     Attributes
     ----------
-    quantity, experiment : str
     stations : int
         How many.
     first : (float, float)
@@ -115,7 +113,6 @@ class PlacesInOtherUnit:
         How many, of all.
     first : (float, float)
         x, y of the first, as stated.
-    unit : str
     """
 
     outside: int
@@ -286,7 +283,6 @@ class HeightsExchanged:
 
     Attributes
     ----------
-    file : Path
     upward : str
         Column of the heights.
     exchanged, verticals : int
@@ -308,9 +304,6 @@ class PointsOutsideWater:
 
     Attributes
     ----------
-    points : int
-    sections, experiments : tuple of str
-    reason : Unused
     first : (float, float)
         x, y of the first [m].
     height, depth : float
@@ -335,8 +328,6 @@ class HeightsTakenForLevels:
 
     Attributes
     ----------
-    file : str
-    experiments : tuple of str
     z : tuple of float
         Middle of the lowest points in each [m].
     first, last : float

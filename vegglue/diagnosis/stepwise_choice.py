@@ -150,15 +150,10 @@ def chosen(named: Sequence[Nominee], score_with: ScoreWith, clearly: bool = Fals
 
     Parameters
     ----------
-    named : sequence of Nominee
     score_with : callable
         Names -> score of the model with these, None if no flow is found.
     clearly : bool
         Whether errors must fall by clear_fall standard errors.
-
-    Returns
-    -------
-    Choice
     """
     order = [one.name for one in named]
 
@@ -258,7 +253,6 @@ def why_not_kept(
 
     Parameters
     ----------
-    before : ModelScore
     after : ModelScore or None
         None if no flow is found.
     clearly : bool
@@ -306,11 +300,6 @@ Addition = tuple[Candidate, Mapping[str, float]]  # an effect, and values of its
 def found_additions(case: Case, found: Diagnosis) -> list[Addition]:
     """Effects and places of a diagnosis in the order they were found.
 
-    Parameters
-    ----------
-    case : Case
-    found : Diagnosis
-
     Returns
     -------
     list of (Candidate, mapping of float)
@@ -335,11 +324,6 @@ def tried_additions(case: Case, found: Diagnosis) -> list[Addition]:
 
     Held-out errors decide between both, and if they are the same, what is known is kept.
 
-    Parameters
-    ----------
-    case : Case
-    found : Diagnosis
-
     Returns
     -------
     list of (Candidate, dict of float)
@@ -357,14 +341,8 @@ def choice_among(case: Case, found: Diagnosis, base_with: Callable[[Names], Base
 
     Parameters
     ----------
-    case : Case
-    found : Diagnosis
     base_with : callable
         Names of some of what is tried -> the calibrated model with these, None if no flow is found.
-
-    Returns
-    -------
-    Choice
     """
     scores: dict[Names, ModelScore | None] = {}
 
@@ -386,17 +364,7 @@ def choice_among(case: Case, found: Diagnosis, base_with: Callable[[Names], Base
 
 
 def nominees(case: Case, found: Diagnosis) -> list[Nominee]:
-    """What `tried_additions` adds, as `chosen` takes it.
-
-    Parameters
-    ----------
-    case : Case
-    found : Diagnosis
-
-    Returns
-    -------
-    list of Nominee
-    """
+    """What `tried_additions` adds, as `chosen` takes it."""
     known = {candidate_at(case, place).name: effect for effect, place in _rival_places(found)}
     named = []
     for one, _ in tried_additions(case, found):
@@ -428,11 +396,6 @@ def _rival_places(found: Diagnosis) -> list[tuple[str, LocalAnomaly]]:
 def values_tried(case: Case, found: Diagnosis) -> dict[str, float]:
     """`values_found`, and the sizes of places that may be there instead of effects.
 
-    Parameters
-    ----------
-    case : Case
-    found : Diagnosis
-
     Returns
     -------
     dict of float
@@ -444,11 +407,6 @@ def values_tried(case: Case, found: Diagnosis) -> dict[str, float]:
 
 def values_found(case: Case, found: Diagnosis) -> dict[str, float]:
     """Parameters of the last model of a diagnosis.
-
-    Parameters
-    ----------
-    case : Case
-    found : Diagnosis
 
     Returns
     -------

@@ -59,15 +59,10 @@ class VerdictInputs:
     ----------
     candidates : tuple of CandidateEffect
         Every tested effect, the strongest first.
-    errors : EstimatedErrors
     misfit : ChiSquare
         Of the model with all that was accepted.
-    steps : tuple of Step
-    places : tuple of LocalAnomaly
     instruments : tuple of FaultyInstrument
         What was accepted.
-    field : FieldFound or None
-    laws : CandidateLaws or None
     model_error : ModelErrorUsed or None
         What was found beside it.
     undecided : tuple of Rival
@@ -134,14 +129,6 @@ def make_verdict(inputs: VerdictInputs) -> Verdict:
     """The verdict on what was found, with what remains and what else should be known.
 
     Data come first, then doubt, laws, fields, places, effects and silence, which has to be earned as a name has.
-
-    Parameters
-    ----------
-    inputs : VerdictInputs
-
-    Returns
-    -------
-    Verdict
     """
     testable = sum(one.detectability.testable for one in inputs.candidates)
     plain = Verdict(
@@ -308,7 +295,6 @@ def effect_found(step: Step, candidates: Iterable[CandidateEffect]) -> EffectFou
 
     Parameters
     ----------
-    step : Step
     candidates : iterable of CandidateEffect
         The accepted one among them.
 

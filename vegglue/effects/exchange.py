@@ -70,7 +70,6 @@ def growing_shear_layer(cells: Cells, spreading: Array, rate: Array) -> dict[str
 
     Parameters
     ----------
-    cells : Cells
     spreading : (m,) [-]
         growth s of its width, some 0.085 times the difference of both speeds over their mean.
     rate : (m,) [1/m]
@@ -108,10 +107,6 @@ def curvature(cells: Cells) -> Array:
 
     Positive where the flow turns towards larger y, and never above 1/2: no bend is narrower than it is deep. |U|^2 is
     u^2 + v^2 + (0.1 U)^2, U the speed of the site, so that water at rest has no bend.
-
-    Parameters
-    ----------
-    cells : Cells
 
     Returns
     -------

@@ -19,7 +19,6 @@ def spot(geometry: ChannelGeometry, x: Array, y: Array, length: Array, width: Ar
 
     Parameters
     ----------
-    geometry : ChannelGeometry
     x, y, length, width : (m,) [m]
         x_0, y_0, l and w.
     """
@@ -40,7 +39,6 @@ def rectangle(geometry: ChannelGeometry, x: Array, y: Array, length: Array, widt
 
     Parameters
     ----------
-    geometry : ChannelGeometry
     x, y, length, width : (m,) [m]
         Its middle, and half of its sides l and w.
     angle : (m,) [degrees]

@@ -115,7 +115,6 @@ def scale_of_column(word: str, quantity: str, where: str) -> float:
     ----------
     word : str
         A unit, or a scale such as `0.7 m`, a diameter that lengths are given in.
-    quantity : str
     where : str
         How the message begins.
 
@@ -143,8 +142,6 @@ def in_si(value: object, quantity: str, where: str) -> float:
 
     Parameters
     ----------
-    value : object
-    quantity : str
     where : str
         How the message begins.
 
@@ -177,7 +174,6 @@ class Role:
 
     Attributes
     ----------
-    name : str
     quantity : str
         Of its unit, '' for words.
     names : tuple of str

@@ -91,7 +91,6 @@ def columns_of_table(path: Path, table: ParsedTable, options: FileOptions) -> di
     ----------
     path : Path
         For messages.
-    table : ParsedTable
     options : FileOptions
         With the columns that the site file names.
 
@@ -216,11 +215,8 @@ def unit_of_column(path: Path, table: ParsedTable, columns: Mapping[str, int], r
     ----------
     path : Path
         For messages.
-    table : ParsedTable
     columns : mapping of int
         Place of the column of each role.
-    role : str
-    options : FileOptions
 
     Returns
     -------
@@ -278,10 +274,8 @@ def numbers_of_column(
     ----------
     path : Path
         For messages.
-    table : ParsedTable
     place : int
         Of the column.
-    role, unit : str
     missing : tuple of float
         Marks beside those of any column [unit].
 

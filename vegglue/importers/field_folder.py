@@ -264,10 +264,6 @@ def case_from_sheet(folder: Path, target: Path, config: Path) -> FolderCase:
     target, config : Path
         Of the child, and of the case.
 
-    Returns
-    -------
-    FolderCase
-
     Raises
     ------
     InputError

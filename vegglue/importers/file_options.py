@@ -115,10 +115,6 @@ def read_file_options(given: Any, where: str) -> FileOptions:
     where : str
         How the message begins.
 
-    Returns
-    -------
-    FileOptions
-
     Raises
     ------
     InputError

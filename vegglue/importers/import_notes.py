@@ -98,7 +98,6 @@ class RepeatsAveraged:
 
     Attributes
     ----------
-    repeats : int
     at : (float, float) or None
         x, y of a single one [m].
     copied : bool
@@ -145,7 +144,6 @@ class PatchesRead:
 
     Attributes
     ----------
-    patches : int
     stems : tuple of str
         Columns of their density.
     lengths, densities : tuple of str
@@ -197,7 +195,6 @@ class FlowTaken:
 
     Attributes
     ----------
-    code, time : str
     places, wet : int
         How many, and how many of them are wet.
     discharge, level : float

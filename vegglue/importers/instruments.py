@@ -70,10 +70,6 @@ BY_BEGINNING: Mapping[bytes, FileReader] = {
 def reader_of(path: Path) -> FileReader:
     """The reader of a file, by how it begins.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     callable

@@ -88,16 +88,10 @@ def measured_files(
     ----------
     folder, target : Path
         The folder, and the config to be written.
-    site : FieldSite
-    place : Placement
     used : sequence of str
         Files that the site file names elsewhere, such as that of the bed.
     bed : callable
         Its level, for measured depths: x, y (n,) -> z (n,) in the channel [m].
-
-    Returns
-    -------
-    MeasuredFiles
 
     Raises
     ------
@@ -121,8 +115,6 @@ def held_out_measurements(
     ----------
     folder, target : Path
         The folder, and the config to be written.
-    site : FieldSite
-    place : Placement
     bed : callable
         As of `measured_files`.
 

@@ -197,7 +197,6 @@ def read_rows(path: Path, options: FileOptions) -> MeasuredRows:
 
     Parameters
     ----------
-    path : Path
     options : FileOptions
         What the site file states about it.
 
@@ -233,13 +232,8 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
     ----------
     path : Path
         For messages.
-    table : ParsedTable
     options : FileOptions
         Columns and units, else their usual names, and the units that the table states.
-
-    Returns
-    -------
-    MeasuredRows
 
     Raises
     ------
@@ -427,12 +421,6 @@ def vertical_role(taken: MeasuredRows) -> str | None:
 
 def in_the_channel(taken: MeasuredRows, place: Placement, options: FileOptions) -> MeasuredRows:
     """The rows along and across the channel: turned, flipped and shifted; a speed with its direction as components.
-
-    Parameters
-    ----------
-    taken : MeasuredRows
-    place : Placement
-    options : FileOptions
 
     Returns
     -------

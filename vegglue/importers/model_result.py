@@ -45,7 +45,6 @@ class ModelResult:
         Nodes of the mesh [m]: how far it reaches.
     roughness : ndarray (n,) or None
         In the unit of its kind [s m^(-1/3), m^(1/3)/s, m^(1/2)/s, m]; None if the file has none.
-    roughness_kind : RoughnessKind
     crs : str
         Coordinate system as the file states it, '' if it does not.
     time : str
@@ -102,7 +101,6 @@ def model_result(
 
     Parameters
     ----------
-    code : str
     x, y : ndarray (n,)
         [m]
     bed, level, depth : ndarray (n,)
@@ -111,10 +109,6 @@ def model_result(
         [m/s], NaN if unknown.
     **more
         Further fields of ModelResult.
-
-    Returns
-    -------
-    ModelResult
     """
     placed = np.isfinite(x) & np.isfinite(y) & np.isfinite(bed)
     unknown, stated_dry = ~np.isfinite(level) & ~np.isfinite(depth), np.nan_to_num(depth, nan=np.inf) <= DRY_DEPTH

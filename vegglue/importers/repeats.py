@@ -175,7 +175,6 @@ def without_repeats(
 
     Parameters
     ----------
-    points : MeasuredRows
     keys : sequence of tuple (rows,)
         Rows of equal keys are one.
     errors : ndarray (rows,)

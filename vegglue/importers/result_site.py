@@ -63,7 +63,6 @@ class PlacedResult:
 
     Attributes
     ----------
-    result : ModelResult
     flow : TheirFlow
         In the channel.
     corners : ndarray (k, 2)
@@ -84,16 +83,12 @@ class SiteOfResult:
 
     Attributes
     ----------
-    site : FieldSite
-    place : Placement
     paths : mapping of Path
         Of the results, by experiment.
     placed : mapping of PlacedResult
         By experiment.
-    stated : ResultEntry
     terrain : Terrain
         The bed of the first.
-    grid : Tree
     """
 
     site: FieldSite
@@ -111,7 +106,6 @@ class GroundOfResult:
 
     Attributes
     ----------
-    ground : Ground
     parameters : Tree
         Priors of its friction.
     key : Tree

@@ -316,13 +316,8 @@ def read_site(path: Path, completed: Any = None) -> FieldSite:
 
     Parameters
     ----------
-    path : Path
     completed : mapping, optional
         Its keys and values with those of a finished result.
-
-    Returns
-    -------
-    FieldSite
 
     Raises
     ------

@@ -68,7 +68,6 @@ class KnownExperiments:
 
     Attributes
     ----------
-    names : tuple of str
     site, key : str
         The site file, and where in it they stand.
     others : tuple of str
@@ -105,7 +104,6 @@ class StationTable:
         Its name.
     heading : tuple of str
         Columns.
-    rows : list of list of str
     observations : tuple of Tree
         That name it.
     taken : str
@@ -125,7 +123,6 @@ class StationTables:
 
     Attributes
     ----------
-    tables : list of StationTable
     left_out : tuple of FileNote
         What they lack, and how many of its rows are in none of them and why.
     """
@@ -148,12 +145,8 @@ def station_tables(
 
     Parameters
     ----------
-    taken : MeasuredRows
     stem : str
         Of its name.
-    options : FileOptions
-    known : KnownExperiments
-    place : Placement
     file : str
         How the message begins.
 

@@ -82,7 +82,6 @@ def number_in(text: str, decimal_comma: bool) -> float | None:
 
     Parameters
     ----------
-    text : str
     decimal_comma : bool
         Whether decimals stand behind a comma, else behind a point.
 

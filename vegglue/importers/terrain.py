@@ -149,12 +149,6 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
         Of the measurements.
     target : Path
         Of the config; the bed belongs into the folder beside it: as bed.asc, and as points along a centreline.
-    site : FieldSite
-    place : Placement
-
-    Returns
-    -------
-    Ground
 
     Raises
     ------
@@ -253,10 +247,8 @@ def grid_of_terrain(path: Path, terrain: Terrain, asked: SiteGrid | None, place:
     ----------
     path : Path
         Of the survey, for messages.
-    terrain : Terrain
     asked : SiteGrid or None
         What the site file states.
-    place : Placement
 
     Returns
     -------

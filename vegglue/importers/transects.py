@@ -55,7 +55,6 @@ def stations_of_transect(
         For messages.
     options : FileOptions
         With `start`, where the boat started, in the coordinates of the site [m].
-    profiles : sequence of BoatProfile
     *form : FileNote
         How they were read.
 
@@ -120,10 +119,6 @@ def depth_mean(ensemble: BoatProfile) -> tuple[float, float]:
     """U = a h^p / (p + 1), with the a that gives the measured cells their mean under u = a z^p
 
     Makers' programs do so above and below the cells.
-
-    Parameters
-    ----------
-    ensemble : BoatProfile
 
     Returns
     -------

@@ -72,7 +72,6 @@ class NamedPolygon:
 
     Attributes
     ----------
-    name : str
     corners : Ring
         [m]
     density : float or None
@@ -203,14 +202,8 @@ def planted_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str]
 
     Parameters
     ----------
-    path : Path
-    frame : Frame or None
     columns : mapping of str
         Headings of `stems` and `name`.
-
-    Returns
-    -------
-    list of NamedPolygon
 
     Raises
     ------
@@ -481,14 +474,8 @@ def drawn_centreline(folder: Path, given: FileOfSite | CentrelineShape, frame: F
 
     Parameters
     ----------
-    folder : Path
     given : FileOfSite or CentrelineShape
         A file, a table of x and y, a line of GeoJSON, or of a shapefile, upstream first; or points, or parts and arcs.
-    frame : Frame or None
-
-    Returns
-    -------
-    DrawnCentreline
 
     Raises
     ------

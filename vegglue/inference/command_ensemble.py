@@ -65,8 +65,6 @@ class StationsUnchanged:
         Its x and y [m].
     value : float
         Its prediction [unit].
-    unit : str
-    members : int
     """
 
     count: int
@@ -188,11 +186,6 @@ def _without_influence(theta: Array, predicted: Array, names: tuple[str, ...]) -
 def refuse_useless(case: Case, ensemble: Ensemble) -> None:
     """Refuse an ensemble of which nothing can be inferred; its file stays.
 
-    Parameters
-    ----------
-    case : Case
-    ensemble : Ensemble
-
     Raises
     ------
     InputError
@@ -230,7 +223,6 @@ def run_ensemble(
         Stations at which the command predicts.
     path : Path
         Of the HDF5 file.
-    runs : CommandRuns
     jobs : int
         Processes of the built-in solver, if the case has effects.
     watch : callable

@@ -153,7 +153,6 @@ def efficiency(residual: Array, station: pd.DataFrame) -> Array:
     ----------
     residual : ndarray (member, station)
         u - U [unit of each station].
-    station : DataFrame
 
     Returns
     -------
@@ -236,7 +235,6 @@ def refuse_undefined_efficiency(case: Case, station: pd.DataFrame) -> None:
     ----------
     case : Case
         `infer` states whether efficiencies are used.
-    station : DataFrame
 
     Raises
     ------
@@ -260,8 +258,6 @@ def check_stations(ensemble: Ensemble, station: pd.DataFrame, config: Path | Non
 
     Parameters
     ----------
-    ensemble : Ensemble
-    station : DataFrame
     config : Path, optional
         For the command to be run again.
 

@@ -47,10 +47,6 @@ def differing(p: Mapping[str, float]) -> frozenset[str]:
     ----------
     p
         Chance that one value fits all experiments, by parameter [-]; NaN for one that is not compared.
-
-    Returns
-    -------
-    frozenset of str
     """
     compared = {name: chance for name, chance in p.items() if not math.isnan(chance)}
     return frozenset(name for name, chance in compared.items() if chance * len(compared) < DIFFERS_BELOW)
@@ -152,7 +148,6 @@ def without_prior(case: Case, z: Array, variance: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    case : Case
     z, variance : ndarray (p,)
         A MAP estimate and v, on the scale of standard normal priors [-].
 
@@ -174,7 +169,6 @@ def correlations_of_estimates(noise: Noise, estimates: Sequence[Estimate | None]
 
     Parameters
     ----------
-    noise : Noise
     estimates : sequence of Estimate or None
         Of each experiment its rows among the used stations, slopes J_e (n_e, p) and covariance V_e (p, p) of z.
     parameters : int
@@ -231,12 +225,6 @@ def equal_values_test(
 
 def one_experiment(model: Model, noise: Noise, experiment: str) -> tuple[Model, Noise]:
     """The model and its errors for one experiment.
-
-    Parameters
-    ----------
-    model : Model
-    noise : Noise
-    experiment : str
 
     Returns
     -------

@@ -68,10 +68,6 @@ def mixture_at_modes(centres: Array, covariances: Array, log_mass: Array) -> Mix
     covariances : ndarray (k, p, p)
     log_mass : ndarray (k,)
         Up to a constant [-].
-
-    Returns
-    -------
-    Mixture
     """
     return Mixture(np.exp(log_mass - logsumexp(log_mass)), centres, np.asarray(np.linalg.cholesky(covariances), float))
 
@@ -81,7 +77,6 @@ def draw(mixture: Mixture, points: Array) -> Array:
 
     Parameters
     ----------
-    mixture : Mixture
     points : ndarray (m, p + 2)
         Of the unit cube: the first column draws k, the second chi2, the others e.
 
@@ -101,7 +96,6 @@ def log_density(mixture: Mixture, z: Array) -> Array:
 
     Parameters
     ----------
-    mixture : Mixture
     z : ndarray (m, p)
 
     Returns
@@ -159,12 +153,6 @@ def adapt(target: Callable[[Array], Array], start: Mixture, seed: int) -> Mixtur
     ----------
     target : callable
         z (m, p) -> log density (m,), up to a constant.
-    start : Mixture
-    seed : int
-
-    Returns
-    -------
-    Mixture
     """
     random, p = np.random.default_rng(seed), start.centre.shape[1]
     # b < 1 with (b (2 - b))^(p / 2) = 1 - TAIL_SHARE, the effective share of draws from p^b, p normal.
@@ -345,10 +333,6 @@ def fit_emulator(
     lower : ndarray (p, p)
     highest : int
         Highest degree.
-
-    Returns
-    -------
-    Emulator
     """
     known = np.isfinite(log_density)
     z, values, log_density = z[known], values[known], log_density[known]

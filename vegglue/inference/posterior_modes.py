@@ -66,13 +66,8 @@ def members_of(ensemble: Ensemble, model: Model) -> TriedMembers:
 
     Parameters
     ----------
-    ensemble : Ensemble
     model : Model
         With the priors.
-
-    Returns
-    -------
-    TriedMembers
     """
     return TriedMembers(z_at(model.case, ensemble.parameters), ensemble.prediction)
 
@@ -156,7 +151,6 @@ def find_modes(model: Model, noise: Noise, tried: TriedMembers, watch: Watch) ->
     ----------
     model : Model
         On the case's own grid.
-    noise : Noise
     tried : TriedMembers
         Of whose best the search starts.
     watch : callable
@@ -200,7 +194,6 @@ def starting_points(noise: Noise, z: Array, prediction: Array) -> Array:
 
     Parameters
     ----------
-    noise : Noise
     z : ndarray (m, p)
         [standard deviations of the prior]
     prediction : ndarray (m, station)
@@ -247,10 +240,6 @@ def distinct_modes(ends: list[MapEstimate]) -> list[MapEstimate]:
     ----------
     ends : list of MapEstimate
         In any order; distances are (dz' V^-1 dz)^(1/2), V the covariance of the better one.
-
-    Returns
-    -------
-    list of MapEstimate
     """
     found = _apart(ends)
     return [end for end in found if end.objective - found[0].objective < NEGLIGIBLE_MODE]
@@ -279,8 +268,6 @@ class ModesAndErrors:
 
     Attributes
     ----------
-    model : Model
-    noise : Noise
     fits : tuple of MapEstimate
         The best first.
     starts : int

@@ -60,9 +60,6 @@ def posterior_of(
 
     Parameters
     ----------
-    settings : InferenceSettings
-    sample : WeightedSample
-    case : Case
     station : DataFrame
         All stations.
     noise : ndarray (station,)
@@ -71,10 +68,6 @@ def posterior_of(
         Its root mean square by kind [unit of the kind].
     factor : ndarray (station, station), optional
         L with L L' the covariance of the errors, if they are correlated; NaN if a station is not used.
-
-    Returns
-    -------
-    Posterior
 
     Raises
     ------
@@ -115,10 +108,6 @@ def marginals(theta: dict[str, Array], case: Case, weights: Array) -> Marginals:
         With the priors.
     weights : ndarray (member,)
         Of sum 1 [-].
-
-    Returns
-    -------
-    Marginals
     """
     priors = case.parameters
     scaled = {name: _on_flat_scale(values, priors[name]) for name, values in theta.items()}
@@ -189,10 +178,6 @@ def on_flat_scale(case: Case, theta: dict[str, Array]) -> Array:
 def prior_mass_near_bounds(prior: Parameter) -> Array:
     """Mass of the prior within NEAR_BOUND of its range of either bound.
 
-    Parameters
-    ----------
-    prior : Parameter
-
     Returns
     -------
     ndarray (2,)
@@ -216,16 +201,10 @@ def predictive_distribution(
 
     Parameters
     ----------
-    sample : WeightedSample
     noise : ndarray (station,)
         Standard deviation of the errors [unit of each station].
-    seed : int
     factor : ndarray (station, station), optional
         L.
-
-    Returns
-    -------
-    PredictiveDistribution
     """
     prediction, weights, random = sample.prediction, sample.weights, np.random.default_rng(seed)
     draws = systematic_draws(weights, CHAINS * DRAWS_PER_CHAIN, random).reshape(CHAINS, DRAWS_PER_CHAIN)
@@ -303,7 +282,6 @@ def corrected_canopy(theta: dict[str, Array], case: Case, weights: Array) -> Cor
     ----------
     theta : dict of ndarray (m,)
         Parameters of all members [unit of each].
-    case : Case
     weights : ndarray (m,)
         [-]
 

@@ -158,11 +158,6 @@ def refinable(case: Case) -> bool:
 def solved_for(model: Model, noise: Noise) -> Model:
     """The model with its flows solved as exactly as measurements resolve.
 
-    Parameters
-    ----------
-    model : Model
-    noise : Noise
-
     Returns
     -------
     Model
@@ -179,7 +174,6 @@ def log_posterior(noise: Noise, z: Array, prediction: Array) -> Array:
 
     Parameters
     ----------
-    noise : Noise
     z : ndarray (m, p)
         [standard deviations of the prior]
     prediction : ndarray (m, station)

@@ -124,7 +124,6 @@ def ensemble_hash(case: Case, given: PriorSample | None = None) -> str:
 
     Parameters
     ----------
-    case : Case
     given : PriorSample, optional
         Members that are not drawn from the priors, whose parameters count, too.
 
@@ -141,11 +140,6 @@ def ensemble_hash(case: Case, given: PriorSample | None = None) -> str:
 
 def refuse_too_many(case: Case, observations: Observations) -> None:
     """Refuse a case without parameters, or with more than MOST_PREDICTIONS.
-
-    Parameters
-    ----------
-    case : Case
-    observations : Observations
 
     Raises
     ------
@@ -164,8 +158,6 @@ def starts_and_chunks(case: Case, site: Site, points: np.ndarray) -> tuple[Start
 
     Parameters
     ----------
-    case : Case
-    site : Site
     points : ndarray (m, p)
         Of the members in the unit cube of the priors.
 
@@ -186,14 +178,6 @@ def chunk_size(members: int, experiments: int) -> int:
     """Members of a chunk at most.
 
     It depends on nothing but the size of the ensemble and the number of experiments.
-
-    Parameters
-    ----------
-    members, experiments : int
-
-    Returns
-    -------
-    int
     """
     if members <= SPARSE_MEMBERS:
         return min(-(-members // 2), SPARSE_CHUNK if experiments == 1 else 2 * SPARSE_CHUNK)
@@ -249,9 +233,6 @@ def solved_members(case: Case, observations: Observations, sample: PriorSample, 
 
     Parameters
     ----------
-    case : Case
-    observations : Observations
-    sample : PriorSample
     jobs : int
         Processes; -1 for one on every core.
 
@@ -316,9 +297,6 @@ def solve_chunk(
 
     Parameters
     ----------
-    case : Case
-    site : Site
-    observations : Observations
     sample : PriorSample
         Of the members.
     start_from : mapping, optional
@@ -345,12 +323,8 @@ def solve_in_experiment(
 
     Parameters
     ----------
-    case : Case
-    site : Site
-    observations : Observations
     start_from : mapping or None
         Where members come from by experiment; coarser cells if None.
-    experiment : str
     sample : PriorSample
         Of the members.
 
@@ -411,10 +385,6 @@ def _stations_in(observations: Observations, experiment: str) -> np.ndarray:
 def section_positions(observations: Observations) -> tuple[tuple[str, float], ...]:
     """Sections in which a velocity was measured.
 
-    Parameters
-    ----------
-    observations : Observations
-
     Returns
     -------
     tuple of (str, float)
@@ -429,7 +399,6 @@ def solve_flow(case: Case, theta: Mapping[str, float]) -> dict[str, FlowFields]:
 
     Parameters
     ----------
-    case : Case
     theta : mapping of float
         All parameters of the case [unit of each].
 

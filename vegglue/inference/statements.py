@@ -45,8 +45,6 @@ class EnsembleWeighed:
 
     Attributes
     ----------
-    members, failed : int
-    likelihood : str
     used, stations : int
         Number of used stations, and of all.
     sizes : tuple of (Kind, float)
@@ -170,7 +168,6 @@ class ParameterEstimated:
 
     Attributes
     ----------
-    parameter : NamedParameter
     median, sd, low, high : float
         Median, standard deviation and 95 % interval [its unit].
     share : float
@@ -254,7 +251,6 @@ class MisfitTested:
     ----------
     chi2 : float
         [-]
-    freedom : int
     p : float
         P(chi2_f >= chi2) [-].
     outcome : {"untested", "unexplained", "hardly-explained", "too-small", "explained"}
@@ -314,7 +310,6 @@ class StationsStandOut:
 
     Attributes
     ----------
-    count : int
     experiment, section : str
         Of the one that stands out most.
     x, y : float
@@ -342,14 +337,12 @@ class ParameterBetweenExperiments:
 
     Attributes
     ----------
-    parameter : NamedParameter
     logarithmic : bool
         Whether values are log10 of the parameter.
     values : tuple of (str, float, float)
         Experiment, value and standard error.
     chi2 : float
         About the weighted mean [-].
-    freedom : int
     p : float
         [-]
     reference : float or None
@@ -449,7 +442,6 @@ def posterior_statements(
 
     Parameters
     ----------
-    posterior : Posterior
     others : mapping, optional
         The reference table of the case, by key.
     symbols : mapping of str, optional
@@ -487,11 +479,6 @@ def _sizes_of(errors: Mapping[str, float]) -> Sizes:
 def measurement_error(posterior: Posterior, kind: str) -> float:
     """s = sqrt(mean s_i^2) of the standard errors of the used stations of a kind.
 
-    Parameters
-    ----------
-    posterior : Posterior
-    kind : str
-
     Returns
     -------
     float
@@ -507,7 +494,6 @@ def sample_statements(posterior: Posterior, symbols: Mapping[str, str] | None = 
 
     Parameters
     ----------
-    posterior : Posterior
     symbols : mapping of str, optional
         Of parameters, by name.
 
@@ -586,7 +572,6 @@ def off_its_prior(posterior: Posterior, name: str) -> bool:
 
     Parameters
     ----------
-    posterior : Posterior
     name : str
         Of the parameter.
 
@@ -605,8 +590,6 @@ def parameter_statements(posterior: Posterior, name: str, symbols: Mapping[str, 
 
     Parameters
     ----------
-    posterior : Posterior
-    name : str
     symbols : mapping of str, optional
         Of parameters, by name.
 
@@ -639,7 +622,6 @@ def correlations(posterior: Posterior, symbols: Mapping[str, str] | None = None)
 
     Parameters
     ----------
-    posterior : Posterior
     symbols : mapping of str, optional
         Of parameters, by name.
 
@@ -674,10 +656,6 @@ def fit_statements(posterior: Posterior) -> Iterator[object]:
 
 def misfit_tested(posterior: Posterior) -> MisfitTested | None:
     """P(chi2_f >= chi2) below UNBELIEVED: unexplained, below DOUBTED: hardly explained; too close to 1: too small.
-
-    Parameters
-    ----------
-    posterior : Posterior
 
     Returns
     -------
@@ -730,10 +708,6 @@ def validation_statements(posterior: Posterior) -> Iterator[object]:
 def stations_standing_out(posterior: Posterior) -> Iterator[StationsStandOut]:
     """Stations whose residual is no chance: each, or of more than OUTLIERS_NAMED their number and the worst.
 
-    Parameters
-    ----------
-    posterior : Posterior
-
     Yields
     ------
     StationsStandOut
@@ -762,7 +736,6 @@ def transfer_statements(
 
     Parameters
     ----------
-    posterior : Posterior
     others : mapping
         The reference table of the case, by key.
     symbols : mapping of str, optional
@@ -816,14 +789,8 @@ def transfer_verdict(
 
     Parameters
     ----------
-    posterior : Posterior
-    transfer : Transfer
     symbols : mapping of str, optional
         Of parameters, by name.
-
-    Returns
-    -------
-    CalibrationTransfers or CalibrationDiffers
     """
     moves = differing(dict(zip(posterior.parameters, transfer.p, strict=True)))
     if not moves and not transfer.p_all < DIFFERS_BELOW:

@@ -170,7 +170,6 @@ def gaussian_process(
     ----------
     names, station
         Parameters of the command, and the stations (n rows).
-    noise : Noise
     centre : ndarray (q,)
     lower : ndarray (q, q)
         u = lower^-1 (z - centre).
@@ -178,10 +177,6 @@ def gaussian_process(
         Places of the runs [standard deviations of the prior].
     d : ndarray (m, n)
         Differences there [unit of each station].
-
-    Returns
-    -------
-    Difference
     """
     u = _places(z, centre, lower)
     terms, whitened = _terms(u), noise.whiten(d[:, noise.rows].T).T
@@ -213,9 +208,6 @@ def log_posterior_under(noise: Noise, model: Model, difference: Difference, z: A
 
     Parameters
     ----------
-    noise : Noise
-    model : Model
-    difference : Difference
     z : ndarray (k, p)
     prediction : ndarray (k, station)
         F + m [unit of each station], NaN without a flow.
@@ -245,7 +237,6 @@ class CommandToLearn:
 
     Attributes
     ----------
-    runs : CommandRuns
     run : ndarray (m, q)
         [standard deviations of the prior]
     failed : int
@@ -287,17 +278,12 @@ def learn(command: CommandToLearn, base: ModesAndErrors, start: Mixture, watch: 
 
     Parameters
     ----------
-    command : CommandToLearn
     base : ModesAndErrors
         Of the built-in engine, corrected where the command fits best.
     start : Mixture
         A first proposal for the posterior.
     watch : callable
         Is called with the progress of runs.
-
-    Returns
-    -------
-    Learned
     """
     noise, model, best = base.noise, base.model, base.fits[0]
     case, bare = model.case, without_effects(model)

@@ -179,7 +179,6 @@ def systematic_draws(weights: Array, count: int, random: np.random.Generator) ->
         Of any sum above 0 [-].
     count : int
         Draws, i from 0.
-    random : Generator
 
     Returns
     -------
@@ -365,10 +364,6 @@ def leave_one_out(residual: Array, precision: Array, weights: Array) -> StationS
     weights : ndarray (m,)
         Above 0 [-].
 
-    Returns
-    -------
-    StationScores
-
     References
     ----------
     Buerkner, Gabry and Vehtari (2021), doi:10.1007/s00180-020-01045-4; Vehtari et al. (2024).
@@ -394,10 +389,6 @@ def leave_out(residual: Array, precision: Array, weights: Array, group: np.ndarr
         As of `leave_one_out`.
     group : ndarray (k,)
         g, columns of the residual.
-
-    Returns
-    -------
-    LeftOut
     """
     part = precision[np.ix_(group, group)]
     pull = (residual @ precision)[:, group]

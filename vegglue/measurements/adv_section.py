@@ -90,14 +90,8 @@ def read_section(case: Case, observation: Observation, gauges: pd.DataFrame) -> 
 
     Parameters
     ----------
-    case : Case
-    observation : Observation
     gauges : DataFrame
         Stations of measured levels.
-
-    Returns
-    -------
-    Section
 
     Raises
     ------
@@ -227,10 +221,6 @@ def across_averages(points: pd.DataFrame) -> pd.DataFrame:
 
 def upward_column(path: Path) -> str:
     """The column of heights in a file of points: `z`, a level, else `height` above the bed.
-
-    Parameters
-    ----------
-    path : Path
 
     Raises
     ------

@@ -25,7 +25,6 @@ def read_table(
 
     Parameters
     ----------
-    path : Path
     names, numbers : sequence of str
         Columns that must exist, as text and as float64.
     optional, labels : sequence of str
@@ -73,10 +72,6 @@ def read_table(
 def headings_of(path: Path) -> list[str]:
     """The headings of a CSV.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     InputError
@@ -115,7 +110,6 @@ def refuse_rows(path: Path, wrong: pd.Series, kind: str, column: pd.Series, **va
 
     Parameters
     ----------
-    path : Path
     wrong : Series of bool (rows,)
     kind : str
         Of the refusal.
@@ -136,12 +130,6 @@ def refuse_rows(path: Path, wrong: pd.Series, kind: str, column: pd.Series, **va
 
 def refuse_repeated(path: Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
     """Refuse a table of which two rows agree in some columns.
-
-    Parameters
-    ----------
-    path : Path
-    table : DataFrame
-    columns : sequence of str
 
     Raises
     ------

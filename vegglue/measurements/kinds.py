@@ -117,7 +117,6 @@ def kind_of(name: str, where: str = "observations") -> Kind:
 
     Parameters
     ----------
-    name : str
     where : str
         How a refusal begins.
 

@@ -129,7 +129,6 @@ def section_place(station: pd.DataFrame, experiment: str, section: str) -> float
     Parameters
     ----------
     station : table of stations
-    experiment, section : str
     """
     own = (station["experiment"] == experiment) & (station["section"] == section)
     return float(station.loc[own, "x"].median())
@@ -137,10 +136,6 @@ def section_place(station: pd.DataFrame, experiment: str, section: str) -> float
 
 def read_observations(case: Case) -> Observations:
     """Read every file of measurements that a case names, judge their quality, and average verticals over the depth.
-
-    Parameters
-    ----------
-    case : Case
 
     Returns
     -------
@@ -216,7 +211,6 @@ def refuse_unknown_limits(case: Case, table: pd.DataFrame) -> None:
 
     Parameters
     ----------
-    case : Case
     table : table of stations
 
     Raises

@@ -70,10 +70,6 @@ class RigidCylinder:
 def read_survey(path: Path) -> dict[str, SurveyedQuantity]:
     """Read a table of `quantity,mean,standard_deviation,samples`, one row for each of SURVEYED.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     dict of str to SurveyedQuantity
@@ -123,10 +119,6 @@ def rigid_cylinder(
         not surveyed; without it there is no undergrowth.
     draws, seed
         How many draws, and their seed.
-
-    Returns
-    -------
-    RigidCylinder
 
     References
     ----------

@@ -99,7 +99,6 @@ class ImplausibleValues:
         The kind in words.
     instrument, si_unit : str
         As in Kind, and the unit of its values.
-    symptom : Symptom
     unit : str
         The unit in which they would be plausible; empty for none.
     size : float
@@ -230,8 +229,6 @@ def implausible_values(case: Case, site: Site, station: pd.DataFrame) -> list[Im
 
     Parameters
     ----------
-    case : Case
-    site : Site
     station : DataFrame
         As Observations.table [SI].
 
@@ -286,16 +283,6 @@ def plausible_flow(case: Case, site: Site, experiment: Experiment) -> PlausibleF
     Q and z_out within 95 % of their priors. A of `slowest` lies under a surface parallel to the floor, or that of the
     outlet if that is higher; A of `fastest` under the lower one that smooth walls leave, see `_smoothest`. If plants
     hold the water up, A is larger and the flow slower.
-
-    Parameters
-    ----------
-    case : Case
-    site : Site
-    experiment : Experiment
-
-    Returns
-    -------
-    PlausibleFlow
     """
     level = prior_range(case, experiment.level)
     parts = [prior_range(case, value) for value in experiment.discharge.values()]

@@ -93,7 +93,6 @@ class CarriedDischarge:
 
     Attributes
     ----------
-    experiment, section : str
     x : float
         Of the section [m].
     value : float
@@ -168,10 +167,8 @@ def grid_weights(section: CrossSection, position: Array, columns: Sequence[Colum
 
     Parameters
     ----------
-    section : CrossSection
     position
         y of the verticals (columns,) [m].
-    columns : sequence of Column
     step
         Largest height of a grid cell [m].
 
@@ -211,7 +208,6 @@ def conveyance_weights(section: CrossSection, position: Array, depth: Array) -> 
 
     Parameters
     ----------
-    section : CrossSection
     position, depth
         y and water depth h of the verticals (columns,) [m].
 
@@ -280,10 +276,6 @@ def combine(value: float, sampling: float, spacing: float, rule: float) -> Disch
         out if NaN.
     rule
         From the profile assumed where nothing was measured [m3/s].
-
-    Returns
-    -------
-    Discharge
     """
     return Discharge(value, float(np.hypot(np.fmax(sampling, spacing), rule)))
 
@@ -295,8 +287,6 @@ def section_discharges(
 
     Parameters
     ----------
-    section : CrossSection
-    columns : sequence of Column
     good : DataFrame
         Their profiles, rows of Observations.profiles.
     error
@@ -328,8 +318,6 @@ def carried_discharges(case: Case, site: Site, station: pd.DataFrame) -> list[Ca
 
     Parameters
     ----------
-    case : Case
-    site : Site
     station : DataFrame
         As Observations.table [SI]; levels that their experiment cannot have are left out.
 
@@ -386,8 +374,6 @@ def changing_discharge(case: Case, experiment: str, x: float) -> str:
 
     Parameters
     ----------
-    case : Case
-    experiment : str
     x : [m]
         Of the section.
     """
@@ -406,8 +392,6 @@ def level_by_gauges(case: Case, setting: Experiment, gauges: pd.DataFrame, x: fl
 
     Parameters
     ----------
-    case : Case
-    setting : Experiment
     gauges : DataFrame
         Its stations of measured levels, one at least.
     x : float

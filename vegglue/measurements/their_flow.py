@@ -100,10 +100,6 @@ class TheirFlow:
 def read_their_flow(path: Path) -> TheirFlow:
     """The flow in a file of a case, with the columns COLUMNS.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     InputError

@@ -186,7 +186,6 @@ def linear_average(column: Column, scatter: float = 1.0) -> tuple[float, float]:
 
     Parameters
     ----------
-    column : Column
     scatter
         Factor on the standard errors of the points [-], see ProfileFit.
 
@@ -209,7 +208,6 @@ def few_points_average(column: Column, among_plants: bool) -> tuple[float, float
 
     Parameters
     ----------
-    column : Column
     among_plants
         Whether the vertical stands in plants.
 
@@ -238,10 +236,6 @@ def average_within_plants(column: Column) -> tuple[float, float]:
     As `linear_average`, but uniform below the lowest point; what zero at the bed would change is the bound of a uniform
     distribution.
 
-    Parameters
-    ----------
-    column : Column
-
     Returns
     -------
     U, standard error
@@ -257,10 +251,6 @@ def fit_log_law(column: Column) -> ProfileFit | None:
 
     Weighted least squares: z_0 is the best of HEIGHTS_TRIED values, the slope of each is exact.
 
-    Parameters
-    ----------
-    column : Column
-
     Returns
     -------
     ProfileFit or None
@@ -274,10 +264,6 @@ def fit_two_layers(column: Column) -> ProfileFit | None:
     """u = u_v below the canopy height k, u_v + (u* / kappa) ln(z / k) above it: the profile inside plants.
 
     Weighted least squares: k is the best of HEIGHTS_TRIED values, u_v and the slope of each are exact.
-
-    Parameters
-    ----------
-    column : Column
 
     Returns
     -------
@@ -299,10 +285,6 @@ def fit_canopy_height(columns: Sequence[Column]) -> CanopyHeight:
     Each vertical has the profile of `fit_two_layers`, with u_v and u* of its own. Standard error: half the width of the
     range in which chi2(k) <= chi2_min + s^2, with s^2 the reduced chi-square, at least 1, so that scatter between stems
     and verticals counts.
-
-    Parameters
-    ----------
-    columns : sequence of Column
 
     Returns
     -------

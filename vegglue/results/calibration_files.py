@@ -38,7 +38,6 @@ def pest_names(names: Iterable[str], longest: int = LONGEST_PARAMETER) -> dict[s
 
     Parameters
     ----------
-    names : iterable of str
     longest : int
         Letters at most.
 
@@ -81,8 +80,6 @@ def write_pest(
 
     Parameters
     ----------
-    folder : Path
-    case : Case
     station : DataFrame
         Rows with a value. Their weight is one over the standard error, 0 if they are not used or it is unknown.
     command : str
@@ -176,10 +173,6 @@ def weights_of(station: pd.DataFrame) -> Array:
 def bounds_of(prior: Parameter) -> tuple[float, float]:
     """Bounds of a prior for programs that need them.
 
-    Parameters
-    ----------
-    prior : Parameter
-
     Returns
     -------
     float, float
@@ -226,7 +219,6 @@ def write_spotpy(
 
     Parameters
     ----------
-    path : Path
     names : mapping of str to str
         Of the columns, by parameter.
     theta : mapping of str to (member,)
@@ -281,11 +273,6 @@ def solved_rows(ensemble: Ensemble) -> NDArray[np.int64]:
 def read_parameters(path: Path, case: Case) -> dict[str, Array]:
     """Members of a CSV with one row each: a column for each parameter, by its name, or that of `pest_names` in any
     case, and at most one that names the members.
-
-    Parameters
-    ----------
-    path : Path
-    case : Case
 
     Returns
     -------

@@ -55,7 +55,6 @@ class LocalAnomaly:
         Its size [unit].
     interval95 : (float, float)
         Of the amplitude [unit].
-    unit : str
     score : float
         Of its fingerprint [standard errors].
     experiments : tuple of str
@@ -168,7 +167,6 @@ class FieldFound:
 
     Attributes
     ----------
-    term : str
     size : float
         Standard deviation [unit of the term].
     length, width : float
@@ -335,10 +333,8 @@ class AmplitudeEstimate:
         From its own refit if `refitted`, else to first order; with its prior [unit].
     interval95 : (float, float)
         95 % interval of the value [unit].
-    unit : str
     off, scale : float
         Value at which the effect is off, and a plausible distance from it [unit].
-    refitted : bool
     objective : float
         Least |W (y - f)|^2 + |z|^2 with the effect [-], predicted if it was not refitted.
     support : (float, float)
@@ -418,13 +414,8 @@ class CandidateEffect:
 
     Attributes
     ----------
-    name : str
-    title : str
     shapes : dict of float
         Shapes by name at which it scores best.
-    amplitude : AmplitudeEstimate
-    test : ScoreTest
-    detectability : Detectability
     """
 
     name: str
@@ -446,7 +437,6 @@ class Rival:
 
     Attributes
     ----------
-    name : str
     kind : str
         `effect`, a term at a place, or the kind of an instrument.
     probability : float

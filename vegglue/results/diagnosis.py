@@ -140,21 +140,10 @@ class Diagnosis:
     ----------
     name, version
         Of the case and of vegglue.
-    verdict : Verdict
-    candidate_effects : tuple of CandidateEffect
     steps : tuple of Step
         Rounds of the search.
-    misfit : Misfit
-    errors : EstimatedErrors
-    first_screening : FirstScreening
-    parameters : ParameterEstimates
-    predictions : Predictions
-    place_map : PlaceMap
-    places : tuple of LocalAnomaly
-    instruments : tuple of FaultyInstrument
     field, field_map
         A field, if one is significant.
-    model_error : ModelErrorUsed or None
     bed_map : FieldMapKept or None
         What measurements change a surveyed bed by [m].
     laws : CandidateLaws or None
@@ -244,10 +233,6 @@ class Diagnosis:
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Every number of a diagnosis that is printed.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
 
     Returns
     -------

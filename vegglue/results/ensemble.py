@@ -78,7 +78,6 @@ class Fields:
         Cell centres [m].
     range
         Along x [m].
-    config_hash
     """
 
     level: Annotated[Single, Stored(DIMS, "m")]
@@ -96,11 +95,6 @@ QUANTITIES = tuple(stored_fields(Fields))  # in the order in which sensor.read_s
 
 def window_of(case: Case, grid: Grid) -> FieldWindow | None:
     """The cells whose centres surround the range of which a case keeps the fields.
-
-    Parameters
-    ----------
-    case : Case
-    grid : Grid
 
     Returns
     -------
@@ -128,7 +122,6 @@ class FieldsTooLarge:
     ----------
     megabytes : float
         Their size [MB].
-    members : int
     budget : float
         [MB]
     length, fitting : float
@@ -158,7 +151,6 @@ def predict_at(fields: Fields, x: float, y: float, quantity: Quantity = "u") -> 
 
     Parameters
     ----------
-    fields : Fields
     x, y : float
         Place in the coordinates of the grid [m].
     quantity : {"u", "v", "level"}
@@ -231,7 +223,6 @@ class Header:
         Of the parameters.
     station : DataFrame
         All rows of observations.table.
-    experiments : tuple of str
     sections : tuple of (str, float)
         Name, x [m].
     chunks : int
@@ -240,9 +231,6 @@ class Header:
         Hash of these sets.
     config : str
         Resolved YAML.
-    config_hash : str
-    seed : int
-    version : str
     window : FieldWindow or None
         Where fields are kept.
     """

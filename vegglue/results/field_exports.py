@@ -38,10 +38,8 @@ def write_geotiff(path: Path, values: Array, grid: Grid, frame: Frame | None) ->
 
     Parameters
     ----------
-    path : Path
     values : (nx, ny)
         At cell centres; NaN where there is none.
-    grid : Grid
     frame : Frame, optional
         Turns x and y onto the map.
 
@@ -95,12 +93,6 @@ QUANTITIES_OF_FLOW = dict.fromkeys(("bed", "level", "depth"), "m") | dict.fromke
 def quantities(flow: FlowFields, grid: Grid, frame: Frame | None) -> dict[str, Array]:
     """The fields of one experiment by name.
 
-    Parameters
-    ----------
-    flow : FlowFields
-    grid : Grid
-    frame : Frame or None
-
     Returns
     -------
     dict of ndarray (nx, ny)
@@ -133,10 +125,8 @@ def write_mesh(
 
     Parameters
     ----------
-    path : Path
     flows : mapping of str to FlowFields
         By experiment.
-    grid : Grid
     frame : Frame, optional
         Turns x and y onto the map.
     attributes : mapping of str to str
@@ -249,9 +239,6 @@ def write_field_table(path: Path, flow: FlowFields, grid: Grid, frame: Frame | N
 
     Parameters
     ----------
-    path : Path
-    flow : FlowFields
-    grid : Grid
     frame : Frame, optional
         Turns x and y onto the map.
     """
@@ -269,12 +256,10 @@ def write_station_table(
 
     Parameters
     ----------
-    path : Path
     station : mapping of str to (station,)
         Columns of `Observations.table`.
     predicted : (station,), optional
         What the model gives there [unit of the kind].
-    grid : Grid
     frame : Frame, optional
         Turns x and y onto the map.
     """

@@ -27,11 +27,6 @@ ENGINE = "h5netcdf"
 def read_labelled(path: Path, *groups: str) -> "xarray.Dataset":
     """Groups of a result file as one dataset.
 
-    Parameters
-    ----------
-    path : Path
-    *groups : str
-
     Returns
     -------
     xarray.Dataset
@@ -93,10 +88,6 @@ def as_tree(parts: "Mapping[str, xarray.Dataset]") -> "xarray.DataTree":
     parts : mapping of xarray.Dataset
         By the name of the group.
 
-    Returns
-    -------
-    xarray.DataTree
-
     Raises
     ------
     InputError
@@ -130,7 +121,6 @@ def extra_library(name: str, extra: str = "arviz", asking: str = "vegglue.load",
 
     Parameters
     ----------
-    name : str
     extra : str
         That has it.
     asking : str

@@ -23,7 +23,6 @@ class Stored:
     ----------
     dims : tuple of str
         Names of its dimensions; of a dict the first is that of its keys.
-    unit : str
     fill : object
         What stands where nothing is known.
     type : type
@@ -44,8 +43,6 @@ class Variable:
     ----------
     dims : tuple of str
         Names of its dimensions.
-    values : array
-    unit : str
     compressed : tuple of int or None
         Shape of the blocks in which it is compressed, if any.
     """
@@ -100,7 +97,6 @@ def fitting(group: ReadGroup, stored: Mapping[str, Stored], sizes: Mapping[str, 
 
     Parameters
     ----------
-    group : mapping of ndarray
     stored : mapping of Stored
         The variables.
     sizes : mapping of int, optional

@@ -108,9 +108,6 @@ class ModelScore:
         Of the case.
     values : dict of (float, float, float)
         Parameters with their 95 % intervals.
-    in_sample : InSample
-    held_out : HeldOut
-    predictive : PredictiveScores
     homogeneity : dict of float
         Chance that a parameter is the same in all experiments, by name [-].
     validation : float
@@ -167,7 +164,6 @@ class ModelComparison:
 
     Attributes
     ----------
-    steps : tuple of ComparedModel
     left_out
         Number of readings excluded for all.
     reason
@@ -260,7 +256,6 @@ class ProposedMeasurement:
     ----------
     name : str
         In words.
-    experiment : str
     x : float
         [m]
     stations : int

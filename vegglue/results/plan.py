@@ -46,7 +46,6 @@ class PlannedPiece:
 
     Attributes
     ----------
-    work : Work
     experiment : str
         The flow it is done in, '' for all.
     x : float
@@ -89,7 +88,6 @@ class PlannedEffect:
 
     Attributes
     ----------
-    name, title : str
     unit : str
         Of its amplitude.
     smallest, best, worst : float
@@ -267,7 +265,6 @@ class ProposedPieces:
 
     Attributes
     ----------
-    pieces : tuple of PlannedPiece
     hours : float
         Field work, with that of another flow [h].
     before, after, least : float
@@ -343,7 +340,6 @@ def hours_of(pieces: Sequence[PlannedPiece], another_flow: float, present: froze
 
     Parameters
     ----------
-    pieces : sequence of PlannedPiece
     another_flow : float
         [h]
     present : frozenset of str
@@ -361,10 +357,6 @@ def hours_of(pieces: Sequence[PlannedPiece], another_flow: float, present: froze
 
 def plan_json(plan: FieldPlan) -> dict[str, Any]:
     """A plan as the object that `vegglue plan --json` prints and plan.json keeps: docs/plan.md lists its keys.
-
-    Parameters
-    ----------
-    plan : FieldPlan
 
     Returns
     -------
@@ -420,13 +412,10 @@ class FieldPlace:
 
     Attributes
     ----------
-    name : str
-    work : Work
     x : float
         [m]
     y : tuple of float
         Of its stations [m], the lowest first.
-    experiments : tuple of str
     """
 
     name: str
@@ -442,8 +431,6 @@ class FieldStation:
 
     Attributes
     ----------
-    name : str
-    work : Work
     x, y : float
         In the case [m].
     east, north : float
@@ -471,8 +458,6 @@ class FieldFiles:
 
     Attributes
     ----------
-    folder : Path
-    stations : tuple of FieldStation
     without_gpx : {"", "frame", "crs", "pyproj", "system"}
         Why there is no GPX, '' if there is one: `frame` or `crs` of the case is missing, pyproj is not installed, or
         the system is unknown to it.
@@ -502,11 +487,6 @@ def field_places(plan: FieldPlan) -> tuple[FieldPlace, ...]:
 
 def field_stations(case: Case, plan: FieldPlan) -> tuple[tuple[FieldStation, ...], str]:
     """Stations of all places of a plan with their map coordinates.
-
-    Parameters
-    ----------
-    case : Case
-    plan : FieldPlan
 
     Returns
     -------
@@ -559,16 +539,6 @@ def field_stations(case: Case, plan: FieldPlan) -> tuple[tuple[FieldStation, ...
 
 def write_field_files(folder: Path, case: Case, plan: FieldPlan) -> FieldFiles:
     """Write stations.csv, stations.gpx and sheet/ into the folder of a plan.
-
-    Parameters
-    ----------
-    folder : Path
-    case : Case
-    plan : FieldPlan
-
-    Returns
-    -------
-    FieldFiles
 
     Raises
     ------
@@ -626,8 +596,6 @@ def sheets(folder: Path, case: Case, plan: FieldPlan) -> dict[str, str]:
     ----------
     folder : Path
         Where they will be.
-    case : Case
-    plan : FieldPlan
 
     Returns
     -------

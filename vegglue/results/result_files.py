@@ -68,10 +68,6 @@ def read_ensemble(path: Path, expected_hash: str | None = None, config: Path | N
     config : Path, optional
         The file of the case, for the command that a refusal names.
 
-    Returns
-    -------
-    Ensemble
-
     Raises
     ------
     InputError
@@ -118,7 +114,6 @@ def write_posterior(path: Path, posterior: Posterior, config: str, config_hash: 
     ----------
     path : Path
         `posterior.h5`.
-    posterior : Posterior
     config : str
         The resolved config that it was inferred under, as YAML.
     config_hash : str
@@ -141,10 +136,6 @@ def read_posterior(path: Path, expected_hash: str | None = None, config: Path | 
     path, expected_hash, config
         `posterior.h5`, and as `read_ensemble`.
 
-    Returns
-    -------
-    Posterior
-
     Raises
     ------
     InputError, StorageError
@@ -160,7 +151,6 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, config: str, config_hash: 
     ----------
     path : Path
         `diagnosis.h5`.
-    diagnosis : Diagnosis
     config, config_hash
         As `write_posterior`.
 
@@ -180,10 +170,6 @@ def read_diagnosis(path: Path, expected_hash: str | None = None) -> Diagnosis:
     ----------
     path, expected_hash
         `diagnosis.h5`, and as `read_ensemble`.
-
-    Returns
-    -------
-    Diagnosis
 
     Raises
     ------
@@ -244,7 +230,6 @@ def flow_that_fits(path: Path, config_hash: str, theta: Mapping[str, float]) -> 
     ----------
     path : Path
         `flow.h5`.
-    config_hash : str
     theta : mapping of str to float
         [their units]
 

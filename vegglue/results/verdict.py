@@ -216,7 +216,6 @@ class EffectFound:
         [unit]
     interval95 : (float, float)
         Of the amplitude [unit].
-    unit : str
     probability : float
         Of it and of those alike together, among all that was tried [-].
     alike : tuple of str
@@ -328,10 +327,8 @@ class EstimateAtBound:
 
     Attributes
     ----------
-    parameter : str
     value : float
         As calibrated [unit].
-    unit : str
     low, high : float
         The ends of its prior [unit].
     lower : bool
@@ -352,10 +349,8 @@ class BeyondHandbook:
 
     Attributes
     ----------
-    parameter : str
     value : float
         As calibrated [unit].
-    unit : str
     low, high : float
         The range of the handbook [unit].
     source : str

@@ -61,7 +61,6 @@ class CaseRun:
 
     Parameters
     ----------
-    case : Case
     runs : Path
         Folder that holds one folder of results for each case.
     jobs : int
@@ -172,10 +171,6 @@ def case_run(
         Is called with each phase.
     force : bool
         Whether what vegglue did not write is replaced, too.
-
-    Returns
-    -------
-    CaseRun
     """
     return case if isinstance(case, CaseRun) else CaseRun(case, Path(runs), jobs, watch, force)
 
@@ -199,13 +194,8 @@ def of_size(case: Case, members: int | None) -> Case:
 
     Parameters
     ----------
-    case : Case
     members : int or None
         The case as it is, if None.
-
-    Returns
-    -------
-    Case
 
     Raises
     ------
@@ -235,7 +225,6 @@ def other_size(case: Case, folder: Path) -> int | None:
 
     Parameters
     ----------
-    case : Case
     folder : Path
         Of its run.
 
@@ -257,7 +246,6 @@ def kept_best_fit(case: Case, folder: Path) -> Array | None:
 
     Parameters
     ----------
-    case : Case
     folder : Path
         Of its run, with best.json or posterior.h5.
 
@@ -295,15 +283,10 @@ def calibrated_anew(model: Model, known: Array | None, aside: pd.DataFrame) -> B
 
     Parameters
     ----------
-    model : Model
     known : ndarray (p,) or None
         z [standard deviations of the prior].
     aside : DataFrame
         Measurements that are excluded, with the columns of MEASUREMENT.
-
-    Returns
-    -------
-    Baseline
 
     Raises
     ------
@@ -335,13 +318,8 @@ def calibrated(run: CaseRun, aside: pd.DataFrame) -> Baseline:
 
     Parameters
     ----------
-    run : CaseRun
     aside : DataFrame
         Measurements that are excluded, with the columns of MEASUREMENT.
-
-    Returns
-    -------
-    Baseline
     """
     wanted = run.config_hash
     base = calibrated_anew(run.commanded_model, kept_best_fit(run.case, run.folder), aside)
@@ -351,11 +329,6 @@ def calibrated(run: CaseRun, aside: pd.DataFrame) -> Baseline:
 
 def median_flow(run: CaseRun, posterior: Posterior) -> dict[str, FlowFields]:
     """Steady fields at cell centres for the median parameters, kept in flow.h5.
-
-    Parameters
-    ----------
-    run : CaseRun
-    posterior : Posterior
 
     Returns
     -------

@@ -36,7 +36,6 @@ class CheckedCase:
         `vegglue.wording.sentences.sentence` renders each, `tagged` makes it JSON.
     carried : tuple of CarriedDischarge
         What the velocities of each section carry.
-    cells, stations, used_stations : int
     picture : Path
         Drawing of the channel.
     """

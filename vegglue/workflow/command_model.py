@@ -92,15 +92,10 @@ def with_command(model: Model, folder: Path, watch: Watch) -> Model:
 
     Parameters
     ----------
-    model : Model
     folder : Path
         Of the results of the case.
     watch : callable
         Is called with each phase.
-
-    Returns
-    -------
-    Model
 
     Raises
     ------
@@ -122,7 +117,6 @@ def command_to_learn(model: Model, folder: Path, watch: Watch) -> "tuple[Model, 
 
     Parameters
     ----------
-    model : Model
     folder : Path
         Of the results of the case.
     watch : callable
@@ -218,13 +212,8 @@ def command_tried(model: Model, folder: Path) -> CommandTried:
 
     Parameters
     ----------
-    model : Model
     folder : Path
         Of the results of the case.
-
-    Returns
-    -------
-    CommandTried
 
     Raises
     ------
@@ -279,15 +268,10 @@ def place_of_command(model: Model, folder: Path, watch: Watch) -> CommandPlace:
 
     Parameters
     ----------
-    model : Model
     folder : Path
         Of the results of the case.
     watch : callable
         Is called with each phase.
-
-    Returns
-    -------
-    CommandPlace
     """
     runs, path, wanted = command_runs(model.case, folder), folder / "engine" / PLACE_FILE, case_hash(model.case)
     known = kept_place(path, wanted, len(model.names))
@@ -312,7 +296,6 @@ def kept_place(path: Path, wanted: str, parameters: int) -> tuple[Array, bool, i
 
     Parameters
     ----------
-    path : Path
     wanted : str
         Hash of the case.
     parameters : int

@@ -29,7 +29,6 @@ class DiscoveredCase:
 
     Attributes
     ----------
-    found : Discovery
     effect_file : Path or None
         File of the law; None if none is written.
     child : Case or None
@@ -118,17 +117,12 @@ def written(parent: Case, laws: Sequence[LawFound], target: Path, file: Path, fo
 
     Parameters
     ----------
-    parent : Case
     laws : sequence of LawFound
         A law, and its product if it has one.
     target, file : Path
         The config, and the effect file.
     force : bool
         Whether what vegglue did not write is replaced, too.
-
-    Returns
-    -------
-    Case
 
     Raises
     ------

@@ -53,7 +53,6 @@ class Exported:
 
     Attributes
     ----------
-    files : tuple of Path
     parameters : str
         Of which parameters the flow is.
     """
@@ -147,7 +146,6 @@ def members_to_export(run: CaseRun, valued: Array) -> dict[str, tuple[dict[str, 
 
     Parameters
     ----------
-    run : CaseRun
     valued : ndarray of bool (station,)
         Stations with a value, v of them.
 
@@ -212,10 +210,6 @@ def export_to_spotpy(run: CaseRun) -> Exported:
 
 def flow_to_export(run: CaseRun) -> tuple[dict[str, FlowFields], Array | None, str]:
     """The flow of a case for its median, best or middle parameters.
-
-    Parameters
-    ----------
-    run : CaseRun
 
     Returns
     -------

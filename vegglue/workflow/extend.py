@@ -181,10 +181,6 @@ def extended(run: CaseRun, found: Diagnosis) -> StepwiseExtension:
         Of the parent.
     found : Diagnosis
         Of the parent.
-
-    Returns
-    -------
-    StepwiseExtension
     """
     aside = excluded_by(found)
     run.watch(Progress(with_compilation(f"calibrating {run.case.name}")))
@@ -243,11 +239,6 @@ def verdict_digest(found: Diagnosis) -> str:
 
 def kept_extension(run: CaseRun, found: Diagnosis) -> StepwiseExtension | None:
     """How exactly this case was extended before, by exactly this diagnosis and with its children unchanged.
-
-    Parameters
-    ----------
-    run : CaseRun
-    found : Diagnosis
 
     Returns
     -------
@@ -352,10 +343,8 @@ def calibrated_with_additions(
 
     Parameters
     ----------
-    parent : Model
     added : sequence of (Candidate, mapping of float)
         Effects with values of their shapes [unit of each].
-    found : Diagnosis
     aside : DataFrame
         Measurements that are excluded, with the columns of MEASUREMENT.
 

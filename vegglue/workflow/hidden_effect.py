@@ -52,7 +52,6 @@ class Hidden:
 
     Attributes
     ----------
-    name : str
     amplitude : float
         [unit of its amplitude; a bad probe in standard errors]
     shapes : dict of float
@@ -81,14 +80,12 @@ class Answer:
 
     Attributes
     ----------
-    hidden : tuple of Hidden
     parameters : dict of float
         [unit of each]
     correlation : float
         Of the errors of neighbours along a section [-].
     scale : float
         True over stated errors [-].
-    seed : int
     """
 
     hidden: tuple[Hidden, ...]
@@ -108,7 +105,6 @@ class TwinBase:
 
     Attributes
     ----------
-    model, fine : Model
     here, there : Point
         Of either, at the same z.
     difference : ndarray (station,)
@@ -129,8 +125,6 @@ def chosen_effect(
 
     Parameters
     ----------
-    base : TwinBase
-    errors : Noise
     name : str
         An effect, `unlisted:NAME`, or `?`: then it is drawn until it can be seen.
     size : float or None
@@ -138,10 +132,6 @@ def chosen_effect(
     snr : float
         [standard errors]
     random : numpy.random.Generator
-
-    Returns
-    -------
-    Candidate, Hidden
 
     Raises
     ------
@@ -189,13 +179,8 @@ def candidate_of(model: Model, name: str) -> Candidate:
 
     Parameters
     ----------
-    model : Model
     name : str
         Of a listed effect, or `unlisted:NAME`.
-
-    Returns
-    -------
-    Candidate
 
     Raises
     ------
@@ -228,14 +213,9 @@ def bad_probe(errors: Noise, size: str, random: np.random.Generator) -> Hidden:
 
     Parameters
     ----------
-    errors : Noise
     size : str
         Standard errors, BAD_PROBE_EXCESS up or down if empty.
     random : numpy.random.Generator
-
-    Returns
-    -------
-    Hidden
 
     Raises
     ------
@@ -305,8 +285,6 @@ def visible_length(base: TwinBase, errors: Noise, trace: Array) -> float:
 
     Parameters
     ----------
-    base : TwinBase
-    errors : Noise
     trace : ndarray (station,)
         d [unit of each station].
 
@@ -365,7 +343,6 @@ def true_place(parameters: int, seed: int) -> Array:
     ----------
     parameters : int
         p.
-    seed : int
 
     Returns
     -------
@@ -381,13 +358,8 @@ def twin_base(model: Model, z: Array) -> TwinBase:
 
     Parameters
     ----------
-    model : Model
     z : ndarray (p,)
         [standard deviations of the prior]
-
-    Returns
-    -------
-    TwinBase
 
     Raises
     ------
@@ -420,19 +392,12 @@ def measured_twin(
 
     Parameters
     ----------
-    base : TwinBase
     wanted : sequence of str
         `EFFECT`, `EFFECT=SIZE`, `unlisted:NAME`, `bad_probe`, `?` for any effect, `nothing`.
     snr : float
         Visibility of what has no size [standard errors].
     noise : str
         See `errors_named`.
-    seed : int
-
-    Returns
-    -------
-    DataFrame
-    Answer
 
     Raises
     ------

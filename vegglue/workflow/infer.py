@@ -115,7 +115,6 @@ def own_ensemble(run: CaseRun, given: Ensemble | None, needed: bool) -> Ensemble
 
     Parameters
     ----------
-    run : CaseRun
     given : Ensemble or None
         The one in the folder of the run, if None.
     needed : bool
@@ -155,13 +154,8 @@ def chosen_method(case: Case, asked: Method | None) -> Method:
 
     Parameters
     ----------
-    case : Case
     asked : {"glue", "refine", "surrogate"} or None
         That of the case, if None.
-
-    Returns
-    -------
-    str
 
     Raises
     ------

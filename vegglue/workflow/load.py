@@ -29,7 +29,6 @@ class LoadedRun:
 
     Attributes
     ----------
-    folder : Path
     ensemble : xarray.Dataset or None
         All members: parameters, prediction (member, station), status, reason, mass_error.
     fields : xarray.Dataset or None
@@ -38,7 +37,6 @@ class LoadedRun:
         Of the posterior: theta (parameter, member), weights and what follows from them.
     posterior : arviz.InferenceData or xarray.DataTree or None
         Draws of equal weight, with the groups prior, log_likelihood, posterior_predictive and others.
-    diagnosis : Diagnosis or None
     stations : DataFrame or None
         One row for each measurement.
     """

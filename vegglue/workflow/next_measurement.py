@@ -122,7 +122,6 @@ def with_places(base: Baseline, found: Diagnosis) -> Baseline:
 
     Parameters
     ----------
-    base : Baseline
     found : Diagnosis
         From where it ended the model is calibrated.
 
@@ -146,7 +145,6 @@ def questions_about(
 
     Parameters
     ----------
-    about : Subject
     rivals : sequence of (Candidate, dict of float, float)
         Effect, values of its shapes, gain.
     worths : sequence of MeasurementWorth
@@ -183,11 +181,6 @@ def _proposed(one: MeasurementWorth, now: float, then: float) -> ProposedMeasure
 
 def what_is_open(case: Case, found: Diagnosis) -> list[tuple[Subject, list[Explanation]]]:
     """What a diagnosis leaves open.
-
-    Parameters
-    ----------
-    case : Case
-    found : Diagnosis
 
     Returns
     -------
@@ -251,9 +244,6 @@ def rivals_of(case: Case, found: Diagnosis, names: Sequence[str], plausible: boo
 
     Parameters
     ----------
-    case : Case
-    found : Diagnosis
-    names : sequence of str
     plausible : bool
         Whether effects have a plausible size, else the one that was found; laws have that to first order.
 

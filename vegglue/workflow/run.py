@@ -98,7 +98,6 @@ def with_a_law(parent: CaseRun, alone: Comparison, show: Show) -> CaseRun:
 
     Parameters
     ----------
-    parent : CaseRun
     alone : Comparison
         Of that case alone.
     show : callable
@@ -133,7 +132,6 @@ def make_posterior(run: CaseRun, members: int | None, show: Show) -> bool:
 
     Parameters
     ----------
-    run : CaseRun
     members : int or None
         Of the ensemble, as in the case if None.
     show : callable

@@ -93,7 +93,6 @@ def compute_members(run: CaseRun, path: Path, given: PriorSample | None = None) 
 
     Parameters
     ----------
-    run : CaseRun
     path : Path
         Of the HDF5 file.
     given : PriorSample, optional
@@ -109,15 +108,6 @@ def compute_members(run: CaseRun, path: Path, given: PriorSample | None = None) 
 
 def simulate_given(run: CaseRun, file: Path) -> Ensemble:
     """Solve the members of a CSV, and write their predictions beside the ensemble.
-
-    Parameters
-    ----------
-    run : CaseRun
-    file : Path
-
-    Returns
-    -------
-    Ensemble
 
     Raises
     ------

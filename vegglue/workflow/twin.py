@@ -192,7 +192,6 @@ class Mark:
 
     Attributes
     ----------
-    hidden : Hidden
     kind : {"probe", "unlisted", "law", "effect"}
     verdict : str
         Kind of the verdict, '' without a diagnosis.
@@ -253,11 +252,6 @@ def marks(answer: Answer, diagnosis: Diagnosis | None) -> list[Mark]:
 
 def mark(hidden: Hidden, diagnosis: Diagnosis | None) -> Mark:
     """A hidden cause compared with a diagnosis.
-
-    Parameters
-    ----------
-    hidden : Hidden
-    diagnosis : Diagnosis or None
 
     Returns
     -------
