@@ -3,7 +3,6 @@
 import math
 import re
 import shlex
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -101,30 +100,6 @@ FARTHEST_BOUND = 7.0
 WIDEST_LOG = 20.0
 
 
-def _unusable(distribution: str, numbers: Mapping[str, float | None]) -> str | None:
-    """What a prior should have been; None for one that can be drawn from.
-
-    numbers: low, high, mean, sd, median and log_sd, None where there is none.
-    """
-    given = {name: value for name, value in numbers.items() if value is not None}
-    if any(value and not SMALLEST_IN_PRIOR <= abs(value) <= LARGEST_IN_PRIOR for value in given.values()):
-        return phrase("usable_prior", "size", (SMALLEST_IN_PRIOR, LARGEST_IN_PRIOR))
-    if distribution == "lognormal":
-        spread = given["log_sd"]
-        return None if THINNEST < spread < WIDEST_LOG else phrase("usable_prior", "log_sd", (THINNEST, WIDEST_LOG))
-    if distribution != "normal":
-        width, size = given["high"] - given["low"], max(abs(given["low"]), abs(given["high"]))
-        return None if width > THINNEST * size else phrase("usable_prior", "range")
-    mean, sd, low, high = given["mean"], given["sd"], given.get("low", -math.inf), given.get("high", math.inf)
-    if sd < THINNEST * abs(mean):
-        return phrase("usable_prior", "sd")
-    if low > mean + FARTHEST_BOUND * sd or high < mean - FARTHEST_BOUND * sd:
-        return phrase("usable_prior", "bounds", (FARTHEST_BOUND,))
-    if high - low < THINNEST * sd:
-        return phrase("usable_prior", "uniform")
-    return None
-
-
 class Experiment(Part):
     """A steady flow, and what differs in it from the others."""
 
@@ -164,10 +139,25 @@ class Parameter(Part):
             raise ValueError("a `low` below `high`")
         if self.distribution == "loguniform" and self.low is not None and self.low <= 0:
             raise ValueError("a `low` above 0 for a loguniform prior")
-        keys_of_numbers = ("low", "high", "mean", "sd", "median", "log_sd")
-        wanted = _unusable(self.distribution, {key: getattr(self, key) for key in keys_of_numbers})
-        if wanted is not None:
-            raise ValueError(wanted)
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_drawn_from(self) -> Self:
+        low, high = -math.inf if self.low is None else self.low, math.inf if self.high is None else self.high
+        numbers = (self.low, self.high, self.mean, self.sd, self.median, self.log_sd)
+        if any(one and not SMALLEST_IN_PRIOR <= abs(one) <= LARGEST_IN_PRIOR for one in numbers):
+            raise ValueError(phrase("usable_prior", "size", (SMALLEST_IN_PRIOR, LARGEST_IN_PRIOR)))
+        if self.log_sd is not None and not THINNEST < self.log_sd < WIDEST_LOG:
+            raise ValueError(phrase("usable_prior", "log_sd", (THINNEST, WIDEST_LOG)))
+        if self.distribution in ("uniform", "loguniform") and high - low <= THINNEST * max(abs(low), abs(high)):
+            raise ValueError(phrase("usable_prior", "range"))
+        if self.mean is not None and self.sd is not None:
+            if self.sd < THINNEST * abs(self.mean):
+                raise ValueError(phrase("usable_prior", "sd"))
+            if low > self.mean + FARTHEST_BOUND * self.sd or high < self.mean - FARTHEST_BOUND * self.sd:
+                raise ValueError(phrase("usable_prior", "bounds", (FARTHEST_BOUND,)))
+            if high - low < THINNEST * self.sd:
+                raise ValueError(phrase("usable_prior", "uniform"))
         return self
 
 

@@ -16,7 +16,6 @@ The second half lists terms, quantities and forms, and which of them make sense 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -173,6 +172,12 @@ class Law:
         own = self.form.of(self.quantity.of(cells), reference)
         return own if self.times is None else own * self.times.g(cells, first)
 
+    def act(
+        self, cells: Cells, strength: Array, reference: Array | float = 1.0, first: Array | float = 1.0
+    ) -> dict[str, Array]:
+        """What its effect returns: the term with the factor exp(a g)."""
+        return self.term.changed(cells, np.exp(strength * self.g(cells, reference, first) * self.term.share(cells)))
+
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """Its reference, and that of the law that it multiplies, where g has one."""
@@ -187,7 +192,7 @@ class Law:
             stage=self.term.stage,
             title=self.title,
             equation=self.equation(),
-            act=partial(_by_law, self),
+            act=self.act,
             amplitude=Amplitude("strength", "-", f"strength {letter}", PLAUSIBLE_STRENGTH, -strongest, strongest),
             shapes=self.shapes,
             source="definition",
@@ -202,12 +207,6 @@ def _reference(name: str, law: Law) -> tuple[Shape, ...]:
     low, high = (-0.5, 0.5) if quantity.name == "along" else (1e-3 * quantity.usual, 1e3 * quantity.usual)
     shape = Shape(name, quantity.unit, f"reference r of {quantity.words}", quantity.usual, low, high, of=quantity.scale)
     return (shape,) if law.form.quantiles else ()
-
-
-def _by_law(
-    law: Law, cells: Cells, strength: Array, reference: Array | float = 1.0, first: Array | float = 1.0
-) -> dict[str, Array]:
-    return law.term.changed(cells, np.exp(strength * law.g(cells, reference, first) * law.term.share(cells)))
 
 
 def _friction(cells: Cells, factor: Array) -> dict[str, Array]:
