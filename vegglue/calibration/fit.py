@@ -110,7 +110,7 @@ def fit(
     for _ in range(steps):
         slope, residual = noise.whiten(noise.used(point.slope)), noise.whiten(noise.residual(point.prediction))
         matrix, right = slope.T @ slope + np.eye(point.z.size), slope.T @ residual - point.z
-        damped, step, predicted = _step(point, matrix, right, longest)
+        damped, step, predicted = _levenberg_step(point, matrix, right, longest)
         before = objective(noise, point)
         objectives.append(before)
         stalled = len(objectives) > STALLED_STEPS and objectives[-1 - STALLED_STEPS] - before < STALLED_DECREASE
@@ -122,7 +122,7 @@ def fit(
         if before - right @ np.linalg.solve(matrix, right) > enough:
             break
         if predicted > STRAIGHT_DECREASE:
-            step = _bent(model, noise, point, damped, step)
+            step = _geodesic_step(model, noise, point, damped, step)
         there = point.z + step
         # The slopes of a step that is taken back are never computed: they are half of its work.
         moved = linearise(model, there, point, partial(lower_there, there, before))
@@ -150,7 +150,7 @@ def fit_from(model: Model, noise: Noise, z: Array, near: Point | None = None) ->
     return None if start is None else fit(model, noise, start)
 
 
-def _step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Array, Array, float]:
+def _levenberg_step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Array, Array, float]:
     """H + l 1 with a step (p,) no longer than `longest` (Levenberg 1944), the step, and the predicted decrease."""
     # Beyond FURTHEST theta equals its bound: a z that would go there is held, else it shortens the step of the others.
     held = (np.abs(point.z) >= FURTHEST) & (right * point.z > 0.0)
@@ -164,8 +164,11 @@ def _step(point: Point, matrix: Array, right: Array, longest: float) -> tuple[Ar
     return damped, np.asarray(step), float(2.0 * right @ step - step @ matrix @ step)
 
 
-def _bent(model: Model, noise: Noise, point: Point, damped: Array, step: Array) -> Array:
-    """The step (p,) along the bend of the predictions, shorter if that is large; straight if no flow is found ahead."""
+def _geodesic_step(model: Model, noise: Noise, point: Point, damped: Array, step: Array) -> Array:
+    """The step (p,) along the bend of the predictions, shorter if that is large; straight if no flow is found ahead.
+
+    Geodesic acceleration (Transtrum and Sethna 2012, arXiv:1201.5885).
+    """
     ahead = prediction_at(model, point.z + BEND_STEP * step, point)
     if ahead is None:
         return step

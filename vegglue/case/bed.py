@@ -118,7 +118,7 @@ def _levels_in(line: str) -> Array:
         return np.array(plain.split(), dtype=np.float64)
 
 
-def _levels_at(raster: Raster, x: Array, y: Array) -> Array:
+def _bilinear(raster: Raster, x: Array, y: Array) -> Array:
     """Levels [m] at x (nx, 1) and y (1, ny), or both (nx, ny): bilinear between the centres of the raster.
 
     Constant in its outer half cell; NaN outside and next to missing data.
@@ -273,7 +273,7 @@ def layer_levels(layer: BedLayer, grid: Grid, upstream: float) -> Array:
         bank = channel.bank_slope * np.clip(out, 0.0, reach)
         return np.asarray((channel.level - channel.bed_slope * (grid.x - upstream))[:, None] + bank[None, :])
     if layer.raster is not None:
-        level = _levels_at(read_raster(layer.raster), *places_on_map(grid))
+        level = _bilinear(read_raster(layer.raster), *places_on_map(grid))
     elif layer.points is not None:
         level = survey_levels(layer.points, *places_on_map(grid))
     else:

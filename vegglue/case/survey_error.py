@@ -423,16 +423,6 @@ class _Kriging:
         return np.asarray(found)
 
 
-def _kriging(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]) -> _Kriging:
-    basis, parts = survey.basis(survey.points), []
-    for one in covariances:
-        lower = cholesky(_of_readings(survey, one), lower=True)
-        white = solve_triangular(lower, np.column_stack([basis, survey.points[:, 2]]), lower=True)
-        shape = cholesky(white[:, :-1].T @ white[:, :-1], lower=True)
-        parts.append((lower, white, shape, cho_solve((shape, True), white[:, :-1].T @ white[:, -1])))
-    return _Kriging(survey, covariances, parts)
-
-
 def root_of_covariance(survey: BedSurvey, covariances: Sequence[CovarianceOfBed], places: Array) -> Array:
     """B with B B' the covariance of the bed around `mean_level`, but for a share LEFT_OUT of its variance.
 
@@ -446,9 +436,15 @@ def root_of_covariance(survey: BedSurvey, covariances: Sequence[CovarianceOfBed]
     (m, k) [m]
         k is MOST_OF_SQUARE_ROOT at most.
     """
+    basis, parts = survey.basis(survey.points), []
+    for one in covariances:
+        lower = cholesky(_of_readings(survey, one), lower=True)
+        white = solve_triangular(lower, np.column_stack([basis, survey.points[:, 2]]), lower=True)
+        shape = cholesky(white[:, :-1].T @ white[:, :-1], lower=True)
+        parts.append((lower, white, shape, cho_solve((shape, True), white[:, :-1].T @ white[:, -1])))
+    kriging = _Kriging(survey, covariances, parts)
     # Cholesky's square root B by the largest variance left, of several places apart at once: their columns are one
     # product of matrices, which takes a tenth of the time of one by one.
-    kriging = _kriging(survey, covariances)
     seen = kriging.seen(places)
     left = np.maximum(kriging.variance(seen), 0.0)
     nearest = 0.5 * min(one.along for one in covariances), 0.5 * min(one.across for one in covariances)

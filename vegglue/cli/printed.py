@@ -135,13 +135,13 @@ def show(case: Case, runs: Path, result: Any, details: bool = False, more: str =
             print(f"Report: {result.resolve()}")
 
 
-def wrapped(paragraphs: Iterable[str], width: int = TERMINAL_WIDTH) -> list[str]:
-    """Each paragraph in lines of so many letters, all but its first indented; names, and numbers with what belongs to
+def wrapped(paragraphs: Iterable[str]) -> list[str]:
+    """Each paragraph in lines of TERMINAL_WIDTH, all but its first indented; names, and numbers with what belongs to
     them, stay whole.
     """
     look: dict[str, Any] = {"subsequent_indent": "  ", "break_long_words": False, "break_on_hyphens": False}
     kept = (KEPT_TOGETHER.sub(FIRM, text) for text in paragraphs)
-    return [line.replace(FIRM, " ") for text in kept for line in textwrap.wrap(text, width, **look)]
+    return [line.replace(FIRM, " ") for text in kept for line in textwrap.wrap(text, TERMINAL_WIDTH, **look)]
 
 
 def verdict_lines(found: Diagnosis, details: str, most: int) -> list[str]:

@@ -278,10 +278,10 @@ def implausible_levels(case: Case, site: Site, station: pd.DataFrame) -> pd.Seri
 
 
 def plausible_flow(case: Case, site: Site, experiment: Experiment) -> PlausibleFlow:
-    """U = Q / A(x) with A under the expected level, and z_out - h / 2 <= z <= z_highest + h / 2, see `_thickest`.
+    """U = Q / A(x) with A under the expected level, and z_out - h/2 <= z <= z_highest + h/2, see `_backwater_level`.
 
     Q and z_out within 95 % of their priors. A of `slowest` lies under a surface parallel to the floor, or that of the
-    outlet if that is higher; A of `fastest` under the lower one that smooth walls leave, see `_smoothest`. If plants
+    outlet if that is higher; A of `fastest` under the lower one that smooth walls leave, see `_normal_level`. If plants
     hold the water up, A is larger and the flow slower.
     """
     level = prior_range(case, experiment.level)
@@ -290,9 +290,9 @@ def plausible_flow(case: Case, site: Site, experiment: Experiment) -> PlausibleF
     expected, deep = (
         np.maximum(expected_depth(case, site, experiment.model_copy(update={"level": end})), 0.0) for end in level
     )
-    smoothest = _smoothest(site, expected, level[0], least)
+    smoothest = _normal_level(site, expected, level[0], least)
     shallow = np.minimum(expected, np.maximum(smoothest[:, None] - site.bed, 0.0))
-    thickest = _thickest(site, deep, level[1], most)
+    thickest = _backwater_level(site, deep, level[1], most)
     dy, depth = site.grid.dy, float(deep[-1].max())
     with np.errstate(divide="ignore"):
         slowest, fastest = least / (dy * deep.sum(axis=1)), most / (dy * shallow.sum(axis=1))
@@ -314,7 +314,7 @@ def plausible_flow(case: Case, site: Site, experiment: Experiment) -> PlausibleF
     )
 
 
-def _smoothest(site: Site, depths: Array, level: float, discharge: float) -> Array:
+def _normal_level(site: Site, depths: Array, level: float, discharge: float) -> Array:
     """z = max(z_out, z_floor + (n q / sqrt(S))^(3/5)) (nx,) [m].
 
     Above the backwater of its outlet a reach may flow at normal depth (Manning), least on smooth walls. S: fall of the
@@ -329,7 +329,7 @@ def _smoothest(site: Site, depths: Array, level: float, discharge: float) -> Arr
     return np.maximum(level, floor + normal)
 
 
-def _thickest(site: Site, depths: Array, level: float, discharge: float) -> Array:
+def _backwater_level(site: Site, depths: Array, level: float, discharge: float) -> Array:
     """z = z_floor + h with h^(13/3) = h_L^(13/3) + 13/3 n^2 q^2 (L - x), (nx,) [m]: water held up by growth all over.
 
     The integral of dh/dx = -n^2 q^2 / h^(10/3), friction after Manning on an even bed, at the thickest growth; on a bed

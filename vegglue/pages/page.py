@@ -3,7 +3,7 @@ several runs on one page: their answers, their parameters side by side, and link
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -219,7 +219,12 @@ def render_overview(folder: Path, runs: Sequence[Run]) -> str:
             name, run.case.title, f"{name}/report.html", headline_lines(run), refined, members,
             posterior.sample.members if refined else 0, max(posterior.weighting.effective_size, 1.0),
         ))  # fmt: skip
-    shared = list(_shared_parameters(runs))
+    alike: dict[tuple[str, object], list[Run]] = {}  # runs whose parameter has one name, unit and prior
+    for name in dict.fromkeys(name for run in runs for name in run.posterior.parameters):
+        for run in (one for one in runs if name in one.posterior.parameters):
+            prior = run.case.parameters[name].model_dump(exclude={"symbol", "meaning"})
+            alike.setdefault((name, tuple(sorted(prior.items()))), []).append(run)
+    shared = [(name, those) for (name, _), those in alike.items() if len(those) > 1]
     shown = [run for _, those in shared for run in those]
     light, dark = palette_css()
     return page_document(
@@ -232,18 +237,6 @@ def render_overview(folder: Path, runs: Sequence[Run]) -> str:
         others=any(run.case.reference for run in shown),
         first_looks=any(not run.posterior.claimed for run in shown),
     )
-
-
-def _shared_parameters(runs: Sequence[Run]) -> Iterator[tuple[str, list[Run]]]:
-    """Parameters that have one name, unit and prior in at least two runs, and those runs."""
-    names = dict.fromkeys(name for run in runs for name in run.posterior.parameters)
-    for name in names:
-        groups: dict[tuple[object, ...], list[Run]] = {}
-        for run in runs:
-            if name in run.posterior.parameters:
-                prior = run.case.parameters[name].model_dump(exclude={"symbol", "meaning"})
-                groups.setdefault(tuple(sorted(prior.items())), []).append(run)
-        yield from ((name, those) for those in groups.values() if len(those) > 1)
 
 
 def _side_by_side(folder: Path, name: str, runs: Sequence[Run]) -> Picture:
