@@ -113,7 +113,13 @@ def dask_setup(worker: object) -> None:
 
 
 def processes_here(where: str) -> int:
-    """N of local:N, 0 for an address. Raises InputError if it is neither."""
+    """N of local:N, 0 for an address.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
     if re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^\s/]+:\d{1,5}", where) and not where.startswith("local:"):
         return 0
     found = re.fullmatch(r"local:([1-9]\d{0,3})", where)
@@ -160,7 +166,10 @@ def refuse_version(wanted: Mapping[str, str], there: Mapping[str, str], worker: 
 def results_of_tasks(client: "Client", work: TaskWork, tasks: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
     """Yield the position and the result of each task as they end; few are under way at once, to bound the memory.
 
-    Raises what a task raises, and InputError if workers died of it, or the scheduler is gone.
+    Raises
+    ------
+    InputError
+        If workers died of a task, or the scheduler is gone. What a task raises comes through.
     """
     from distributed import CancelledError, KilledWorker, as_completed
     from distributed.protocol.pickle import dumps, loads

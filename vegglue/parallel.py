@@ -149,7 +149,13 @@ def at_most(jobs: int) -> Iterator[None]:
 
 
 def cores_of(jobs: int) -> int:
-    """The number of cores, -1 for all. Raises InputError for others below 1."""
+    """The number of cores, for -1 all.
+
+    Raises
+    ------
+    InputError
+        For other numbers below 1.
+    """
     if jobs == 0 or jobs < -1:
         raise InputError(f"jobs: expected the number of cores to use, or -1 for all of them, got {jobs}.")
     return int(cpu_count()) if jobs < 0 else jobs

@@ -59,7 +59,14 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 
     It grows in `path`.new, which is locked: of two commands that write one result, one waits. A file that a killed
     command left there is taken over. A link of either name is replaced, not followed: the folder of a run may come from
-    others. Raises OSError when the file cannot be written; what was there before then stays.
+    others.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written; what was there before then stays.
+    StorageError
+        If another process is writing it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(path.name + ".new")
@@ -81,7 +88,13 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def folder_within(folder: Path, name: str) -> Path:
-    """The place of a folder in another; a link there is taken away, not followed. Errors: StorageError."""
+    """The place of a folder in another; a link there is taken away, not followed.
+
+    Raises
+    ------
+    StorageError
+        If the link cannot be removed.
+    """
     within = folder / name
     if within.is_symlink():
         with failed_writes_told(within, MAKE_ROOM):

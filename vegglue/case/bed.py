@@ -290,7 +290,13 @@ kept_mean_level = memoised(MOST_MEANS_KEPT)(mean_level)  # it is part of the bed
 
 
 def surveyed(survey: SurveyOfBed) -> BedSurvey:
-    """The survey of a layer as it counts now. Errors: InputError."""
+    """The survey of a layer as it counts now.
+
+    Raises
+    ------
+    InputError
+        If its file cannot be read.
+    """
     return read_bed_survey(survey.file, (*survey.loose, *survey.relevelled))
 
 

@@ -134,7 +134,18 @@ def _layers(path: Path, above: tuple[Path, ...]) -> list[tuple[Path, Tree]]:
 
 
 def read_tree(path: Path, above: tuple[Path, ...] = ()) -> Tree:
-    """Keys and values of a YAML file; above: the files whose `extends` led to it. Errors: InputError."""
+    """Keys and values of a YAML file.
+
+    Parameters
+    ----------
+    above : tuple of Path
+        Files whose `extends` led to it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no mapping of keys to values.
+    """
     is_site = any(os.path.isfile(path / name) for name in SITE_FILES)  # which no name is too long for
     advice = "extends" if above else "import" if is_site else "path"
     text = read_text(path, LARGEST_CONFIG, advice, above[-1] if above else None)

@@ -33,7 +33,13 @@ def yaml_of(tree: Any) -> str:
 
 
 def safe_yaml(text: str) -> Any:
-    """The keys and values of a YAML text. Errors: yaml.YAMLError, with the place and a sentence."""
+    """The keys and values of a YAML text.
+
+    Raises
+    ------
+    yaml.YAMLError
+        With the place and a sentence.
+    """
     return yaml.load(text, Loader=_Loader)
 
 

@@ -51,9 +51,21 @@ class Part(BaseModel):
 
 
 def exactly(part: Part, chosen: str, wanted: Mapping[str, tuple[str, ...]], allowed: tuple[str, ...] = ()) -> None:
-    """Check that a part has the keys of its kind and none of another. Errors: ValueError naming the key.
+    """Check that a part has the keys of its kind and none of another.
 
-    chosen: the kind; wanted: the keys of each kind; allowed: keys that any kind may have.
+    Parameters
+    ----------
+    chosen : str
+        The kind.
+    wanted : mapping of tuple of str
+        The keys of each kind.
+    allowed : tuple of str
+        Keys that any kind may have.
+
+    Raises
+    ------
+    ValueError
+        Naming the key.
     """
     others = {key for keys in wanted.values() for key in keys} - set(wanted[chosen]) - set(allowed)
     for key in wanted[chosen]:

@@ -20,10 +20,19 @@ UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\u202
 
 
 def read_text(path: Path, most: int, advice: str = "path", by: Path | None = None) -> str:
-    """The text of a file in UTF-8, with or without its mark, of at most so many bytes; no more is ever read.
+    """The text of a file in UTF-8, with or without its mark.
 
-    advice, by: how to get such a file, see the macro `unreadable`. Errors: InputError when it is no file, cannot be
-    read, is larger, or is not in UTF-8.
+    Parameters
+    ----------
+    most : int
+        Size of the file at most [bytes]; no more is ever read.
+    by : Path, optional
+        With `advice`, how to get such a file, see the macro `unreadable`.
+
+    Raises
+    ------
+    InputError
+        If it is no file, cannot be read, is larger, or is not in UTF-8.
     """
     try:
         content = None
@@ -53,7 +62,12 @@ def unprintable(text: str) -> str | None:
 def write_text(path: Path, text: str, advice: str) -> None:
     """Write a file, and the folders above it, whole or not at all.
 
-    Errors: StorageError, which ends with the advice; InputError for a sign that no file in UTF-8 can hold.
+    Raises
+    ------
+    StorageError
+        If it cannot be written; the message ends with the advice.
+    InputError
+        For a sign that no file in UTF-8 can hold.
     """
     try:
         content = text.encode()

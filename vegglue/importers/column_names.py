@@ -101,7 +101,25 @@ def _plain_unit(word: str) -> str:
 
 
 def si_factor(word: str, quantity: str, where: str) -> float:
-    """SI value of one unit [SI unit per unit]. InputError, which begins with `where`, for an unknown word."""
+    """SI value of one unit.
+
+    Parameters
+    ----------
+    word : str
+        The unit, as it is written.
+    where : str
+        How the message begins.
+
+    Returns
+    -------
+    float
+        [SI unit per unit]
+
+    Raises
+    ------
+    InputError
+        For an unknown word.
+    """
     unit = unit_named(word, quantity)
     if unit is None:
         raise InputError("unknown_unit", where=where, quantity=quantity, got=word, known=list(UNITS[quantity]))

@@ -179,7 +179,10 @@ def _is_of_something_else(heading: str, role: str, headings: tuple[str, ...], na
 def without_flagged(path: Path, table: ParsedTable, columns: Mapping[str, int]) -> ParsedTable:
     """The table without rows that a column of flags marks as no measurement.
 
-    InputError for a column of 0 and 1 of which the heading does not say which is good.
+    Raises
+    ------
+    InputError
+        For a column of 0 and 1 whose heading does not say which is good.
     """
     for place, heading in enumerate(table.headings):
         words = words_of(heading)

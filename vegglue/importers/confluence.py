@@ -75,9 +75,24 @@ def mat_folder(folder: Path) -> Path | None:
 
 
 def case_from_confluence(folder: Path, target: Path) -> Tree:
-    """The config, as keys and values, of the set in a folder; every second section is held out as validation.
+    """The config of the set in a folder; every second section is held out as validation.
 
-    Files are written into a folder beside `target`. InputError for what cannot be read.
+    Parameters
+    ----------
+    folder : Path
+        With bed.csv, water_level.csv and depth_averaged.csv.
+    target : Path
+        The config to be written; files go into a folder beside it.
+
+    Returns
+    -------
+    dict
+        Keys and values.
+
+    Raises
+    ------
+    InputError
+        For what cannot be read.
     """
     verticals = folder / "depth_averaged.csv"
     bed = _columns(folder / "bed.csv", "x_m", "y_m", "z_bed_m")
@@ -249,9 +264,19 @@ def _write(path: Path, heading: str, rows: Sequence[Sequence[float | str]] | Arr
 
 
 def tables_of_mat(source: Path, into: Path) -> Path:
-    """Write bed.csv, water_level.csv and depth_averaged.csv of the MATLAB files; returns their folder.
+    """Write bed.csv, water_level.csv and depth_averaged.csv of the MATLAB files.
 
-    InputError for a file that is none of the set; StorageError.
+    Returns
+    -------
+    Path
+        Their folder.
+
+    Raises
+    ------
+    InputError
+        For a file that is none of the set.
+    StorageError
+        If a file cannot be written.
     """
     maps = load_matlab(source / MAPS_OF_THE_SET, OF_THE_SET, ("Xtopo", "Ytopo", "Ztopo", "Xwl", "Ywl", "Zwl"))
     bed, level = (_points_of_map([maps[f"{axis}{name}"] for axis in "XYZ"]) for name in ("topo", "wl"))

@@ -68,7 +68,13 @@ class StatedSystem:
 
 
 def known_in_metres(crs: str) -> str:
-    """The system of a frame. ValueError if it has no metres, or if pyproj, where it is installed, does not know it."""
+    """The system of a frame.
+
+    Raises
+    ------
+    ValueError
+        If it has no metres, or if pyproj, where it is installed, does not know it.
+    """
     in_metres(crs)
     with suppress(ImportError):  # of the extra `field`: late, as it is not always there
         from pyproj import CRS

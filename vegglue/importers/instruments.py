@@ -41,7 +41,13 @@ NETCDF_BEGINS, CLASSIC_BEGINS = b"\x89HDF", b"CDF"
 
 
 def read_matlab(path: Path, options: FileOptions) -> MeasuredRows:
-    """What a MATLAB file of an instrument holds, known by its variables. InputError."""
+    """What a MATLAB file of an instrument holds, known by its variables.
+
+    Raises
+    ------
+    InputError
+        If it is damaged, or of no instrument that is read.
+    """
     parts = {name.strip("\0 "): part for name, part in load_matlab(path).items()}  # MIDAS fills its names up
     if QREV_VARIABLE in parts:
         return stations_of_qrev(path, parts, options)

@@ -61,7 +61,13 @@ def refuse_foreign_format(path: Path) -> None:
 
 
 def readable_text(path: Path) -> str:
-    """The text of a file: UTF-8, UTF-16 with its mark, or what Windows in the west writes. InputError."""
+    """The text of a file: UTF-8, UTF-16 with its mark, or what Windows in the west writes.
+
+    Raises
+    ------
+    InputError
+        If the file is too large, or cannot be read.
+    """
     try:
         size = path.stat().st_size
         raw = path.read_bytes() if size <= LARGEST_DATA else b""
@@ -84,9 +90,21 @@ def refuse_larger(path: Path, size: int) -> None:
 
 @contextmanager
 def read_by_library(path: Path, kind: str, logger: str = "", limit: int = LARGEST_DATA) -> Iterator[None]:
-    """Within, a library reads a file: its warnings and its log are not shown, all its errors are one InputError.
+    """Within, a library reads a file: its warnings and its log are not shown.
 
-    kind: what the file should be; limit: of its size [bytes].
+    Parameters
+    ----------
+    kind : str
+        What the file should be.
+    logger : str
+        Of the library, if it has one.
+    limit : int
+        Of the size of the file [bytes].
+
+    Raises
+    ------
+    InputError
+        In place of every error of the library.
     """
     log = logging.getLogger(logger) if logger else None
     before = None if log is None else log.disabled
@@ -115,9 +133,17 @@ def read_by_library(path: Path, kind: str, logger: str = "", limit: int = LARGES
 
 @contextmanager
 def importing(library: str, path: Path, extra: str, instead: str) -> Iterator[None]:
-    """Within, a library of an extra is imported. InputError, which names the extra, if it is not installed.
+    """Within, a library of an extra is imported.
 
-    instead: as what else the file may be saved.
+    Parameters
+    ----------
+    instead : str
+        As what else the file may be saved.
+
+    Raises
+    ------
+    InputError
+        Naming the extra, if the library is not installed.
     """
     try:
         yield
@@ -216,7 +242,18 @@ def unpack_matlab(path: str) -> None:
 
 @contextmanager
 def reading_structures(path: Path, kind: str) -> Iterator[None]:
-    """Within, structures of a file are read: whatever they lack is one InputError. kind: whose structures."""
+    """Within, structures of a file are read.
+
+    Parameters
+    ----------
+    kind : str
+        Whose structures.
+
+    Raises
+    ------
+    InputError
+        For whatever they lack.
+    """
     try:
         yield
     except InputError:
@@ -233,8 +270,19 @@ def numbers_of_variable(values: Any) -> Array:
 def open_raw(path: Path, program: str, most: int | None = None, named: Path | None = None) -> Any:
     """The dataset that mhkit, which carries on dolfyn, makes of a raw file.
 
-    program: that of the maker, which can export ASCII; most: samples that the file can hold, where the reader's own
-    guess is too small; named: the file that it is a copy of. InputError without mhkit, and for what it cannot read.
+    Parameters
+    ----------
+    program : str
+        That of the maker, which can export ASCII.
+    most : int, optional
+        Samples that the file can hold, where the reader's own guess is too small.
+    named : Path, optional
+        The file that it is a copy of.
+
+    Raises
+    ------
+    InputError
+        Without mhkit, and for what it cannot read.
     """
     named = named or path
     with importing("mhkit", named, "instruments", f"ASCII by {program}"):

@@ -280,7 +280,10 @@ def rows_of_table(path: Path, table: ParsedTable, options: FileOptions) -> Measu
 def read_placed_rows(path: Path, options: FileOptions) -> MeasuredRows:
     """What a table holds, with places by `line` or `x`, and heights above the bed from both depths.
 
-    InputError, also if its columns hold these places already.
+    Raises
+    ------
+    InputError
+        As `read_rows`; also if its columns hold these places already, or none along a tape.
     """
     taken = read_rows(path, replace(options, line=None))
     if {"below", "depth"} <= taken.numbers.keys() and vertical_role(taken) is None:
@@ -353,10 +356,20 @@ def on_the_tape(path: Path, taken: MeasuredRows, options: FileOptions) -> Measur
 
 
 def refuse_far_places(where: str, east: Array, north: Array, place: Placement) -> None:
-    """InputError for places (n,) [m] that are rather degrees, and if most lie further than FAR from a site on a map.
+    """Refuse places that belong to another site, or to other coordinates.
 
-    where: how the message begins. The cause is what would bring them near: degrees, axes exchanged, another unit,
-    digits in front, or that they are those of the channel.
+    Parameters
+    ----------
+    where : str
+        How the message begins.
+    east, north : ndarray (n,) [m]
+
+    Raises
+    ------
+    InputError
+        For places that are rather degrees, and if most lie further than FAR from a site on a map. The cause is what
+        would bring them near: degrees, axes exchanged, another unit, digits in front, or that they are those of the
+        channel.
     """
     there = np.isfinite(east) & np.isfinite(north)
     at = np.unique(np.column_stack([east, north])[there], axis=0)

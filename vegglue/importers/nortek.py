@@ -185,7 +185,12 @@ def _record_mean(
 
 def read_samples(path: Path, options: FileOptions) -> MeasuredRows:
     """What a table of measurements holds; with a `position`, samples of a probe there without spikes and those of low
-    correlation. InputError also for a `position` of a table that has places of its own, or no velocities.
+    correlation.
+
+    Raises
+    ------
+    InputError
+        If it is no such table; also for a `position` of a table that has places of its own, or no velocities.
     """
     taken = read_placed_rows(path, replace(options, position=None))
     if options.position is None:
@@ -230,7 +235,12 @@ def rows_of_profiler(path: Path, parts: dict[str, Any], options: FileOptions) ->
     """One row for each cell, so far below the `position` of the probe, which looks down; none at the bed and below.
 
     Velocities of beams b are turned by T b, with the matrix T of each cell. Samples without a number, as in a cleaned
-    file, do not count, nor do cells at or below the bed that the probe found, at its median distance. InputError.
+    file, do not count, nor do cells at or below the bed that the probe found, at its median distance.
+
+    Raises
+    ------
+    InputError
+        If the file lacks what this needs, or `position` is not given.
     """
     _refuse_without_position(path, options)
     data, config = (parts[name] for name in PROFILER_VARIABLES)

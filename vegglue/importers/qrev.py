@@ -29,7 +29,13 @@ ENTITIES = re.compile(r"<!(DOCTYPE|ENTITY)")  # QRev writes none, and some unpac
 
 
 def stations_of_qrev(path: Path, parts: dict[str, Any], options: FileOptions) -> MeasuredRows:
-    """Stations of all transects together that QRev used for the discharge. InputError."""
+    """Stations of all transects together that QRev used for the discharge.
+
+    Raises
+    ------
+    InputError
+        If velocities are not in earth coordinates, or the file lacks what this needs; as `stations_of_transect`.
+    """
     with reading_structures(path, "QRev"):
         used = [one for one in np.atleast_1d(parts[QREV_VARIABLE].transects) if bool(one.checked)]
         profiles = [profile for one in used for profile in _profiles_of_transect(path, one, str(used[0].startEdge))]

@@ -204,9 +204,19 @@ def without_repeats(
 
 
 def refuse_confounded_replicates(taken: MeasuredRows, places: Sequence[Hashable], file: str) -> None:
-    """InputError if velocities of one place differ with a column of no role, or the discharge, alike at many places.
+    """Refuse repeats of a place that another column explains: a mean over them would mix two flows.
 
-    places (rows,): what is one if they are equal. A number of the repeat, or its time, makes no difference.
+    Parameters
+    ----------
+    places : sequence (rows,)
+        What is one if they are equal. A number of the repeat, or its time, makes no difference.
+    file : str
+        How the message begins.
+
+    Raises
+    ------
+    InputError
+        If velocities of one place differ with a column of no role, or the discharge, alike at many places.
     """
     columns: dict[str, Sequence[str]] = dict(taken.others)
     if (discharges := taken.numbers.get("discharge")) is not None:

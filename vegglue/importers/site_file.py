@@ -369,7 +369,10 @@ def site_refusal(path: Path, error: ValidationError, *above: str) -> InputError:
 def assumptions_of_site(folder: Path, site: FieldSite) -> list[object]:
     """What `import` assumes because the site file does not state it, and what in the folder is not read.
 
-    site: of the folder. InputError as `read_site`.
+    Raises
+    ------
+    InputError
+        As `read_site`.
     """
     path = site_file(folder)
     given = read_keys(path) if path.is_file() else {}
@@ -399,7 +402,13 @@ def assumptions_of_site(folder: Path, site: FieldSite) -> list[object]:
 
 
 def read_keys(path: Path) -> Any:
-    """Keys and values of a site file, not checked. InputError."""
+    """Keys and values of a site file, not checked.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is neither YAML nor JSON.
+    """
     if path.suffix == ".yaml":
         return read_tree(path)
     text = read_text(path, LARGEST_CONFIG, "site")

@@ -339,9 +339,18 @@ def _outlines(geometry: Mapping[str, Any]) -> Iterator[Ring]:
 
 @contextmanager
 def geojson_features(path: Path, what: str, frame: Frame | None = None) -> Iterator[list[Any]]:
-    """The features of a GeoJSON file, or its one geometry; what: it should hold.
+    """The features of a GeoJSON file, or its one geometry.
 
-    InputError if it is none, names another system than the frame does, or lacks what is read of it within.
+    Parameters
+    ----------
+    what : str
+        It should hold.
+    frame : Frame, optional
+
+    Raises
+    ------
+    InputError
+        If it is no GeoJSON, names another system than the frame does, or lacks what is read of it within.
     """
     refuse_foreign_format(path)
     try:
@@ -357,10 +366,19 @@ def geojson_features(path: Path, what: str, frame: Frame | None = None) -> Itera
 
 @contextmanager
 def shapes_and_records(path: Path, kind: str, frame: Frame | None) -> Iterator[list[Any]]:
-    """Those of a shapefile whose type begins with a kind, such as POLYGON.
+    """The shapes and records of a shapefile.
 
-    Its .cpg names the encoding of its texts; without it they are UTF-8, or what Windows in the west writes. InputError
-    if it is none, or its .prj states another system than the frame.
+    Its .cpg names the encoding of its texts; without it they are UTF-8, or what Windows in the west writes.
+
+    Parameters
+    ----------
+    kind : str
+        With which the type of its shapes begins, such as POLYGON.
+
+    Raises
+    ------
+    InputError
+        If it is no shapefile, or its .prj states another system than the frame.
     """
     beside = {one.suffix.lower(): one for one in path.parent.glob(f"{glob.escape(path.stem)}.*")}
     if ".prj" in beside:
@@ -384,10 +402,22 @@ def shapes_and_records(path: Path, kind: str, frame: Frame | None) -> Iterator[l
 
 
 def refuse_crossing(where: str, ring: Sequence[tuple[float, float]]) -> None:
-    """InputError if the outline of a polygon crosses itself, like a bow tie: half of its area would be lost.
+    """Refuse the outline of a polygon that crosses itself, like a bow tie: half of its area would be lost.
 
     Sides a b and c d cross if c and d lie on different sides of a b, and a and b on different sides of c d; the lines
-    there and back to holes touch others at their ends only. where: how the message begins.
+    there and back to holes touch others at their ends only.
+
+    Parameters
+    ----------
+    where : str
+        How the message begins.
+    ring : sequence of (float, float)
+        Its corners [m].
+
+    Raises
+    ------
+    InputError
+        Naming where it crosses.
     """
     a = np.asarray(ring, dtype=np.float64)
     if len(a) < 4 or len(a) > MOST_CORNERS:
@@ -462,7 +492,13 @@ class DrawnCentreline:
 
 
 def drawn_placement(folder: Path, site: FieldSite) -> tuple[DrawnCentreline | None, Placement]:
-    """The centreline of a site, if it has one, and where its channel lies on the map. InputError."""
+    """The centreline of a site, if it has one, and where its channel lies on the map.
+
+    Raises
+    ------
+    InputError
+        If the centreline cannot be read or drawn.
+    """
     frame = site.frame.frame if site.frame is not None else None
     given = site.grid.centreline if site.grid is not None else None
     drawn = drawn_centreline(folder, given, frame) if given is not None else None

@@ -49,9 +49,17 @@ from vegglue.wording.sentences import page_document, page_phrase, phrase, senten
 
 
 def write_report(run: Run) -> Path:
-    """Write run.folder/report.html and figures/*.svg beside it; returns the page. What `run` lacks is left out of it.
+    """Write run.folder/report.html and figures/*.svg beside it; what `run` lacks is left out of it.
 
-    Errors: StorageError when a file cannot be written.
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    StorageError
+        If a file cannot be written.
     """
     path = run.folder / "report.html"
     write_file(path, render(run).encode(), MAKE_ROOM)
@@ -195,9 +203,17 @@ class IntervalOf:
 
 
 def write_overview(path: Path, runs: Sequence[Run]) -> Path:
-    """Write a page about runs whose folders lie beside it, with pictures in figures; returns the page.
+    """Write a page about runs whose folders lie beside it, with pictures in figures.
 
-    Errors: StorageError when a file cannot be written.
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    StorageError
+        If a file cannot be written.
     """
     write_file(path, render_overview(path.parent, runs).encode(), MAKE_ROOM)
     return path

@@ -35,7 +35,13 @@ def with_digest(content: bytes) -> bytes:
 
 
 def append_digest(path: Path) -> None:
-    """Put the line behind a file, in place of one that is there. Errors: OSError."""
+    """Put the line behind a file, in place of one that is there.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
     with path.open("r+b") as file:
         size = os.fstat(file.fileno()).st_size - (LENGTH if _stated(file) else 0)
         digest = _digest_of(file, size)
@@ -56,9 +62,17 @@ def state_of(path: Path) -> tuple[Path, int, int, int]:
 
 @lru_cache(maxsize=64)
 def is_unchanged(path: Path, *state: int) -> bool | None:
-    """Whether a file has the digest that stands behind it; None where none does. Errors: OSError.
+    """Whether a file has the digest that stands behind it; None where none does.
 
-    state: looked at once for each, however often the file is opened.
+    Parameters
+    ----------
+    state : int
+        Looked at once for each, however often the file is opened.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
     """
     with path.open("rb") as file:
         stated = _stated(file)
@@ -95,7 +109,10 @@ UNREADABLE = (OSError, RuntimeError, ValueError, KeyError, TypeError, IndexError
 def write_whole(path: Path, groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> None:
     """Write a file that appears under its name only when it is whole.
 
-    Errors: StorageError when it cannot be written; a file of that name from before stays as it was.
+    Raises
+    ------
+    StorageError
+        If it cannot be written; a file of that name from before stays as it was.
     """
     write_file(path, with_digest(_image(groups, attributes)), WRITTEN_STAYS)
 
@@ -136,8 +153,12 @@ def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
     """An open file for the length of the block: "r" for one that is whole, "r+" for one that grows.
 
     Without locks of the HDF5 library: whole files are never changed in place, and a growing one is guarded by the lock
-    of its folder and may be looked at. Errors: StorageError when it cannot be opened, has changed since it was written,
-    or holds what leads out of it.
+    of its folder and may be looked at.
+
+    Raises
+    ------
+    StorageError
+        If it cannot be opened, has changed since it was written, or holds what leads out of it.
     """
     try:
         if mode == "r":
@@ -169,7 +190,15 @@ def open_hdf5(path: Path, mode: str) -> Iterator[h5py.File]:
 
 
 def refuse_in_use(path: Path) -> None:
-    """Errors: StorageError when another program has the file open to change it, which locks it; OSError without one."""
+    """Refuse a file that another program has open to change it, which locks it.
+
+    Raises
+    ------
+    StorageError
+        If it is in use.
+    OSError
+        If there is no such file.
+    """
     with path.open("rb") as file:
         try:
             lock(file.fileno(), shared=True)

@@ -50,7 +50,10 @@ def read_labelled(path: Path, *groups: str) -> "xarray.Dataset":
 def read_inference_data(path: Path) -> "arviz.InferenceData | xarray.DataTree":
     """posterior.h5 as ArviZ sees it: posterior, prior, log_likelihood and so on; a DataTree from ArviZ 1.0 on.
 
-    Errors: as read_labelled.
+    Raises
+    ------
+    InputError, StorageError
+        As `read_labelled`.
     """
     arviz = extra_library("arviz")
     extra_library(ENGINE)

@@ -135,7 +135,15 @@ _STATED: dict[type, tuple[tuple[type, ...], str]] = {str: ((str,), "text"), bool
 
 
 def stated_as(kind: type, stated: Mapping[str, Any], name: str) -> Any:
-    """A number, word, or yes or no that a file states. Errors: KeyError without it, ValueError where it is no such."""
+    """A number, word, or yes or no that a file states.
+
+    Raises
+    ------
+    KeyError
+        Without it.
+    ValueError
+        If it is no such.
+    """
     value = stated[name]
     types, words = _STATED.get(kind, ((int, float, np.integer, np.floating), "number"))
     if not isinstance(value, types):
@@ -144,7 +152,15 @@ def stated_as(kind: type, stated: Mapping[str, Any], name: str) -> Any:
 
 
 def names_of(group: ReadGroup, dim: str) -> tuple[str, ...]:
-    """The names along a dimension. Errors: KeyError; ValueError where these are no names, or two are the same."""
+    """The names along a dimension.
+
+    Raises
+    ------
+    KeyError
+        Without the dimension.
+    ValueError
+        If these are no names, or two are the same.
+    """
     names = tuple(fitting(group, {dim: Stored((dim,), type=IN_WORDS)})[dim])
     if len(set(names)) < len(names):
         raise ValueError(f"two of {dim} have the same name")
@@ -152,7 +168,13 @@ def names_of(group: ReadGroup, dim: str) -> tuple[str, ...]:
 
 
 def stations_from(group: ReadGroup) -> pd.DataFrame:
-    """The table of stations of a group, without what else stands there. Errors: KeyError, ValueError."""
+    """The table of stations of a group, without what else stands there.
+
+    Raises
+    ------
+    KeyError, ValueError
+        Without one of its columns; if one holds something else, or names an unknown kind.
+    """
     types = {name: IN_WORDS if kind is str else kind for name, kind in STATION_TYPES.items()}
     found = fitting(group, {name: Stored(("station",), type=kind) for name, kind in types.items()})
     table = station_table(pd.DataFrame({name: found[name] for name in STATION_TYPES}))

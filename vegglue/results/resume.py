@@ -44,8 +44,12 @@ def hold_lock(folder: Path) -> Iterator[None]:
     """Hold `folder/.lock` for the length of the block; the file names its holder (pid, host, time).
 
     The operating system drops the lock of a killed run. The file is emptied, not removed: removing a locked file would
-    let two runs hold two files of one name. A link is not followed. Raises StorageError if a living process holds the
-    lock, or the folder cannot be written.
+    let two runs hold two files of one name. A link is not followed.
+
+    Raises
+    ------
+    StorageError
+        If a living process holds the lock, or the folder cannot be written.
     """
     path = folder / ".lock"
     try:
@@ -98,7 +102,13 @@ def unfinished_fields(folder: Path, header: Header) -> UnfinishedFields | None:
 
 
 def reserve(unfinished: UnfinishedFields) -> None:
-    """Take the room of all members, each NaN. Errors: OSError when there is none, and then nothing is left behind."""
+    """Take the room of all members, each NaN.
+
+    Raises
+    ------
+    OSError
+        If there is none; then nothing is left behind.
+    """
     nothing = np.full(unfinished.shape[1:], np.nan, np.float32).tobytes()
     try:
         unfinished.path.unlink(missing_ok=True)  # a link there is not followed
@@ -127,7 +137,20 @@ def is_reserved(unfinished: UnfinishedFields) -> bool:
 
 
 def write_fields(unfinished: UnfinishedFields, members: np.ndarray, values: Single) -> None:
-    """Write values (len(members), ...) of some members, onto the disk. Errors: OSError."""
+    """Write values of some members onto the disk.
+
+    Parameters
+    ----------
+    members : ndarray (n,)
+        Their numbers.
+    values : ndarray (n, experiment, quantity, x, y)
+        [m, m/s]
+
+    Raises
+    ------
+    OSError
+        If they cannot be written.
+    """
     if values.shape != (len(members), *unfinished.shape[1:]):
         raise ValueError(f"expected fields of shape {(len(members), *unfinished.shape[1:])}, got {values.shape}")
     with unfinished.path.open("r+b") as file:
@@ -218,12 +241,16 @@ class EnsembleWriter:
 
 @contextmanager
 def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
-    """Open `path`.part for appending, resuming what an earlier run of the same header left; rename it to `path` when
-    the block ends with every chunk appended. Fields wait in `fields.part` beside it and become `fields.h5` just before.
+    """Open `path`.part for appending, resuming what an earlier run of the same header left.
 
-    A part file of another config, seed, version or cut into chunks, or a broken one, is moved to `path`.part.old, never
-    mixed in.
-    Errors: StorageError when another run holds the folder, its files cannot be written or the disk is full.
+    It is renamed to `path` when the block ends with every chunk appended. Fields wait in `fields.part` beside it and
+    become `fields.h5` just before. A part file of another config, seed, version or cut into chunks, or a broken one, is
+    moved to `path`.part.old, never mixed in.
+
+    Raises
+    ------
+    StorageError
+        If another run holds the folder, its files cannot be written or the disk is full.
     """
     with failed_writes_told(path, WRITTEN_STAYS):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -276,7 +303,13 @@ def ensemble_writer(path: Path, header: Header) -> Iterator[EnsembleWriter]:
 
 
 def remove_left_over_fields(path: Path) -> None:
-    """Take away `fields.part` of a run that was killed after its ensemble at `path` was whole. Errors: StorageError."""
+    """Take away `fields.part` of a run that was killed after its ensemble at `path` was whole.
+
+    Raises
+    ------
+    StorageError
+        If it cannot be removed.
+    """
     left = path.with_name(FIELDS_PART)
     if left.exists() and not part_file(path).exists():
         with hold_lock(path.parent), failed_writes_told(left, WRITTEN_STAYS):

@@ -182,7 +182,13 @@ def _measured_alike(case: Case, other: Case) -> bool:
 
 
 def folder_of(runs: Path | str, case: Case) -> Path:
-    """Where the results of a case lie; made if need be. Errors: StorageError."""
+    """Where the results of a case lie; made if need be.
+
+    Raises
+    ------
+    StorageError
+        If it cannot be made.
+    """
     folder = Path(runs) / case.name
     with failed_writes_told(folder, ANOTHER_RUNS):
         folder.mkdir(parents=True, exist_ok=True)

@@ -89,7 +89,10 @@ def check(case: Case | CaseRun, *, runs: Path | str = "runs") -> CheckedCase:
 def critical_warnings(run: CaseRun) -> list[object]:
     """Remarks on what would mislead all that is computed with the measurements of a case.
 
-    Errors: InputError for a file that cannot be read.
+    Raises
+    ------
+    InputError
+        If a file cannot be read.
     """
     return [*critical_remarks(run.case, run.site, run.observations), *beyond_seen(run)]
 
@@ -112,9 +115,22 @@ def beyond_seen(run: CaseRun) -> list[str]:
 
 @one_thread()
 def check_effects(file: Path, *, trust: bool = False) -> "dict[str, list[Breach]]":
-    """What each effect of a Python file breaks of the contract, by its name; none for a good one.
+    """What each effect of a Python file breaks of the contract.
 
-    trust: whether the file may be run. Errors: InputError when it may not, or is not there.
+    Parameters
+    ----------
+    trust : bool
+        Whether the file may be run.
+
+    Returns
+    -------
+    dict
+        By name of the effect; no breach for a good one.
+
+    Raises
+    ------
+    InputError
+        If the file may not be run, or is not there.
     """
     if not trust:
         raise InputError(f"{file}: runs as code when it is checked: read it, and add --trust if you trust it.")

@@ -126,10 +126,15 @@ def tells_more(kept: ModelComparison | None, ladder: ModelComparison) -> bool:
 
 
 def refuse_other_measurements(several: Sequence[CaseRun]) -> None:
-    """Raise InputError unless all models have the same measurements, and no two models that differ have one name.
+    """Refuse models that cannot be compared.
 
-    Errors are compared station by station under the same errors of the data, and kept in a folder for each name; one
-    model may be there twice.
+    Errors are compared station by station under the same errors of the data, and kept in a folder for each name.
+
+    Raises
+    ------
+    InputError
+        Unless all models have the same measurements, and no two models that differ have one name; one model may be
+        there twice.
     """
     if not several:
         raise InputError("compare: expected one model or more, got none; give the cases as a list.")

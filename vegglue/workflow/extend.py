@@ -298,8 +298,12 @@ def extension_reason(case: Case, found: Diagnosis, choice: Choice) -> ExtensionR
 def named_candidates(
     run: CaseRun, names: Sequence[str], shapes: Mapping[str, float], known: Mapping[str, Addition]
 ) -> list[Addition]:
-    """Candidates by name, each with those of the shapes that it has, and with those of what is known under its name;
-    InputError for a shape that none has.
+    """Candidates by name, each with those of the shapes that it has, and with those of what is known under its name.
+
+    Raises
+    ------
+    InputError
+        For a shape that none has.
     """
     station = run.observations.table
     added: list[Addition] = []
@@ -319,7 +323,13 @@ def child_path(parent: Path, added: Sequence[Candidate]) -> Path:
 
 
 def write_child(parent: Case, target: Path, added: Sequence[Addition], force: bool = False) -> Case:
-    """Write the config that extends `parent`, and read it back as any other. Errors: InputError for another's file."""
+    """Write the config that extends `parent`, and read it back as any other.
+
+    Raises
+    ------
+    InputError
+        If `target` is the parent, or holds what may not be replaced, see `write_made`.
+    """
     refuse_parent(target, parent.source)
     tree = child_tree(parent, target, added)
     names = ", ".join(candidate.name for candidate, _ in added)

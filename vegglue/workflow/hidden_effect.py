@@ -233,7 +233,18 @@ def bad_probe(errors: Noise, size: str, random: np.random.Generator) -> Hidden:
 
 
 def size_given(text: str, size: str) -> float | None:
-    """The number behind `EFFECT=` [unit of its amplitude], None if there is none. Errors: InputError."""
+    """The number behind `EFFECT=`.
+
+    Returns
+    -------
+    float or None
+        [unit of its amplitude]; None if there is none.
+
+    Raises
+    ------
+    InputError
+        If it is no number.
+    """
     try:
         return float(size) if size else None
     except ValueError:

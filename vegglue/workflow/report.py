@@ -107,10 +107,21 @@ def overview(
 
 
 def results_of(sized: CaseRun, run: CaseRun, above: str = "../") -> Run:
-    """All that is kept of a run but its flow. sized: the case with as many members as its ensemble has, which is all
-    that a diagnosis does not depend on; above: the folder of all runs, seen from the page that is made.
+    """All that is kept of a run but its flow.
 
-    Errors: as those of `report`; StorageError for a broken file, too.
+    Parameters
+    ----------
+    sized : CaseRun
+        The case with as many members as its ensemble has, which is all that a diagnosis does not depend on.
+    above : str
+        The folder of all runs, seen from the page that is made.
+
+    Raises
+    ------
+    InputError
+        As `report`.
+    StorageError
+        For a broken file.
     """
     case, folder, observations = run.case, run.folder, run.observations
     path, ensemble = folder / "ensemble.h5", None

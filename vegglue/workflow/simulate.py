@@ -167,7 +167,12 @@ def refuse_to_shrink(run: CaseRun) -> None:
 def share_one_beside(run: CaseRun) -> None:
     """Link the ensemble of another case in the folder of runs that solved the very same members, if there is one.
 
-    The files are copied if the disk knows no links. Raises StorageError when the disk is full.
+    The files are copied if the disk knows no links.
+
+    Raises
+    ------
+    StorageError
+        If the disk is full.
     """
     wanted = simulation_hash(run.case)
     names = ("ensemble.h5",) if run.case.simulate.fields is None else ("fields.h5", "ensemble.h5")

@@ -38,7 +38,13 @@ def sealed_answer(answer: Answer) -> str:
 
 
 def opened_answer(path: Path) -> Answer:
-    """The answer in a file. Errors: InputError when there is no seal, or it is broken."""
+    """The answer in a file.
+
+    Raises
+    ------
+    InputError
+        If there is no seal, or it is broken.
+    """
     lines = read_text(path, LARGEST_JSON, "twin").splitlines()
     try:
         # What is packed may claim to be of any size.
@@ -53,9 +59,19 @@ SEAL = "answer.sealed"
 
 
 def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force: bool = False) -> Path:
-    """Write all files and return the config. force: replace what vegglue did not write, too.
+    """Write all files and return the config.
 
-    Errors: InputError when such files are there; StorageError when the folder cannot be written.
+    Parameters
+    ----------
+    force : bool
+        Whether to replace what vegglue did not write.
+
+    Raises
+    ------
+    InputError
+        If such files are there.
+    StorageError
+        If the folder cannot be written.
     """
     name = case_name(folder.resolve().name, "twin")
     used, line = station[station["used"]], centreline_in(case)
@@ -98,7 +114,13 @@ def in_rows_of_twin(answer: Answer, station: pd.DataFrame) -> Answer:
 
 
 def config_in(folder: Path) -> Path:
-    """The config that `write_twin` left there, beside its children maybe. Errors: InputError if it is not clear."""
+    """The config that `write_twin` left in a folder, maybe beside its children.
+
+    Raises
+    ------
+    InputError
+        If it is not clear which it is.
+    """
     own = folder / f"{case_name(folder.resolve().name, 'twin')}.yaml"
     found = [own] if own.is_file() else sorted(folder.glob("*.yaml"))
     if len(found) != 1:
