@@ -79,7 +79,7 @@ def test_the_mean_of_a_logged_record_has_the_error_of_its_eddies(tmp_path: Path)
     record = logged(0.9, places=40, samples=400)
     rows = "".join(f"A,{9 + n // 20},{n % 20 / 20},{0.4 + u:.5f}\n" for n, one in enumerate(record) for u in one)
     found = brook(tmp_path, rows)
-    assert "in a row" in found.taken["runs.csv"]
+    assert "rows are alike" in found.taken["runs.csv"]
     truth = 0.05 * np.sqrt((1.9 / 0.1) / 400)  # tau = (1 + a) / (1 - a)
     assert errors_of(found) == pytest.approx(np.full(40, truth), rel=0.3)
     assert np.std(np.array(found.values()) - 0.4) == pytest.approx(errors_of(found).mean(), rel=0.3)
@@ -93,7 +93,7 @@ def test_a_gauge_through_a_flood_is_known_by_its_range(tmp_path: Path) -> None:
 def test_repeats_by_chance_count_each(tmp_path: Path) -> None:
     rows = "".join(f"A,9,{n / 40},{0.4 + u:.5f}\n" for n, one in enumerate(logged(0.0, 40, 40)) for u in one)
     found = brook(tmp_path, rows)
-    assert "in a row" not in found.taken["runs.csv"]
+    assert "rows are alike" not in found.taken["runs.csv"]
     assert errors_of(found) == pytest.approx(np.full(40, 0.05 / 40**0.5), rel=0.5)
 
 
@@ -189,4 +189,4 @@ def test_a_level_that_every_vertical_repeats_counts_once(tmp_path: Path, levels:
     rows = (f"8,{y},0.4,{level}" for y, level in zip((-1, 0, 1), levels, strict=True))
     found = import_of(tmp_path, a__csv="\n".join(["x,y,u,WSE (m)", *rows]))
     assert found.values("level") == kept
-    assert ("1 section once" in found.taken["a.csv"]) == (len(kept) == 1)
+    assert ("1 section taken once" in found.taken["a.csv"]) == (len(kept) == 1)

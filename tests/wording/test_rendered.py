@@ -545,7 +545,6 @@ REFUSED = [
     InputError("no_bed_columns", file=CSV, got=("x", "y", "depth"), deep=True),
     InputError("no_bed_columns", file=CSV, got=("Chainage", "Station", "Elevation"), deep=False),
     *(InputError("no_effects_in_file", file=Path("own.py"), got=one) for one in (None, "", "Effect", "int")),
-    InputError("no_start", case="brook"),
     InputError("not_computed", file=Path("a.hdf"), areas=True),
     InputError("not_computed", file=Path("a.hdf"), areas=False),
     InputError("not_on_mesh", file=Path("map.nc"), missing=["u", "v"], layers=True),

@@ -518,7 +518,7 @@ def command_place(runs: CommandRuns, model: Model, watch: Watch) -> CommandPlace
 
 def _first_place(model: Model, correction_there: Callable[[Array, bool], Correction]) -> tuple[Array, Correction]:
     """The middle of the prior or, if the command fails there, the next of `places_of_prior`."""
-    refused = InputError("no_start", case=model.case.name)
+    refused: InputError | None = None
     for z in places_of_prior(len(model.names)):
         try:
             correction_there(z, False)  # alone: a command that fails may take its time
@@ -527,4 +527,5 @@ def _first_place(model: Model, correction_there: Callable[[Array, bool], Correct
             raise
         except InputError as error:
             refused = error
+    assert refused is not None
     raise refused

@@ -374,7 +374,7 @@ def _rms(values: Array) -> float:
 
 @dataclass(frozen=True)
 class _Seen:
-    """What a survey says at places (m, 2) [m]: by how much the mean of each covariance is off that of all, weighed, and
+    """What a survey says at places (m, 2) [m]: by how much the mean of each covariance is off the weighted one, and
     whitened covariances with its points and with its mean section, for each covariance.
     """
 

@@ -144,7 +144,7 @@ class Cells:
 
     @property
     def u_y(self) -> Array:
-        """du/dy (nx, ny, m) [1/s], weighed by the shear depth where there is one."""
+        """du/dy (nx, ny, m) [1/s], weighted by the shear depth where there is one."""
         if self.shear_depth.size:
             return weighted_across(self.u, self.shear_depth, self.geometry.dy)
         return across(self.u, self.geometry.dy)

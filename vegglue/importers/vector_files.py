@@ -124,7 +124,7 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
         if lost is not None:
             raise InputError(
                 f"{shown_path(path)}: expected corners with places in polygon {number}, got one at {lost[0]:g}, "
-                f"{lost[1]:g}, which marks no value; mend or remove it."
+                f"{lost[1]:g}, a missing-value code; correct or remove it."
             )
         if len(ring) < FEWEST_CORNERS:
             raise InputError("few_corners", file=path, polygon=number, got=len(ring))

@@ -1,4 +1,4 @@
-"""GLUE: the members of an ensemble weighed by how well they predict what was measured.
+"""GLUE: the members of an ensemble weighted by how well they predict what was measured.
 
     p(theta | u) ~ L(u | theta) p(theta):   a member drawn from the prior weighs w_k = L_k / sum L
 
@@ -168,7 +168,7 @@ def efficiency(residual: Array, station: pd.DataFrame) -> Array:
 
 
 def glue(ensemble: Ensemble, case: Case, observations: Observations) -> Posterior:
-    """The posterior of an ensemble, its members weighed by likelihood.
+    """The posterior of an ensemble, its members weighted by likelihood.
 
         gaussian: L = prod_i (2 pi s_i^2)^(-1/2) exp(-(u_i - U_i)^2 / (2 s_i^2)) over the used stations i
 

@@ -41,7 +41,7 @@ class NamedParameter:
 
 @dataclass(frozen=True)
 class EnsembleWeighed:
-    """Members of an ensemble as a likelihood has weighed them.
+    """Members of an ensemble as a likelihood has weighted them.
 
     Attributes
     ----------
@@ -490,7 +490,7 @@ def measurement_error(posterior: Posterior, kind: str) -> float:
 
 
 def sample_statements(posterior: Posterior, symbols: Mapping[str, str] | None = None) -> Iterator[object]:
-    """How the members were made and weighed, and under which errors.
+    """How the members were made and weighted, and under which errors.
 
     Parameters
     ----------
@@ -640,7 +640,7 @@ def correlations(posterior: Posterior, symbols: Mapping[str, str] | None = None)
 
 
 def fit_statements(posterior: Posterior) -> Iterator[object]:
-    """Misfit of the median prediction and stations outside the total band; chi2 of weighed members of known errors."""
+    """Misfit of the median prediction and stations outside the total band; chi2 of weighted members of known errors."""
     fit, station = posterior.fit, posterior.station
     value, band = station["value"].to_numpy(float), posterior.predicted.total_band
     outside = ((value < band[0]) | (value > band[-1])) & station["used"].to_numpy()
