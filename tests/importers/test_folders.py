@@ -190,7 +190,7 @@ def test_a_table_on_the_map_in_other_units_becomes_stations(tmp_path: Path) -> N
     assert found.case.experiments["June"].discharge == {"upstream": 2.0}
     assert found.case.experiments["June"].level == pytest.approx(0.95)
     assert found.case.frame == FRAME
-    for word in ("semicolons", "decimal comma", "1 comment line", "1 mark", "Easting"):
+    for word in ("semicolons", "decimal comma", "1 comment line", "1 missing-value code", "Easting"):
         assert word in found.taken["adv.csv"]
     assert (found.case.imported or ())[0].units["east_velocity"] == "cm/s"
 

@@ -236,7 +236,7 @@ def taken_of(folder: Path, *lines: str) -> str:
 @pytest.mark.parametrize(
     ("row", "counts"),
     [
-        ("low,B,20,0,{},0.01", ["4 rows", "4 marks"]),
+        ("low,B,20,0,{},0.01", ["4 rows", "4 missing-value codes"]),
         ("low,B,20,0,,0.01", ["4 rows", "4 empty cells in u"]),
         ("low,B,,0,0.5,0.01", ["4 rows", "4 empty cells in x"]),
         ("low,B,20,0", ["4 rows", "4 empty cells in u", "4 empty cells in u_se"]),
