@@ -68,7 +68,7 @@ def compare(
 
     Readings that the diagnosis of any of them excludes are excluded for all. The comparison is drawn in ladder.png of
     the last run, and kept in comparison.json of each, unless one model is there twice, or a comparison is kept there
-    that begins with another model. Errors of a model are kept in model_score.json, and read there for exactly the same
+    that begins with another model. Errors of a model are kept in rung.json, and read there for exactly the same
     case.
 
     Parameters
