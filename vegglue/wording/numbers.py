@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 
 # Of a unit of time, from which the next one is used; below two of it, a whole number may be off by more than a quarter.
@@ -163,10 +164,9 @@ def short(value: float, figures: int = 3) -> str:
     if not math.isfinite(value):
         return "–"
     if value != 0 and not 1e-3 <= abs(value) < 1e6:
-        power = math.floor(math.log10(abs(value)))
-        leading = fixed(value / 10**power, 1)
-        raised = str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-        return f"{'' if leading == '1.0' else leading + '·'}10{raised}"
+        leading, _, power = f"{abs(value):.1e}".partition("e")
+        raised = str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return f"{MINUS if value < 0 else ''}{'' if leading == '1.0' else leading + '·'}10{raised}"
     return fixed(value, decimals(value, figures) if value else 0)
 
 
@@ -182,7 +182,7 @@ def as_given(value: float, sd: float = math.nan) -> str:
     """value ± sd of another study with the decimals they are stated with, no more."""
     if not math.isfinite(sd):
         return f"{value:g}".replace("-", MINUS)
-    places = max(len(f"{number:g}".partition(".")[2]) for number in (value, sd))
+    places = max(0, *(-int(Decimal(f"{number:g}").as_tuple().exponent) for number in (value, sd)))
     return f"{fixed(value, places)}{FIRM}±{FIRM}{fixed(sd, places)}"
 
 
