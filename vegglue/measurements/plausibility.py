@@ -5,7 +5,7 @@ effect that compensates for a wrong unit is found with great certainty. They are
 from m/s and one datum from another, and no effect comes near to them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -348,16 +348,14 @@ def _backwater_level(site: Site, depths: Array, level: float, discharge: float) 
 def _judged(case: Case, site: Site, used: pd.DataFrame) -> tuple[list[ImplausibleOutlet], pd.DataFrame]:
     """Outlets, and rows of the table that are wrong, with columns `problem`, `size` and `unit` of the Judgement."""
 
-    def wrong_of(group: pd.DataFrame, verdicts: Sequence[Judgement], depth: float) -> pd.DataFrame:
-        table = group.assign(
-            problem=pd.Series([one[0] for one in verdicts], group.index, dtype=object),
-            size=np.array([one[1] for one in verdicts], dtype=float),
-            unit=pd.Series([one[2] for one in verdicts], group.index, dtype=object),
-            depth=depth,
-        )
-        return table[table["problem"].notna()]
+    outlets: list[ImplausibleOutlet] = []
+    found: dict[Hashable, tuple[Symptom, float, str, float]] = {}
 
-    outlets, judged = [], [wrong_of(used[:0], [], 0.0)]
+    def keep_wrong(group: pd.DataFrame, verdicts: Sequence[Judgement], depth: float) -> None:
+        for row, (problem, size, unit) in zip(group.index, verdicts, strict=True):
+            if problem is not None:
+                found[row] = problem, size, unit, depth
+
     for name, rows in used.groupby("experiment", sort=False):
         flow = plausible_flow(case, in_experiment(site, str(name)), case.experiments[str(name)])
         if flow.depth > DEEPEST_CHANNEL * flow.width or flow.fastest[-1] < STANDING_WATER:
@@ -365,13 +363,23 @@ def _judged(case: Case, site: Site, used: pd.DataFrame) -> tuple[list[Implausibl
             outlets.append(ImplausibleOutlet(str(name), level, flow.depth, flow.width, float(flow.fastest[-1])))
             continue
         groups = [group for _, group in rows.groupby(["kind", "section"], sort=False)]
-        wrong = pd.concat([wrong_of(group, _judge_values(flow, group), flow.depth) for group in groups])
+        for group in groups:
+            keep_wrong(group, _judge_values(flow, group), flow.depth)
         # Errors are held against sound values only: velocities of a section that do not go with the discharge are none.
-        off = wrong.loc[wrong["problem"].isin([Symptom.FAST, Symptom.SLOW]), "section"]
-        unsound = wrong.index.union(rows.index[velocity_rows(rows) & rows["section"].isin(off).to_numpy(bool)])
-        sound = [group[~group.index.isin(unsound)] for group in groups]
-        judged += [wrong, *(wrong_of(group, _judge_errors(flow, group), flow.depth) for group in sound)]
-    wrong = pd.concat(judged)
+        wrong = rows.index.isin(found)
+        of_section = [row for row in rows.index[wrong] if found[row][0] in (Symptom.FAST, Symptom.SLOW)]
+        off = rows["section"].isin(rows.loc[of_section, "section"]).to_numpy(bool)
+        unsound = rows.index[wrong | velocity_rows(rows) & off]
+        for group in groups:
+            sound = group[~group.index.isin(unsound)]
+            keep_wrong(sound, _judge_errors(flow, sound), flow.depth)
+    problem, size, unit, depth = zip(*found.values(), strict=True) if found else ((), (), (), ())
+    wrong = used.loc[list(found)].assign(
+        problem=np.array(problem, dtype=object),
+        size=np.array(size, dtype=float),
+        unit=np.array(unit, dtype=object),
+        depth=np.array(depth, dtype=float),
+    )
     # Levels that a unit would move far from their outlets, and that all lie as far above them, have another datum:
     # |f z - z_out| beyond a quarter of the depth somewhere, and twice the range of z - z_out; f: the unit found for it.
     rows = wrong[wrong["problem"] == Symptom.LEVEL_UNIT]
