@@ -47,7 +47,7 @@ from vegglue.flow.march import fall_back, march_to_rest
 from vegglue.flow.newton import CLOSE
 from vegglue.flow.problem import EMPTY, Problem, crop, take
 from vegglue.flow.problem_setup import build_problem, with_effects_of
-from vegglue.flow.reference_member import settled
+from vegglue.flow.reference_member import LinearisedMember, settled
 from vegglue.flow.sensor import predictions_at_sensors, predictions_under_effects, reading_weights
 from vegglue.flow.starts import backwater, between_cells, on_grid
 from vegglue.flow.status import FAILED
@@ -311,19 +311,21 @@ def _predict_members(model: Model, points: Sequence[Point], z: Array) -> Array:
     tasks = [(points[k], z[part]) for k, part in sets]
     for (_, part), prediction in zip(sets, parallel_map(partial(predict_near, model), tasks), strict=True):
         found[part] = prediction
-    left, experiments = np.flatnonzero(np.isnan(found).any(axis=1)), list(model.case.experiments)
-    if left.size:  # as members of an ensemble are solved
-        alone = np.full((left.size, len(model.station)), np.nan)
-        readings_of = parallel_map(partial(_predict_alone, model), [(one, z[left]) for one in experiments])
-        for experiment, readings in zip(experiments, readings_of, strict=True):
-            alone[:, model.rows[experiment]] = readings
-        alone[np.isnan(alone).any(axis=1)] = np.nan
-        found[left] = alone
+    lost = [
+        (points[k], experiment, members)
+        for k in range(len(points)) for experiment in model.case.experiments
+        if (members := np.flatnonzero((nearest == k) & np.isnan(found[:, model.rows[experiment]]).any(axis=1))).size
+    ]  # fmt: skip
+    alone = [(point, experiment, z[members]) for point, experiment, members in lost]
+    readings = parallel_map(partial(_predict_alone, model), alone)
+    for (_, experiment, members), of_them in zip(lost, readings, strict=True):
+        found[np.ix_(members, model.rows[experiment])] = of_them
+    found[np.isnan(found).any(axis=1)] = np.nan
     return found
 
 
 def predict_near(model: Model, point: Point, z: Array) -> Array:
-    """f(z) around a point, with its factors; NaN rows where they do not lead there.
+    """f(z) around a point, with its factors; NaN in experiments where they do not lead there.
 
     Parameters
     ----------
@@ -343,20 +345,28 @@ def predict_near(model: Model, point: Point, z: Array) -> Array:
             problem = problem_at(model, experiment, z[some])
             start = flow.state + flow.slopes @ (z[some, : point.z.size] - point.z).T
             solution = chord_in_band(problem, start, flow.factors, flow.band, model.case.numerics.tolerance)
-            part[:, model.rows[experiment]] = _read_stations(model, experiment, problem, solution.state, flow.band)
-            part[~solution.converged] = np.nan
+            read = _read_stations(model, experiment, problem, solution.state, flow.band)
+            part[:, model.rows[experiment]] = np.where(solution.converged[:, None], read, np.nan)
     return found
 
 
-def _predict_alone(model: Model, experiment: str, z: Array) -> Array:
-    numerics = model.case.numerics
-    how = fall_back(numerics.march_step, numerics.march_span)
+def _predict_alone(model: Model, near: Point, experiment: str, z: Array) -> Array:
+    """Predictions (m, stations of the experiment) of members that are solved as those of an ensemble, from a point."""
+    numerics, flow, start = model.case.numerics, near.flows.get(experiment), None
+    if flow is not None:
+        further = z.shape[1] - near.z.size  # effects added since, which move nothing to first order
+        density = np.exp(-0.5 * near.z**2) / np.sqrt(2.0 * np.pi)  # dP/dz
+        slopes = widen(flow.slopes / density, flow.rows, flow.band)
+        tangents = [np.ascontiguousarray(slopes[..., [p]]) for p in range(near.z.size)]
+        state = widen(flow.state, flow.rows, flow.band)
+        there = ndtr(np.concatenate([near.z, z[0, near.z.size :]]))
+        start = LinearisedMember(there, state, (*tangents, *further * (np.zeros_like(state),)))
 
     def problem_of(points: Array) -> Problem:
         return problem_at(model, experiment, ndtri(points))
 
-    problem = problem_at(model, experiment, z)
-    solved = solve_members(problem, ndtr(z), problem_of, numerics.tolerance, how=how)
+    problem, how = problem_at(model, experiment, z), fall_back(numerics.march_step, numerics.march_span)
+    solved = solve_members(problem, ndtr(z), problem_of, numerics.tolerance, start, how)
     state = np.ascontiguousarray(solved.state)
     prediction = predictions_at_sensors(problem, state, model.site.grid, model.stations[experiment])
     prediction[solved.status == FAILED] = np.nan
