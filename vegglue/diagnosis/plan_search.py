@@ -83,13 +83,13 @@ class FirstCompetition:
     units: Single
     scores: Single
 
-    def named(self, effect: int, truths: Projected) -> Array:
-        """Chance that an effect is named at each of NAMED_AT (lengths,), over its truths (rows, t) in turn."""
-        draw = np.arange(self.scores.shape[1])
-        cosine = self.units.T @ truths.units.astype(np.float32)
-        truth = draw % cosine.shape[1]
+    def named(self, effect: int, cosine: Single) -> Array:
+        """Chance that an effect is named at each of NAMED_AT (lengths,), over its truths in turn, given the cosine of
+        each with all columns (k, truths).
+        """
+        truths = cosine.shape[1]
         own = self.only_sign[self.owner == effect]
-        both = np.where((draw // cosine.shape[1]) % 2 == 0, 1.0, -1.0)
+        both = np.where((np.arange(self.scores.shape[1]) // truths) % 2 == 0, 1.0, -1.0)
         sign = np.where(own.any(), own[0], both).astype(np.float32)
         near = np.flatnonzero((self.owner < self.effects) | (np.abs(cosine).max(axis=1) > UNLIKE))
         owner, first = np.unique(self.owner[near], return_index=True)
@@ -98,10 +98,12 @@ class FirstCompetition:
         others[owner] -= np.add.reduceat(at_rest[near], first, axis=0, dtype=float)
         evidence = np.repeat(np.log(np.maximum(others, LEAST_ODDS))[None], NAMED_AT.size - 1, axis=0)
         of_near = self.only_sign[near], self.factor[near], self.constant[near], self.owner[near]
+        scores = self.scores[near]
         for one, toward in enumerate(np.ascontiguousarray(cosine[near].T)):
-            of_it = np.flatnonzero(truth == one)
-            scores, found = self.scores[np.ix_(near, of_it)], np.ascontiguousarray(evidence[..., of_it])
-            _add_evidence(np.outer(NAMED_AT[1:], sign[of_it]), scores, toward, *of_near, found)
+            of_it = slice(one, None, truths)
+            found = np.ascontiguousarray(evidence[..., of_it])
+            shifts = np.outer(NAMED_AT[1:], sign[of_it])
+            _add_evidence(shifts, np.ascontiguousarray(scores[:, of_it]), toward, *of_near, found)
             evidence[..., of_it] = found
         return np.array([0.0, *(self._named(one.T, effect) for one in evidence)])
 
@@ -240,7 +242,9 @@ def chances_named(competition: FirstCompetition, truths: Sequence[Projected]) ->
     ndarray (effect, lengths)
         [-]
     """
-    return np.array(in_threads(competition.named, list(enumerate(truths))))
+    ends = np.cumsum([one.units.shape[1] for one in truths])[:-1]
+    cosines = competition.units.T @ np.hstack([one.units for one in truths]).astype(np.float32)
+    return np.array(in_threads(competition.named, list(enumerate(np.split(cosines, ends, axis=1)))))
 
 
 # Proposals of one kind that are shown, and of all; rounds of exchange.
