@@ -52,6 +52,12 @@ def test_a_heading_has_a_role_and_a_unit(heading: str, known: tuple[str, str | N
     assert role_of(heading) == known
 
 
+@pytest.mark.parametrize("heading", ["x_m (cm)", "h_m [mm]", "depth m, ft", "u_cm_s [m/s]"])
+def test_a_heading_with_two_units_has_no_role(heading: str) -> None:
+    """h_m [mm] was read in metres: a mean depth a thousand times too large."""
+    assert role_of(heading) is None
+
+
 @pytest.mark.parametrize("heading", ["u*", "u*_ms", "σ_u", "σu (m/s)", "u'", "u′ [cm/s]", "Δx", "y+", "∂u", "±u", "∆x"])
 def test_a_sign_makes_another_quantity_of_a_letter(tmp_path: Path, heading: str) -> None:
     taken = rows_of(tmp_path, f"{heading},x,y,u\n0.05,8,0,0.4\n0.06,20,0,0.5\n")

@@ -308,7 +308,7 @@ def role_of(heading: str) -> tuple[str, str | None] | None:
 
 def known_name(heading: str) -> tuple[str, str | None] | None:
     """Under which name of its role a column is known, and the unit its heading states: `('u mean', 'm/s')`; a share,
-    such as `%Q`, under none.
+    such as `%Q`, and a heading with two units under none.
     """
     bare, unit = _name_and_brackets(heading)
     if OF_SHARES.search(bare):
@@ -319,7 +319,8 @@ def known_name(heading: str) -> tuple[str, str | None] | None:
     for name, word in _suffixed(bare):
         found = _ROLE_OF.get(words_of(name))
         if found is not None and ROLES[found].quantity and (said := unit_named(word, ROLES[found].quantity)):
-            return words_of(name), said
+            # Brackets with another unit: h_m [mm] may be a mean depth.
+            return None if unit_named(unit, ROLES[found].quantity) not in (None, said) else (words_of(name), said)
     return None
 
 
