@@ -4,9 +4,10 @@ The code of others has the second solver's scheme on its own cells and no second
 solver makes on finer cells, has one. What is judged is the misfit of the finished result.
 """
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
-import blind_truth
 import numpy as np
 import pytest
 import yaml
@@ -49,13 +50,11 @@ def result_of(case: Case, experiment: str) -> GridFlow:
     return GridFlow(*edges, bed_level(x, y, truth), depth, flow.u, flow.v, n, ORIGIN, ANGLE)
 
 
-def folder_of_user(folder: Path, code: str, hidden: dict[str, dict[str, float]], flows: dict[str, GridFlow]) -> Path:
+def folder_of_user(folder: Path, code: str, nature: np.ndarray, flows: dict[str, GridFlow]) -> Path:
     """Measurements along the channel, patches, and a result for each experiment."""
     folder.mkdir()
     case = load_case(small_twin(folder, "mid" in flows))
-    station = read_observations(case).table
-    site = perfect_site(case, "twin", STATED, len(station))
-    write_with_errors(case, station, np.asarray(true_values(site, case, "twin", station, hidden)))
+    write_with_errors(case, read_observations(case).table, nature)
     (folder / "twin.yaml").unlink()
     write, ending, more = WRITERS[code]
     for name, flow in flows.items():
@@ -85,10 +84,32 @@ def flows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, GridFlow]:
     return {name: result_of(case, name) for name in case.experiments}
 
 
-def diagnosed(folder: Path, code: str, hidden: dict[str, dict[str, float]], flows: dict[str, GridFlow]) -> Diagnosis:
-    """Import, check and diagnosis of a result of a code, with what nature has beside it."""
-    reach = folder_of_user(folder / "reach", code, hidden, flows)
-    case = vegglue.import_folder(reach, folder / "reach.yaml")
+@pytest.fixture(scope="module")
+def nature(tmp_path_factory: pytest.TempPathFactory) -> Callable[[bool], np.ndarray]:
+    """What instruments without errors show of two experiments with what is hidden, or of three without: solved once."""
+
+    @cache
+    def values(hides: bool) -> np.ndarray:
+        case = load_case(small_twin(tmp_path_factory.mktemp("nature"), mid=not hides))
+        station = read_observations(case).table
+        site = perfect_site(case, "twin", STATED, len(station))
+        return np.asarray(true_values(site, case, "twin", station, HIDDEN if hides else {}, CELLS))
+
+    return values
+
+
+def diagnosed(
+    folder: Path, code: str, nature: np.ndarray, flows: dict[str, GridFlow], coarsened: float = 1.0
+) -> Diagnosis:
+    """Import, check and diagnosis of a result of a code, with what nature has beside it; on cells so many times as
+    large as `import` proposes.
+    """
+    reach = folder_of_user(folder / "reach", code, nature, flows)
+    config = vegglue.import_folder(reach, folder / "reach.yaml").source
+    tree = yaml.safe_load(config.read_text(encoding="utf-8"))
+    tree["grid"] |= {"cell": [coarsened * side for side in tree["grid"]["cell"]]}
+    config.write_text(yaml.safe_dump(tree), encoding="utf-8")
+    case = load_case(config)
     for name, wanted in {"low": 1.0, "high": 3.2}.items():
         assert case.experiments[name].discharge["upstream"] == pytest.approx(wanted, rel=0.03)
     compared = vegglue.check(case, runs=folder / "runs").remarks[0]
@@ -102,10 +123,9 @@ def diagnosed(folder: Path, code: str, hidden: dict[str, dict[str, float]], flow
 @pytest.mark.slow
 @pytest.mark.parametrize("code", WRITERS)
 def test_it_names_what_a_result_lacks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, flows: dict[str, GridFlow]
+    tmp_path: Path, code: str, flows: dict[str, GridFlow], nature: Callable[[bool], np.ndarray]
 ) -> None:
-    monkeypatch.setitem(blind_truth.CELLS, "twin", CELLS)
-    found = diagnosed(tmp_path, code, HIDDEN, {name: flows[name] for name in ("low", "high")})
+    found = diagnosed(tmp_path, code, nature(True), {name: flows[name] for name in ("low", "high")})
     assert found.set == ["secondary_current"]
     amplitude = found.candidate_effect("secondary_current").amplitude
     low, high = amplitude.interval95
@@ -115,9 +135,8 @@ def test_it_names_what_a_result_lacks(
 @pytest.mark.slow
 @pytest.mark.parametrize("code", WRITERS)
 def test_nothing_is_missing_in_a_result_that_lacks_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, flows: dict[str, GridFlow]
+    tmp_path: Path, code: str, flows: dict[str, GridFlow], nature: Callable[[bool], np.ndarray]
 ) -> None:
     """In three experiments: the 62 readings of two allow a miss of 1.38 times the errors between the sections."""
-    monkeypatch.setitem(blind_truth.CELLS, "twin", CELLS)
-    found = diagnosed(tmp_path, code, {}, flows)
+    found = diagnosed(tmp_path, code, nature(False), flows, coarsened=2.0)
     assert (found.verdict.kind, found.set) == ("nothing-missing", [])
