@@ -198,8 +198,9 @@ def test_what_the_tutorial_hides_is_found_and_added(willows: tuple[Path, dict[st
 
 @pytest.mark.slow
 def test_the_demonstration_goes_the_same_way(willows: tuple[Path, dict[str, list[str]]], tmp_path: Path) -> None:
-    """Its site is that of the tutorial, and what lies in its folder is not computed again."""
+    """Its site is that of the tutorial, and what lies in its folder is not computed again, nor what was added."""
     shutil.copytree(willows[0] / "runs", tmp_path / "tour")
+    shutil.copy(willows[0] / "willows+secondary_current.yaml", tmp_path / "tour")
     results = {path: path.stat().st_mtime_ns for path in (tmp_path / "tour").rglob("*.h5")}
     quiet, told = (here(tmp_path, "demo", "tour", "--short", "--jobs", "1", mode) for mode in ("--quiet", "--json"))
     page = (tmp_path / "tour" / "overview.html").resolve()
