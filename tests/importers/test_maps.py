@@ -675,6 +675,22 @@ def test_walls_and_mapped_classes_win_over_stated_banks(tmp_path: Path) -> None:
         assert (site.friction_class[:, site.grid.y < -3] == site.class_names.index(name)).all()
 
 
+@pytest.mark.parametrize(
+    ("names", "coefficients"),
+    [
+        (("砂", "砾"), ["n_b", "n_class", "n_class_2"]),
+        (("fine sand", "Fine-Sand"), ["n_b", "n_fine_sand"]),
+        (("d 1/2", "d 1_2"), ["n_b", "n_d_1_2"]),
+    ],
+)
+def test_classes_differ_if_their_names_do(tmp_path: Path, names: tuple[str, str], coefficients: list[str]) -> None:
+    """Two classes without a Latin letter were one."""
+    south, north = (polygon((0, y), (40, y), (40, y + 1.5), (0, y + 1.5)) for y in (-4.5, 3.0))
+    text = collection(({"class": names[0]}, south), ({"class": names[1]}, north))
+    case, _ = surveyed(tmp_path, "classes: {file: classes.geojson}\n", classes__geojson=text)
+    assert [one.n for one in case.friction.classes.values()] == coefficients
+
+
 def test_steep_cells_without_a_class_are_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     case, _ = surveyed(tmp_path, "")
     assert list(case.friction.classes) == ["bed"]

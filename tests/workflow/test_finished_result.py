@@ -149,18 +149,20 @@ def test_what_import_refuses(tmp_path: Path) -> None:
         imported(folder_with(tmp_path / "e", uniform(), site={"result": {"law": "darcy"}}))
 
 
-def test_each_experiment_has_its_result(tmp_path: Path) -> None:
-    """Also the one that is held out; discharges are those of the runs, bed and frame those of the first."""
-    speeds = {"high": 1.2, "late": 1.1, "low": 1.0}
-    site = {
-        "result": {"files": {name: f"{name}.p01.hdf" for name in speeds}},
-        "experiments": {"low": {}, "high": {}}, "holdout": {"late": {}},
-    }  # fmt: skip
-    folder = folder_with(tmp_path / "reach", uniform(), name="low.p01.hdf", site=site)
+@pytest.mark.parametrize(("low", "high"), [("low", "high"), ("低", "高"), ("Q 2", "Q/2")])
+def test_each_experiment_has_its_result(tmp_path: Path, low: str, high: str) -> None:
+    """Also the one that is held out; discharges are those of the runs, bed and frame those of the first.
+
+    Flows of two experiments whose names have the same Latin letters were written into one file.
+    """
+    speeds = {high: 1.2, "late": 1.1, low: 1.0}
+    files = {name: f"{number}.p01.hdf" for number, name in enumerate(speeds)}
+    site = {"result": {"files": files}, "experiments": {low: {}, high: {}}, "holdout": {"late": {}}}
+    folder = folder_with(tmp_path / "reach", uniform(), name=files[low], site=site)
     for name, factor in speeds.items():
-        write_hec_ras(folder / f"{name}.p01.hdf", uniform(speed=factor * SPEED))
+        write_hec_ras(folder / files[name], uniform(speed=factor * SPEED))
     table = pd.read_csv(folder / "velocities.csv")
-    pd.concat([table.assign(experiment=name) for name in ("low", "high")]).to_csv(folder / "velocities.csv")
+    pd.concat([table.assign(experiment=name) for name in (low, high)]).to_csv(folder / "velocities.csv")
     table.assign(experiment="late").to_csv(folder / "holdout.csv")
     case = imported(folder)
     flows = case.experiments | case.validation.experiments

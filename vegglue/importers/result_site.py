@@ -18,7 +18,7 @@ from scipy.interpolate import LinearNDInterpolator
 from vegglue.arrays import Array
 from vegglue.case.grid import Grid, centres
 from vegglue.case.resolved_config import Tree
-from vegglue.case.text_files import case_name
+from vegglue.case.text_files import case_name, told_apart
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.config_parts import MANNING_BED, bed_prior, lognormal_prior
 from vegglue.importers.finished_results import holds_result, read_result
@@ -183,8 +183,9 @@ def ground_of_result(target: Path, found: SiteOfResult) -> GroundOfResult:
     friction, parameters, values, texts, words = _friction_of_result(target, placed, found)
     imported: list[Tree] = []
     files: dict[str, str] = {}
+    called = told_apart({experiment: case_name(experiment) for experiment in found.placed})
     for experiment, one in found.placed.items():
-        file = f"flow-{case_name(experiment)}.csv"
+        file = f"flow-{called[experiment]}.csv"
         flow, (west, east), (south, north) = one.flow, found.grid["x"], found.grid["y"]
         beside = 2.0 * flow.spacing  # of the flow beyond the grid two spacings are kept
         near = (

@@ -24,7 +24,7 @@ from vegglue.case.survey_error import (
     lines_left_out,
     mean_level,
 )
-from vegglue.case.text_files import case_name
+from vegglue.case.text_files import case_name, told_apart
 from vegglue.case.zones import beyond_slope_break, slope
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import UNITS, role_of, unit_named, words_of
@@ -204,9 +204,10 @@ def mapped_classes(folder: Path, site: FieldSite, place: Placement) -> tuple[Tre
     path = _file_of(folder, site.classes, "classes")
     polygons = read_polygons(path, place.frame)
     refuse_far_polygons(path, polygons, place)
-    zones = []
-    for polygon in polygons:
-        name = case_name(polygon.friction_class or polygon.name)
+    zones, texts = [], [polygon.friction_class or polygon.name for polygon in polygons]
+    called = told_apart({words_of(text): case_name(text, "class") for text in texts})
+    for polygon, text in zip(polygons, texts, strict=True):
+        name = called[words_of(text)]
         coefficient = f"n_{re.sub('[^a-z0-9]', '_', name)}"
         own = {"law": "manning", "n": f"{coefficient}_class" if coefficient in TAKEN_NAMES else coefficient}
         friction["classes"].setdefault(name, own)
