@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from reach import COARSE, Say, block, write_reach
 
-from vegglue.calibration.candidates import Candidate
+from vegglue.calibration.candidates import Candidate, acting_in
 from vegglue.case.config import load_case
 from vegglue.diagnosis.child_config import child_name
 from vegglue.effects.library import library
@@ -112,6 +112,13 @@ def test_a_child_of_a_long_name_has_another_than_its_parent(tmp_path: Path) -> N
     assert "a" * 100 not in names
     assert all(len(name) <= 100 for name in names)
     assert child_name("brook", added[0]).startswith("brook-")
+
+
+def test_children_of_two_experiments_have_two_names() -> None:
+    """An experiment without a Latin letter left no trace in the folder of results."""
+    effect = library()["discharge_error"]
+    added = [Candidate(effect), *(acting_in(effect, "experiment", (name,)) for name in ("高", "低"))]
+    assert len({child_name("brook", [one]) for one in added}) == len(added)
 
 
 def test_stations_outside_the_grid_give_no_posterior(tmp_path: Path, say: Say) -> None:

@@ -200,6 +200,7 @@ def child_name(parent: str, added: Sequence[Candidate]) -> str:
     """A name for the child's folder of results."""
     words = "-".join([parent, *(candidate.key for candidate in added)])
     name = case_name(words)
-    if len(name) < LONGEST_NAME:
+    if len(name) < LONGEST_NAME and words.isascii():
         return name
-    return f"{name[:-9]}-{hashlib.sha256(words.encode()).hexdigest()[:8]}"  # cut, it could be its parent's
+    # Cut, or without its other letters, it could be that of its parent or of another child.
+    return f"{name[: LONGEST_NAME - 9]}-{hashlib.sha256(words.encode()).hexdigest()[:8]}"
