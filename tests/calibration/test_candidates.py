@@ -39,6 +39,14 @@ def case_with(effect: str, values: Mapping[str, Value]) -> Case:
     return CASE.model_copy(update={"effects": {"own": entry}, "parameters": parameters})
 
 
+def test_names_that_give_one_key_are_refused() -> None:
+    """Of an error of the discharge in each of two experiments the second took the place of the first."""
+    experiments = {name: next(iter(CASE.experiments.values())) for name in ("Q 2", "Q/2")}
+    case = CASE.model_copy(update={"experiments": experiments})
+    with pytest.raises(InputError, match="rename one"):
+        candidates_of(case, stations_of(case, ("A",), 5))
+
+
 @pytest.mark.parametrize(
     ("effect", "values", "name"),
     [

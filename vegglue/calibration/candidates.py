@@ -27,6 +27,7 @@ from vegglue.effects.definition import Amplitude, Effect, Need, Shape
 from vegglue.effects.identity import EffectIdentity
 from vegglue.effects.library import library
 from vegglue.engine.interface import Cause
+from vegglue.errors import InputError, shown_path
 from vegglue.measurements.csv_table import read_table
 from vegglue.measurements.kinds import kind_of, velocity_rows
 
@@ -247,15 +248,29 @@ def where_it_may_act(case: Case, station: pd.DataFrame) -> dict[str, list[str]]:
     -------
     dict of list of str
         `experiment`; `section`, those with used velocities; `device`, the used ones; `patch`.
+
+    Raises
+    ------
+    InputError
+        If two names give one key of a config, such as `Q 2` and `Q/2`.
     """
     used = station[station["used"]]
     velocity = used[velocity_rows(used)]
-    return {
+    places = {
         "experiment": list(case.experiments),
         "section": [str(name) for name in velocity["section"].unique()],
         "device": [str(name) for name in used["device"].unique() if str(name)],
         "patch": [patch.name for patch in case.plants.patches],
     }
+    for kind, names in places.items():
+        known: dict[str, str] = {}
+        for name in names:
+            if (other := known.setdefault(EffectIdentity("", (name,)).key, name)) != name:
+                raise InputError(
+                    f"{shown_path(case.source)}: expected {kind}s whose names differ in letters or digits, got "
+                    f"{other!r} and {name!r}; rename one."
+                )
+    return places
 
 
 def candidates_in_case(case: Case) -> dict[str, Candidate]:
