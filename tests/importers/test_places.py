@@ -54,6 +54,7 @@ def test_repeats_on_the_axis_are_averaged_and_reported(tmp_path: Path, table: st
     [
         (FROM_THE_BANK, WADING, [(11, 2.0), (11, 1.0), (19, 2.0)]),
         ("{zero: [0, -1]}", "x;y;u\n1;0.5;0.4\n", [(1, -0.5)]),
+        ("{zero: [0, -1]}", "x;u\n1;0.4\n", [(1, -1)]),
         ("{x: 12 m}", "y;u\n-1;0.4\n1;0.5\n", [(12, -1), (12, 1)]),
         (TAPE, "Distance (m);Velocity\n0.5;0.4\n1;0.5\n", [(8, 1.5), (8, 1)]),
         (TAPE, "DMG (m);Depth (m);Mean Speed (m/s)\n0.5;1;0.4\n1;1;0.5\n", [(8, 1.5), (8, 1)]),

@@ -22,7 +22,7 @@ class Noted(StrEnum):
     EMPTY = auto()  # how many; the heading
     LACKING = auto()  # how many; roles
     UNNAMED_SECTIONS = auto()  # how many
-    ON_AXIS = auto()
+    ON_AXIS = auto()  # y [m]
     BESIDE_POINTS = auto()  # the kind in words
     NEAR_AVERAGE = auto()  # share of the depth [-]
     HEIGHTS_UNUSED = auto()  # the role of the heights

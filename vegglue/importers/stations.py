@@ -170,7 +170,8 @@ def station_tables(
     named = _with_experiment_and_section(taken, options, known.names, f"{file}:")
     taken, once = _once_in_a_section(named)
     kinds = [kind for kind in KINDS.values() if kind.column in taken.numbers]
-    on_axis = () if "y" in at or not any(kind.at_point for kind in kinds) else (ImportNote(Noted.ON_AXIS),)
+    lacks_y = "y" not in at and any(kind.at_point for kind in kinds)
+    on_axis = (ImportNote(Noted.ON_AXIS, _lacking_y(options)),) if lacks_y else ()
     if options.experiment is not None and options.experiment not in known.names:
         raise known.refusal(file, options.experiment)
     if not kinds:
@@ -274,12 +275,17 @@ def _with_experiment_and_section(
         raise InputError("no_column_of_experiments", where=where, file=file, known=experiments, alike=alike[:1])
     sections = [options.section] * taken.size if options.section is not None else taken.texts.get("section")
     if sections is None or "" in sections:
-        x, y = taken.numbers["x"], taken.numbers.get("y", np.zeros(taken.size))
+        x, y = taken.numbers["x"], taken.numbers.get("y", np.full(taken.size, _lacking_y(options)))
         of_one_tape = "tape" in taken.columns and "tape" not in taken.numbers
         sections = [_section_at(x)] * taken.size if of_one_tape else _sections_by_place(x, y)
     named = replace(taken, texts={**taken.texts, "experiment": names, "section": sections})
     _refuse_lost_places(named, where.removesuffix(":"))
-    return named if "y" in place else named.having({"y": np.zeros(named.size)})
+    return named if "y" in place else named.having({"y": np.full(named.size, _lacking_y(options))})
+
+
+def _lacking_y(options: FileOptions) -> float:
+    """y of rows without a column of it, which lie where y of the file is 0 [m]."""
+    return 0.0 if options.zero is None else options.zero[1]
 
 
 def _section_at(x: Array) -> str:
