@@ -111,11 +111,14 @@ def pd0(
     unranged: tuple[int, ...] = (),
     cell: int = 10,
     first: int = 35,
+    gps: bool = False,
+    bed: tuple[float, float] = (0.0, 0.0),
 ) -> bytes:
     """A raw transect as a Rio Grande writes it: the boat of `winriver`, one ensemble a second, 0.2 m deep in the water.
 
     cell, first: size of the cells, and range of the first one [cm]; lost, unranged: ensembles, from 0, whose bottom
-    track and whose ranges to the bottom are marked as lost. Each has header, fixed and variable leader, velocities
+    track and whose ranges to the bottom are marked as lost; gps: with places from 46.5 N, 7 E on; bed: velocity of a
+    bed that moves. Each has header, fixed and variable leader, velocities
     against the boat, three blocks of quality, bottom track, check sum.
     """
     random, cells, draft = np.random.default_rng(3), np.arange(30), 0.2
@@ -124,11 +127,25 @@ def pd0(
     for number, boat in enumerate(boats):
         own = noise * random.standard_normal((cells.size, 2))
         marks = number in lost, number in unranged
-        ensembles.append(_pd0_ensemble(number + 1, boat, depth, draft, cells, velocity, own, marks, cell, first))
+        place = (east[number], north[number]) if gps else None
+        ensembles.append(
+            _pd0_ensemble(number + 1, boat, depth, draft, cells, velocity, own, marks, cell, first, place, bed)
+        )
     return b"".join(ensembles)
 
 
-def _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise, marks, cell, first) -> bytes:
+def _gga(number: int, east: float, north: float) -> bytes:
+    """A fix as WinRiver II writes it (block 2022), on a sphere of 111.2 km a degree."""
+    latitude, longitude = 46.5 + north / 111_200.0, 7.0 + east / (111_200.0 * np.cos(np.radians(46.5)))
+    clock = f"10{number // 60:02d}{number % 60:02d}.00"
+    fix = b"$GPGGA\0" + clock.encode().ljust(10, b"\0")
+    fix += struct.pack("<dcdcBBffcfcfH", latitude, b"N", longitude, b"E", 2, 9, 0.9, 450.0, b"M", 48.0, b"M", 1.0, 0)
+    return struct.pack("<HHHd", 0x2022, 104, len(fix), 0.0) + fix
+
+
+def _pd0_ensemble(
+    number, boat, depth, draft, cells, velocity, noise, marks, cell, first, place=None, bed=(0.0, 0.0)
+) -> bytes:
     minute, second = divmod(number, 60)
     clock = (20, 6, 3, 10, minute, second, 0)
     # Rio Grande 10.16; beams of 20 degrees; the frame of the earth, tilts used.
@@ -149,12 +166,13 @@ def _pd0_ensemble(number, boat, depth, draft, cells, velocity, noise, marks, cel
         for name, value in ((0x200, 120), (0x300, 90), (0x400, 100))
     ]
     lost, unranged = marks
-    track = [-32768] * 4 if lost else [*(-1000.0 * boat).round().astype(int).tolist(), 0, 0]
+    track = [-32768] * 4 if lost else [*(1000.0 * (np.array(bed) - boat)).round().astype(int).tolist(), 0, 0]
     bottom = (*[0 if unranged else round(100 * (depth - draft))] * 4, *track)
     blocks += [
         struct.pack("<3H4BHI4H4h", 0x600, 1, 0, 220, 30, 0, 5, 1000, 0, *bottom)
         + bytes([255] * 4 + [100] * 8 + [0] * 37)
     ]
+    blocks += [_gga(number, *place)] if place is not None else []
     starts = np.cumsum([6 + 2 * len(blocks), *map(len, blocks)]).tolist()
     whole = struct.pack("<HHBB", 0x7F7F, starts[-1] + 2, 0, len(blocks)) + struct.pack(f"<{len(blocks)}H", *starts[:-1])
     whole += b"".join(blocks) + bytes(2)

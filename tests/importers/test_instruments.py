@@ -168,6 +168,27 @@ def test_a_raw_transect_gives_the_stations_of_its_ascii_output(tmp_path: Path) -
     assert ImportNote(Noted.ENSEMBLES, 151) in raw.notes
 
 
+@pytest.mark.parametrize(("bed", "lost", "drift"), [
+    ((0.0, 0.0), (), 0.0), ((0.0, 0.0), tuple(range(40, 90)), 0.0), ((0.16, -0.12), (), 0.2),
+    ((0.16, -0.12), tuple(range(40, 90)), 0.2),
+])  # fmt: skip
+def test_places_by_gps_count_over_a_bottom_that_moves_or_is_lost(
+    tmp_path: Path, bed: tuple[float, float], lost: tuple[int, ...], drift: float
+) -> None:
+    """On the Tanana the bottom was lost for 122 s, and moved at up to 1 m/s: stations lay 180 m off, and water that ran
+    at 2.1 m/s was read as 1.2 m/s.
+    """
+    pytest.importorskip("mhkit")
+    (track, *rest) = BOAT
+    right = read_pd0(raw_boat(tmp_path), START)
+    path = written(tmp_path / "gps.PD0", pd0(*track, *rest, gps=True, bed=bed, lost=lost))
+    found = read_pd0(path, START)
+    for role, off in (("x", 0.3), ("y", 0.3), ("east_velocity", 0.03), ("north_velocity", 0.03)):
+        assert found.numbers[role] == pytest.approx(right.numbers[role], abs=off), role
+    assert ImportNote(Noted.BY_GPS, pytest.approx(drift, abs=0.02)) in found.notes
+    assert ImportNote(Noted.ENSEMBLES, 151) in found.notes
+
+
 def test_a_compass_is_turned_to_true_north(tmp_path: Path) -> None:
     pytest.importorskip("mhkit")
     path = raw_boat(tmp_path)

@@ -56,6 +56,7 @@ class Noted(StrEnum):
     CELLS_SOUND = auto()  # how many; of how many
     ADCP_AT = auto()  # its draft [m]; its model
     DECLINATION = auto()  # [degrees]
+    BY_GPS = auto()  # how fast the bottom drifts against places by GPS, 0 if it stands still [m/s]
     DAMAGED = auto()  # how many ensembles
     SURFACE_LAYER = auto()
     ENSEMBLES = auto()  # how many

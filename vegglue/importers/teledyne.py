@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -20,13 +21,24 @@ from vegglue.importers.file_options import FileOptions
 from vegglue.importers.import_notes import ImportNote, Noted
 from vegglue.importers.library_files import open_raw, read_by_library, readable_text
 from vegglue.importers.measured_rows import MeasuredRows
-from vegglue.importers.transects import DEEPEST_RIVER, FASTEST, BoatProfile, refuse_leaps, stations_of_transect
+from vegglue.importers.transects import (
+    DEEPEST_RIVER,
+    FASTEST,
+    FEWEST_ENSEMBLES,
+    BoatProfile,
+    refuse_leaps,
+    stations_of_transect,
+)
 
 # How a file of ensembles begins, and each ensemble; bytes of the shortest one, header and leaders alone.
 PD0_BEGINS, LEAST_ENSEMBLE = b"\x7f\x7f", 100
 # How blocks begin: the fixed leader, and those of the surface layer of a RiverPro or a StreamPro.
 FIXED_LEADER = b"\x00\x00"
 SURFACE_BLOCKS = {bytes([0x10, number]) for number in range(6)}
+# The bottom moves if it drifts by more than this share of the speed of the water, Mueller et al. (2013), Techniques and
+# Methods 3-A22 (not compared with the source), and by more standard errors of its mean than this, chosen.
+MOVING_BED, ERRORS_OF_DRIFT = 0.01, 3.0
+EARTH, FLATTENING = 6_378_137.0, 1.0 / 298.257223563  # equatorial radius [m], and flattening of WGS 84
 # What marks no value in the output of WinRiver, whatever the unit.
 NO_VALUE = -32768.0
 # By the unit of the file: metres in one of depth, and in one of velocity (cm/s or ft/s).
@@ -36,7 +48,8 @@ SCALES = {"cm": (1.0, 0.01), "ft": (0.3048, 0.3048)}
 @dataclass(frozen=True)
 class _RawEnsemble:
     """Time; draft [m]; bottom against the boat (2,) [m/s]; depth below the instrument [m], 0 for none; ranges of the
-    cells above the side lobes (cells,) [m], and their velocities against the boat (cells, 2) [m/s].
+    cells above the side lobes (cells,) [m], and their velocities against the boat (cells, 2) [m/s]; latitude and
+    longitude by GPS (2,) [degrees], NaN for none.
     """
 
     time: np.datetime64
@@ -45,14 +58,16 @@ class _RawEnsemble:
     depth: float
     cells: Array
     water: Array
+    fix: Array
 
 
 def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
     """Stations of a raw transect.
 
     x_i = x_(i-1) + u_i (t_i - t_(i-1)), the boat moving as the bottom seems to, the other way. Water over ground is the
-    water against the boat less the bottom against it. Cells that the side lobes of the beams reach are left out:
-    range > R cos(beam angle).
+    water against the boat less the bottom against it. If the file has places by GPS, these count, and their velocity
+    dx/dt where the bottom was lost, everywhere if the bottom drifts against them: over a bed that moves, bottom track
+    gives too little. Cells that the side lobes of the beams reach are left out: range > R cos(beam angle).
 
     Parameters
     ----------
@@ -70,41 +85,54 @@ def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
     Raises
     ------
     InputError
-        Also without mhkit, without bottom track, and if the boat leaps.
+        Also without mhkit, without bottom track and GPS, and if the boat leaps.
 
     References
     ----------
-    WorkHorse Commands and Output Data Format (P/N 957-6156-00).
+    WorkHorse Commands and Output Data Format (P/N 957-6156-00). Mueller et al. (2013), doi:10.3133/tm3A22.
     """
     groups, damaged, of_surface = _sound_ensembles(path.read_bytes())
     read = [_raw_ensembles(path, group) for group in groups]
     model, found = read[-1][0], sorted((one for _, some in read for one in some), key=lambda one: one.time)
     bottoms = np.array([one.bottom for one in found])
     known = (np.isfinite(bottoms) & (np.abs(np.nan_to_num(bottoms)) <= FASTEST)).all(axis=1)
-    if not known.any():
+    time = np.array([(one.time - found[0].time) / np.timedelta64(1, "s") for one in found])
+    fixes = np.array([one.fix for one in found])
+    by_gps = np.isfinite(fixes).all(axis=1) & (np.diff(time, prepend=-1.0) > 0.0)
+    has_gps = np.count_nonzero(by_gps) >= FEWEST_ENSEMBLES
+    if not (known.any() or has_gps):
         raise InputError(
-            f"{shown_path(path)}: expected bottom track, got none in {known.size} ensembles; without it no boat has a "
-            "place. Export classic ASCII output with GPS as reference from WinRiver."
+            f"{shown_path(path)}: expected bottom track or GPS, got none in {known.size} ensembles; without it no boat "
+            "has a place. Export classic ASCII output with GPS as reference from WinRiver."
         )
     own = np.array([one.draft for one in found])
     usual = float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0
     draft = np.where(np.isnan(own), usual, own) if options.draft is None else np.full(own.shape, options.draft)
-    time = np.array([(one.time - found[0].time) / np.timedelta64(1, "s") for one in found])
-    track = np.cumsum(-bottoms[known].T * np.diff(time[known], prepend=time[known][:1]), axis=1)
-    places = iter(_to_true_north(track.T, options.declination).tolist())
+    boat = np.where(known[:, None], -_to_true_north(bottoms, options.declination), np.nan)
+    place = np.full(boat.shape, np.nan)
+    place[known] = np.cumsum(boat[known] * np.diff(time[known], prepend=time[known][:1])[:, None], axis=0)
+    against = [_to_true_north(one.water, options.declination) for one in found]
+    reference: tuple[ImportNote, ...] = ()
+    if has_gps:
+        place = _metres_from_first(fixes)
+        moved = np.full(boat.shape, np.nan)
+        moved[by_gps] = np.gradient(place[by_gps], time[by_gps], axis=0)
+        drift = _drift_of_bottom(boat, moved, against)
+        boat = np.where(np.isfinite(boat) & (drift == 0.0), boat, moved)
+        reference = (ImportNote(Noted.BY_GPS, drift),)
     profiles = []
-    for one, deep, is_known in zip(found, draft.tolist(), known.tolist(), strict=True):
-        if not is_known:
+    for one, deep, at, own_velocity, water in zip(found, draft.tolist(), place.tolist(), boat, against, strict=True):
+        if not np.isfinite([*at, *own_velocity]).all():
             profiles.append(BoatProfile((np.nan, np.nan), 0.0, np.zeros(0), np.zeros((0, 2))))
             continue
-        velocity = _to_true_north(one.water - one.bottom, options.declination)
+        velocity = water + own_velocity
         good = np.isfinite(velocity).all(axis=1)
         depth = one.depth + deep if one.depth > 0.0 else 0.0
-        east, north = next(places)
-        profiles.append(BoatProfile((east, north), depth, depth - deep - one.cells[good], velocity[good]))
+        profiles.append(BoatProfile((at[0], at[1]), depth, depth - deep - one.cells[good], velocity[good]))
     refuse_leaps(path, profiles)
     form = [ImportNote(Noted.ADCP_AT, float(np.median(draft)), (model,))]
     form += [ImportNote(Noted.DECLINATION, options.declination)] if options.declination else []
+    form += reference
     form += [ImportNote(Noted.DAMAGED, damaged)] if damaged else []
     form += [ImportNote(Noted.SURFACE_LAYER)] if of_surface else []
     return stations_of_transect(path, options, profiles, *form)
@@ -140,14 +168,62 @@ def _raw_ensembles(path: Path, group: list[bytes]) -> tuple[str, list[_RawEnsemb
     )
     own = np.where((own >= 0.0) & (own <= DEEPEST_RIVER), own, np.nan)
     beams = np.where((beams > 0.0) & (beams <= DEEPEST_RIVER), beams, np.nan)  # 0 marks a lost beam
+    fixes = _fixes(data)
     half, slant = 0.5 * float(data.attrs["cell_size"]), math.cos(math.radians(float(data.attrs["beam_angle"])))
     found = []
     for i, time in enumerate(data["time"].values):
         seen = beams[np.isfinite(beams[:, i]), i]
         reached = cells + half <= (float(seen.min()) * slant if seen.size else 0.0)
         depth = float(seen.mean()) if seen.size else 0.0
-        found.append(_RawEnsemble(time, own[i], bottom[:2, i], depth, cells[reached], water[:2, reached, i].T))
+        found.append(
+            _RawEnsemble(time, own[i], bottom[:2, i], depth, cells[reached], water[:2, reached, i].T, fixes[i])
+        )
     return model, found
+
+
+def _fixes(data: Any) -> Array:
+    """Latitude and longitude at the times of the ensembles (n, 2) [degrees], NaN before the first fix and after the
+    last; a file without GPS has none.
+    """
+    time = data["time"].values
+    if not {"latitude_gps", "longitude_gps", "hdwtime_gps"} <= set(data):
+        return np.full((time.size, 2), np.nan)
+    at = (data["hdwtime_gps"].values - time[0]) / np.timedelta64(1, "s")
+    places = np.column_stack([data[name].values for name in ("latitude_gps", "longitude_gps")]).astype(np.float64)
+    sound = np.isfinite(at) & np.isfinite(places).all(axis=1) & (places != 0.0).any(axis=1)
+    if not sound.any():
+        return np.full((time.size, 2), np.nan)
+    order = np.argsort(at[sound])
+    seconds = (time - time[0]) / np.timedelta64(1, "s")
+    return np.column_stack(
+        [np.interp(seconds, at[sound][order], part[sound][order], np.nan, np.nan) for part in places.T]
+    )
+
+
+def _metres_from_first(fixes: Array) -> Array:
+    """East and north of the first fix (n, 2) [m], by the radii of WGS 84 along its parallel and its meridian."""
+    first = fixes[np.flatnonzero(np.isfinite(fixes).all(axis=1))[0]]
+    latitude, squared = math.radians(first[0]), FLATTENING * (2.0 - FLATTENING)
+    flat = 1.0 - squared * math.sin(latitude) ** 2
+    north, east = np.radians(fixes - first).T
+    return np.column_stack([east * EARTH / flat**0.5 * math.cos(latitude), north * EARTH * (1.0 - squared) / flat**1.5])
+
+
+def _drift_of_bottom(boat: Array, moved: Array, against: list[Array]) -> float:
+    """How fast the bottom drifts against the places [m/s], 0 if it stands still.
+
+    boat, moved: velocity of the boat by bottom track and by GPS (n, 2), NaN for none; against: that of the water
+    against the boat, cells of each ensemble.
+    """
+    both = np.isfinite(boat + moved).all(axis=1)
+    if both.sum() < FEWEST_ENSEMBLES:
+        return 0.0
+    apart = (boat - moved)[both]
+    drift, error = apart.mean(axis=0), apart.std(axis=0, ddof=1) / math.sqrt(len(apart))
+    over = np.vstack([against[i] + moved[i] for i in np.flatnonzero(both)])
+    speed = float(np.hypot(*over[np.isfinite(over).all(axis=1)].mean(axis=0)))
+    size = float(np.hypot(*drift))
+    return size if size > MOVING_BED * speed and size > ERRORS_OF_DRIFT * float(np.hypot(*error)) else 0.0
 
 
 def _sound_ensembles(content: bytes) -> tuple[list[list[bytes]], int, bool]:
