@@ -45,7 +45,7 @@ from vegglue.engine.interface import flow_at_centres
 from vegglue.measurements.kinds import velocity_rows
 from vegglue.progress import silent
 from vegglue.results.causes import Rival
-from vegglue.results.verdict import MeasuredStretch, NameHangsOnSection, PlacesOnMap
+from vegglue.results.verdict import MeasuredStretch, NameHangsOnSection, OneSection, PlacesOnMap
 
 WEST, EAST = CASE_OF_TWINS.grid.x
 
@@ -134,6 +134,15 @@ def test_a_name_that_one_section_alone_gives_is_found(
     screening: Any = SimpleNamespace(base=base, fingerprints=prints, best_column=lambda candidate: candidate)
     found = conclusion.name_without_a_section(screening, SearchState(steps=(step(accepted),)))
     assert found == (NameHangsOnSection("wind", "A", "waves") if named else None)
+
+
+def test_a_second_section_or_experiment_or_gauge_is_no_lone_section() -> None:
+    station = stations_of(CASE_OF_TWINS, ("A", "B"), 4)
+    alone = station[(station["section"] == "A") & (station["experiment"] == station["experiment"].iloc[0])]
+    assert conclusion.only_section(alone) == OneSection("A")
+    assert conclusion.only_section(station[station["section"] == "A"]) is None
+    assert conclusion.only_section(station[station["experiment"] == station["experiment"].iloc[0]]) is None
+    assert conclusion.only_section(alone.assign(kind="level")) is None
 
 
 def test_a_misfit_is_in_the_errors_of_the_last_model() -> None:

@@ -44,6 +44,7 @@ from vegglue.results.verdict import (
     NeighboursExcluded,
     NoFlowHeldOut,
     Note,
+    OneSection,
     ParameterFarFromPrior,
     Reason,
     Remaining,
@@ -468,6 +469,15 @@ def test_a_name_that_hangs_on_one_section_is_none() -> None:
     assert verdict_on(**found).kind in ("identified", "one-of")
     hanging = verdict_on(**found, hangs_on=NameHangsOnSection("wind", "B", "waves"))
     assert (hanging.kind, tags(hanging.reasons)) == ("cannot-tell", ["name_hangs_on_section"])
+
+
+def test_one_section_in_one_experiment_gives_no_name() -> None:
+    """A transect of the Tanana: a lower bed 47 m upstream, over 1,000 to 1."""
+    of_wind = {"candidates": (a_candidate_effect("wind"),), "steps": (step("wind"),), "misfit": FITS}
+    for found in (of_wind, {"places": (an_anomaly(),)}, {"laws": LIKELY}):
+        told = verdict_on(**found, one_section=OneSection("T"))
+        assert (told.kind, tags(told.reasons)) == ("cannot-tell", ["one_section"])
+    assert verdict_on(misfit=FITS, one_section=OneSection("T")) == verdict_on(misfit=FITS), "silence has its own rules"
 
 
 def test_no_law_is_named_beside_errors_without_sense() -> None:

@@ -150,6 +150,7 @@ from vegglue.results.verdict import (
     NameHangsOnSection,
     NeighboursCorrelated,
     NoneLeads,
+    OneSection,
     ParameterFarFromPrior,
     ResultCompared,
     ShearLayer,
@@ -242,6 +243,7 @@ VERDICTS: dict[str, Diagnosis] = {
     )),
     "too many": doubt(TooManyGroups(tuple(Rival(name, "effect", 0.2) for name in ("wind", "waves", "steep_bank")))),
     "a name of one section": doubt(NameHangsOnSection("steep_bank", "B", "wind"), effects=(bank(),)),
+    "one section": doubt(OneSection("B"), effects=(bank(),)),
     "two surfaces": brook(kind="identified", effects=(
         bank(name="bank_roughness", title=SURFACES.title, amplitude=1.1, interval95=(0.9, 1.3)),
     )),

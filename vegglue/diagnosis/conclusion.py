@@ -69,6 +69,7 @@ from vegglue.results.verdict import (
     MeasuredStretch,
     NameHangsOnSection,
     Note,
+    OneSection,
     PlacesOnMap,
     ShearLayer,
     TooShallow,
@@ -365,6 +366,7 @@ def _verdict(
             surroundings=tuple(surroundings),
             excluded=model.case.exclude or {},
             hangs_on=hangs_on,
+            one_section=only_section(model.station.iloc[base.noise.rows]),
             bed=of_bed,
         )
     )
@@ -441,6 +443,23 @@ def name_without_a_section(first: Screening, found: SearchState) -> NameHangsOnS
             told = str(used["section"].to_numpy()[section_of == section][0])
             least, clearest = ahead, NameHangsOnSection(step.accepted, told, name)
     return clearest
+
+
+def only_section(used: pd.DataFrame) -> OneSection | None:
+    """The section of all velocities, if there is but one of one experiment, and nothing else is measured.
+
+    Parameters
+    ----------
+    used : DataFrame
+        Stations.
+
+    Returns
+    -------
+    OneSection or None
+    """
+    places = used[["experiment", "section"]].drop_duplicates()
+    lone = len(places) == 1 and bool(velocity_rows(used).any())
+    return OneSection(str(places["section"].iloc[0])) if lone else None
 
 
 def strained_without_a_section(base: Baseline, parameter: str) -> tuple[str, float] | None:

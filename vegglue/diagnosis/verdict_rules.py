@@ -35,6 +35,7 @@ from vegglue.results.verdict import (
     EstimatedErrors,
     NameHangsOnSection,
     Note,
+    OneSection,
     Reason,
     Remaining,
     Verdict,
@@ -94,6 +95,8 @@ class VerdictInputs:
         Effects that cannot act at the site, with the reason of each.
     hangs_on : NameHangsOnSection or None
         The section without which another name leads.
+    one_section : OneSection or None
+        That of all measurements.
     bed : tuple of BedCorrected
         Where it differs from the surveyed one, the clearest first.
     """
@@ -122,6 +125,7 @@ class VerdictInputs:
     surroundings: tuple[Note, ...] = ()
     excluded: Mapping[str, str] = by_default(default_factory=dict)
     hangs_on: NameHangsOnSection | None = None
+    one_section: OneSection | None = None
     bed: tuple[BedCorrected, ...] = ()
 
 
@@ -161,6 +165,8 @@ def _concluded(inputs: VerdictInputs, plain: Verdict) -> Verdict:
     if off := _unexplained(inputs):
         return replace(plain, reasons=tuple(discharge_mismatches(off)))
     doubt, laws, accepted = _doubt(inputs), inputs.laws, bool(inputs.steps or inputs.places)
+    if inputs.one_section is not None and (accepted or laws is not None or inputs.field is not None):
+        return replace(plain, laws=laws, reasons=(doubt or inputs.one_section,))
     if laws is not None:
         nothing_else = not (accepted or inputs.undecided or inputs.field)
         if nothing_else or (not doubt and laws.likelier and not accepted):

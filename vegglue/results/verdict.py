@@ -114,6 +114,13 @@ class NameHangsOnSection:
 
 
 @dataclass(frozen=True)
+class OneSection:
+    """All measurements are of one section in one experiment: how the water arrives there explains them as well."""
+
+    section: str
+
+
+@dataclass(frozen=True)
 class NeighboursExcluded:
     """Readings side by side are excluded, which one bad probe does not explain."""
 
@@ -198,9 +205,9 @@ class CommandNotSettled:
 OfTheData = DischargeMismatch | ImplausibleOutlet | ImplausibleValues
 Reason = (
     OfTheData | MisfitBeyondErrors | ParameterFarFromPrior | AmplitudeAtBound | AmplitudeBeyondPlausible |
-    NameHangsOnSection | NeighboursExcluded | TooManyGroups | NoneLeads | MisfitUnexplained | ErrorsLargerThanStated |
-    CorrelatedErrors | ModelErrorExceeded | NoFlowHeldOut | HeldOutMissed | UncertainBetweenSections | FewTestable |
-    CommandDiffers | CommandNotSettled
+    NameHangsOnSection | OneSection | NeighboursExcluded | TooManyGroups | NoneLeads | MisfitUnexplained |
+    ErrorsLargerThanStated | CorrelatedErrors | ModelErrorExceeded | NoFlowHeldOut | HeldOutMissed |
+    UncertainBetweenSections | FewTestable | CommandDiffers | CommandNotSettled
 )  # fmt: skip
 
 
