@@ -111,6 +111,29 @@ def test_a_window_counts_by_the_places_that_it_has_seen_again(
     assert found.log_evidence == pytest.approx(np.log(kept * prior))
 
 
+def test_what_its_mirror_image_explains_as_well_may_lie_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Levels on the axis cannot show on which side of it something lies; moved by 0.1 m it gained, and its mirror image
+    did not: y = 2.6 +- 0.2 m.
+    """
+    y = np.linspace(-3.0, 3.0, 7)
+    one, evidence = np.ones(7), -10.0 * (np.abs(y) - 2.0) ** 2
+    places = Places("drag", 0.0 * y, y, one, one, 1.0, np.zeros((1, 7)))
+    at = np.linspace(1.0, 3.0, 21)
+    near = Window(0.0 * at, at, 6.0 - 10.0 * (at - 2.1) ** 2, 0.0 * at)
+    monkeypatch.setattr("vegglue.diagnosis.competition.window_around", lambda *_: near)
+    fitted: Any = SimpleNamespace(point=SimpleNamespace(z=np.zeros(2)))
+    candidate = place_candidate(OBJECT, places.shapes(5), 1.0)
+    refit = Refit(candidate, places.shapes(5), fitted, 0.0, 1.0, (0.5, 1.5))
+    moved = replace(refit, shapes={**places.shapes(5), "y": 2.1}, log_factor=6.0)
+    monkeypatch.setattr("vegglue.diagnosis.competition.refits_of", lambda *_: (moved,))
+    search: Any = SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(effects={})))
+    kind: Any = SimpleNamespace(scores=np.zeros(7), size=np.zeros(7), log_evidence=evidence, log_prior=np.zeros(7))
+    found = found_place(search, places, kind, 5, refit)
+    assert found.refit is moved
+    assert found.spread[1] == pytest.approx(4.1 / 2**0.5, abs=0.3)
+    assert found.errors[1] > 2.5
+
+
 def test_nothing_more_is_looked_for_where_something_acts_already() -> None:
     """Of another length at the same x and y it had the same name, and took the place of the first in the case; a
     parameter without an effect was left.

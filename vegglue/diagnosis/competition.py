@@ -260,8 +260,14 @@ def found_place(search: SearchModel, places: Places, kind: HypothesisKind, spot:
         np.concatenate([places.y[far], window.y]) - moved.shapes["y"],
     ])  # fmt: skip
     total = float(logsumexp(weight))
+    # Where it may lie: far spots gain what those of the window gained by being refitted and moved, as their mirror
+    # images would.
+    near = weight[np.count_nonzero(far) :]
+    gained = logsumexp(near) - logsumexp(kind.log_evidence[~far]) - kept
+    chances = np.concatenate([weight[: np.count_nonzero(far)] + gained, near])
     errors, spread = (
-        np.sqrt(away**2 @ chance).tolist() for chance in (tempered_probabilities(weight), np.exp(weight - total))
+        np.sqrt(away**2 @ chance).tolist()
+        for chance in (tempered_probabilities(chances), np.exp(chances - logsumexp(chances)))
     )
     return FoundPlace(moved, total, tuple(errors), tuple(spread))
 
