@@ -68,7 +68,8 @@ def test_a_sign_makes_another_quantity_of_a_letter(tmp_path: Path, heading: str)
 @pytest.mark.parametrize(
     ("heading", "unit"),
     [("Flow (m/s)", "m/s"), ("Q (Mgal/d)", "Mgal/d"), ("u (%)", "%"), ("level (m/s)", "m/s"), ("x, ft/s", "ft/s"),
-     ("u [m3]", "m3")],
+     ("u [m3]", "m3"), ("u [10^-2 m/s]", "10^-2 m/s"), ("u (×10⁻² m/s)", "×10⁻² m/s"), ("u (1e-3 m/s)", "1e-3 m/s"),
+     ("u [m/s x 100]", "m/s x 100"), ("x (100 m)", "100 m"), ("Q (MGD)", "MGD")],
 )  # fmt: skip
 def test_a_unit_of_something_else_is_refused(tmp_path: Path, heading: str, unit: str) -> None:
     with pytest.raises(InputError, match=re.escape(f"a.csv: column {heading!r} is headed {unit!r}")):
@@ -88,7 +89,10 @@ def test_words_in_round_brackets_are_no_units(tmp_path: Path, heading: str) -> N
         ("x_ft", "length", "ft"), ("x (ift)", "length", "ft"),
         ("Q (gpm)", "discharge", "gal/min"),
         ("WL (above datum, in cm)", "length", "cm"), ("direction (gon)", "angle", "gon"),
-        ("x (in the channel)", "length", None),
+        ("x (in the channel)", "length", None), ("Q (cusecs)", "discharge", "ft3/s"), ("V (mph)", "velocity", "mph"),
+        ("V, kt", "velocity", "kn"), ("Velocity (feet per second)", "velocity", "ft/s"),
+        ("V (centimetres per second)", "velocity", "cm/s"), ("Flow (cubic feet per second)", "discharge", "ft3/s"),
+        ("Stems (per square metre)", "density", "1/m2"), ("Q (litres/second)", "discharge", "l/s"),
     ],
 )  # fmt: skip
 def test_a_unit_is_known_among_other_words(heading: str, quantity: str, unit: str | None) -> None:

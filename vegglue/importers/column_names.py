@@ -5,6 +5,7 @@ import re
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 from vegglue.errors import InputError
@@ -18,7 +19,7 @@ UNITS: dict[str, dict[str, float]] = {
     },
     "velocity": {
         "m/s": 1.0, "dm/s": 0.1, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1.0 / 3.6, "ft/s": _FOOT, "in/s": _FOOT / 12.0,
-        "kn": 1852.0 / 3600.0, "m/min": 1.0 / 60.0,
+        "kn": 1852.0 / 3600.0, "mph": 5280.0 * _FOOT / 3600.0, "m/min": 1.0 / 60.0,
     },
     "discharge": {
         "m3/s": 1.0, "l/s": 0.001, "ml/s": 1e-6, "m3/h": 1.0 / 3600.0, "m3/min": 1.0 / 60.0, "m3/d": 1.0 / 86400.0,
@@ -30,9 +31,8 @@ UNITS: dict[str, dict[str, float]] = {
 }  # fmt: skip
 # Other spellings, after `_plain` has done its work.
 SPELLINGS = {
-    "metre": "m", "metres": "m", "meter": "m", "meters": "m", "feet": "ft", "foot": "ft", "ift": "ft", "sft": "us-ft",
-    "inch": "in",
-    "fps": "ft/s", "kmh": "km/h", "kph": "km/h", "knots": "kn", "cfs": "ft3/s", "cumecs": "m3/s", "cms": "m3/s",
+    "ift": "ft", "sft": "us-ft", "fps": "ft/s", "kmh": "km/h", "kph": "km/h", "knots": "kn", "knot": "kn", "kt": "kn",
+    "kts": "kn", "cfs": "ft3/s", "cusec": "ft3/s", "cusecs": "ft3/s", "cumec": "m3/s", "cumecs": "m3/s", "cms": "m3/s",
     "deg": "degrees", "degree": "degrees", "°": "degrees", "graden": "degrees",
     "graad": "degrees", "grad": "degrees", "degré": "degrees", "degrés": "degrees", "degres": "degrees",
     "grados": "degrees", "gradi": "degrees", "graus": "degrees", "radians": "rad", "sec": "s", "seconds": "s",
@@ -40,6 +40,18 @@ SPELLINGS = {
     "lps": "l/s", "gpm": "gal/min", "m3/day": "m3/d", "yards": "yd", "stems/m2": "1/m2", "m-2": "1/m2", "cbm/s": "m3/s",
     "qm3/s": "m3/s",
 }  # fmt: skip
+# Units in words of lower case, in this order: `cubic feet per second`.
+IN_WORDS = (
+    (r"\bcenti(?=met)", "c"), (r"\bmilli(?=met)", "m"), (r"\bdeci(?=met)", "d"), (r"\bkilo(?=met)", "k"),
+    (r"met(re|er)s?\b", "m"), (r"\b(feet|foot)\b", "ft"), (r"\binch(es)?\b", "in"), (r"\blit(re|er)s?\b", "l"),
+    (r"\bgallons?\b", "gal"), (r"\bcubic\s+(\w+)", r"\g<1>3"), (r"\bsquare\s+(\w+)", r"\g<1>2"), (r"^per\s+", "1/"),
+    (r"\s+per\s+", "/"), (r"(?<=/)seconds?\b", "s"), (r"(?<=/)minutes?\b", "min"), (r"(?<=/)hours?\b", "h"),
+)  # fmt: skip
+# A power of ten in front of a unit or behind it, `10^-2 m/s`, `m/s x 100`: values may be times it or over it.
+POWER_OF_TEN = r"(10\s*(\^|\*\*)?\s*[-−]?\d+|10[⁻⁺]?[⁰¹²³⁴⁵⁶⁷⁸⁹]+|1?e[-+]?\d+|0?\.0*1|10+)"
+SCALED_UNIT = re.compile(
+    rf"[x×*]?\s*{POWER_OF_TEN}\s*[x×*·]?\s*(?P<front>\D.*)|(?P<back>.*\D)\s*[x×*·]\s*{POWER_OF_TEN}"
+)
 # The foot of the U.S. survey, `US ft`, `ftUS`, `survey feet`: 4 mm in 2 km of a State Plane, and 1.2 m in 600 km.
 OF_SURVEY = re.compile(r"(?=.*(us|u\.s\.|survey))(us|u\.s\.)?[\s/-]*(survey)?[\s/-]*(ft|foot|feet)[\s/-]*(\(?us\)?)?")
 # What stands behind the unit of a level and says of which datum it is: `m a.s.l.`, `m+NAP`, `m ü. NN`.
@@ -90,11 +102,14 @@ def is_like_unit(word: str) -> bool:
     """Whether a word is a unit of any quantity, or looks like one that is not known here, `acre-ft/d`."""
     plain = _plain_unit(word)
     known = is_unit(word) and plain not in ("", "-", "1")
-    return known or re.fullmatch(r"[a-z0-9-]+/(s|sec|min|h|hr|d|day)", plain) is not None
+    return known or re.fullmatch(r"[a-z0-9-]+/(s|sec|min|h|hr|d|day)|m[gl]d", plain) is not None
 
 
+@lru_cache(1024)  # the words of each title and heading, once for each quantity
 def _plain_unit(word: str) -> str:
     text = word.strip().strip("[]()").strip().lower()
+    for words, sign in IN_WORDS:
+        text = re.sub(words, sign, text)
     text = text.replace("³", "3").replace("²", "2").replace("⁻¹", "-1").replace("^", "").replace("**", "")
     text = re.sub(r"[\s.·*]*(s|sec|h)-1$", r"/\1", text)
     return re.sub(r"\s*/\s*", "/", text).replace("_", "/")
@@ -326,9 +341,12 @@ def known_name(heading: str) -> tuple[str, str | None] | None:
 
 def unit_stated(heading: str, quantity: str) -> str | None:
     """The unit of a quantity that a heading states, whatever its name is: `cm/s` for `Geschw. (cm/s)`, `V, cm/s` and
-    `V_cm_s`, also among other words, `(m above datum)` and `(US survey feet)`; None where it states none.
+    `V_cm_s`, also among other words, `(m above datum)` and `(US survey feet)`; None where it states none. A unit with a
+    power of ten is as it stands: no unit that is known.
     """
     bare, unit = _name_and_brackets(heading)
+    if (scaled := SCALED_UNIT.fullmatch(unit.strip())) and unit_named(scaled["front"] or scaled["back"], quantity):
+        return unit.strip()
     among = [word for word in (*re.split(r"[,;]", unit), *re.findall(r"[^\s,;]+", unit)) if word != "in"]
     words = [unit, *among, *(word for _, word in _suffixed(bare))]
     return next((said for word in words if (said := unit_named(word, quantity))), None)
