@@ -1,5 +1,6 @@
 """What all tests share, and the order in which their files are begun."""
 
+import gc
 import os
 import signal
 from collections.abc import Iterator
@@ -48,6 +49,13 @@ assert all(path.is_file() for path in LONGEST)
 def pytest_configure(config: pytest.Config) -> None:
     """Files are handed out in the order below, not by their number of tests."""
     config.option.loadscopereorder = False
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Half a million objects of modules and tests live to the end: garbage is not looked for among them."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
