@@ -58,6 +58,14 @@ def test_a_heading_with_two_units_has_no_role(heading: str) -> None:
     assert role_of(heading) is None
 
 
+@pytest.mark.parametrize(
+    "heading", ["u uncertainty (95 %)", "u error (k=2)", "u error (2 sigma)", "level error [m, 2σ]", "u_se (95% CI)"]
+)
+def test_half_an_interval_is_no_standard_error(heading: str) -> None:
+    """It was read as a standard error, twice too large."""
+    assert role_of(heading) is None
+
+
 @pytest.mark.parametrize("heading", ["u*", "u*_ms", "σ_u", "σu (m/s)", "u'", "u′ [cm/s]", "Δx", "y+", "∂u", "±u", "∆x"])
 def test_a_sign_makes_another_quantity_of_a_letter(tmp_path: Path, heading: str) -> None:
     taken = rows_of(tmp_path, f"{heading},x,y,u\n0.05,8,0,0.4\n0.06,20,0,0.5\n")

@@ -310,6 +310,11 @@ ROLES = {
         Role("device", "", ("device", "instrument", "probe", "sensor")),
     )
 }  # fmt: skip
+# An error that is no standard error but two or three, half an interval.
+ERROR_WORDS = {"se", "error", "uncertainty"}
+OF_AN_INTERVAL = re.compile(
+    r"9\d(\.\d+)?\s*%|\bk\s*=\s*[23]|\b[23]\s*(σ|sigma|sd|se)\b|\bci\b|interval|expanded", re.IGNORECASE
+)
 OF_SHARES = re.compile(r"%|\b(percent|pct)\b", re.IGNORECASE)
 DEGREES = {"lat", "latitude", "lon", "long", "lng", "longitude", "breite", "breitengrad", "laenge", "langengrad"}
 _ROLE_OF = {name: role.name for role in ROLES.values() for name in role.names}
@@ -323,10 +328,10 @@ def role_of(heading: str) -> tuple[str, str | None] | None:
 
 def known_name(heading: str) -> tuple[str, str | None] | None:
     """Under which name of its role a column is known, and the unit its heading states: `('u mean', 'm/s')`; a share,
-    such as `%Q`, and a heading with two units under none.
+    such as `%Q`, half an interval, and a heading with two units under none.
     """
     bare, unit = _name_and_brackets(heading)
-    if OF_SHARES.search(bare):
+    if OF_SHARES.search(bare) or (ERROR_WORDS & set(words_of(bare).split()) and OF_AN_INTERVAL.search(heading)):
         return None
     if (found := _ROLE_OF.get(words_of(bare))) is not None:
         quantity = ROLES[found].quantity
