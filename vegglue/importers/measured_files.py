@@ -100,7 +100,28 @@ def measured_files(
     """
     options = _stated_options(folder, site)
     known = KnownExperiments(tuple(site.experiments), site_file(folder).name, EXPERIMENTS, tuple(site.holdout))
-    found = _read_group(_files_to_read(folder, options, used), options, target, place, known, bed)
+    free = [
+        path
+        for path in folder.iterdir()
+        if path.is_file() and path.name not in used and (path in options or not path.name.startswith(OF_PROGRAMS))
+    ]
+    texts = [path.stem for path in free if path.suffix.lower() in TEXT_ENDINGS]
+
+    def is_read(path: Path) -> bool:
+        """No raw record whose export lies beside it."""
+        if path.stem.lower() == HELD_OUT or path in options:
+            return path.stem.lower() != HELD_OUT
+        if path.suffix.lower() not in TABLE_ENDINGS or path.name.lower() in OTHERS:
+            return False
+        exported = re.compile(rf"{re.escape(path.stem)}([^0-9A-Za-z]|$)")  # `mill_000_ASC` of `mill_000`
+        return path.suffix.lower() not in BINARY_ENDINGS or not any(map(exported.match, texts))
+
+    # Files of every kind in their order, then others by name, then those within folders that have options of their own.
+    order = {kind.file: number for number, kind in enumerate(KINDS.values())}
+    paths = sorted(filter(is_read, free), key=lambda path: (order.get(path.name, len(order)), path.name))
+    named = {folder / name for name in used}
+    paths += sorted(path for path in options if path.parent != folder and path not in named)
+    found = _read_group(paths, options, target, place, known, bed)
     if not found.observations:
         raise _nothing_measured(found, shown_path(folder))
     return found
@@ -179,32 +200,6 @@ def _stated_options(folder: Path, site: FieldSite) -> dict[Path, FileOptions]:
             )
         found[folder / name] = read_file_options(given or {}, f"{shown_path(folder)}: `files.{name}`")
     return found
-
-
-def _files_to_read(folder: Path, options: Mapping[Path, FileOptions], used: Sequence[str]) -> list[Path]:
-    """Files of every kind in their order, then others by name; no raw record whose export lies beside it.
-
-    Of folders within the folder only those files that have options of their own.
-    """
-    order = {kind.file: place for place, kind in enumerate(KINDS.values())}
-    free = [
-        path
-        for path in folder.iterdir()
-        if path.is_file() and path.name not in used and (path in options or not path.name.startswith(OF_PROGRAMS))
-    ]
-    texts = [path.stem for path in free if path.suffix.lower() in TEXT_ENDINGS]
-
-    def is_read(path: Path) -> bool:
-        if path.stem.lower() == HELD_OUT or path in options:
-            return path.stem.lower() != HELD_OUT
-        if path.suffix.lower() not in TABLE_ENDINGS or path.name.lower() in OTHERS:
-            return False
-        exported = re.compile(rf"{re.escape(path.stem)}([^0-9A-Za-z]|$)")  # `mill_000_ASC` of `mill_000`
-        return path.suffix.lower() not in BINARY_ENDINGS or not any(map(exported.match, texts))
-
-    within = [path for path in options if path.parent != folder and path not in {folder / name for name in used}]
-    paths = filter(is_read, free)
-    return sorted(paths, key=lambda path: (order.get(path.name, len(order)), path.name)) + sorted(within)
 
 
 def _read_group(
