@@ -28,7 +28,8 @@ def told_at_most(made: Sequence[Record], angles: Sequence[Mapping[str, Any]]) ->
         shares = [np.mean([_mean(some, way, what) for some in found if some]) for what in ("in set", "alone")]
         told.append(f"{100 * shares[0]:.0f} % and {100 * shares[1]:.0f} % {words}")
     return fill(
-        "At most, to first order, the right quantity is in the credible set, and alone in it, in "
+        "What the data allow at most, to first order, as shares of the laws whose right quantity is in the credible "
+        "set, and of those for which it is alone in it: "
         f"{'; '.join(told)} (`tests/studies/law_angles.py`).", 120, break_on_hyphens=False
     )  # fmt: skip
 
