@@ -318,10 +318,11 @@ def test_rows_flagged_as_bad_are_left_out(tmp_path: Path, heading: str, good: st
     assert "row 8" in taken
 
 
-def test_flags_of_0_and_1_without_a_sense_are_refused(tmp_path: Path) -> None:
-    rows = [f"{x};{y};0.4;{number % 2}" for number, (x, y) in enumerate(ACROSS)]
-    with pytest.raises(InputError, match="'QC'"):
-        imported(tmp_path, v__txt="\n".join(["x;y;u;QC", *rows]))
+@pytest.mark.parametrize(("heading", "codes"), [("QC", 2), ("flags", 2), ("flags", 3)])  # flags: of OpenPIV, 0 to 2
+def test_flags_of_0_and_1_without_a_sense_are_refused(tmp_path: Path, heading: str, codes: int) -> None:
+    rows = [f"{x};{y};0.4;{number % codes}" for number, (x, y) in enumerate(ACROSS)]
+    with pytest.raises(InputError, match=f"'{heading}'"):
+        imported(tmp_path, v__txt="\n".join([f"x;y;u;{heading}", *rows]))
 
 
 @pytest.mark.parametrize("quality", ["good", "fair", "poor", "{number}"])

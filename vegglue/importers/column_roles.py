@@ -60,8 +60,8 @@ NAMES_OF_EAST = {"e", "east", "easting", "rechtswert", "utm x", "utm e"}
 # Headings of a flag, and what in it marks a row as no measurement; by numbers, those of IOC and QARTOD: 3 suspect, 4
 # failed, 9 missing. Of 0 and 1 the heading decides which is good.
 OF_FLAGS = re.compile(
-    r"(data )?(quality|qc|qa|qaqc|flag|valid|ok|use|used|status|good|bad|reject|rejected|outlier)"
-    r"( (flag|code|check|control|qc))*"
+    r"(data )?(quality|qc|qa|qaqc|flags?|valid|ok|use|used|status|good|bad|reject|rejected|outlier)"
+    r"( (flags?|code|check|control|qc))*"
 )
 BAD = re.compile(
     r"(bad|reject|fail|invalid|discard|outlier|exclude|suspect|questionable|doubtful|spike|unusable"
@@ -70,7 +70,7 @@ BAD = re.compile(
 )
 NO = {"no", "n", "false", "0", "nein", "non", "nee", "f"}
 BAD_CODES, GOOD_CODES = {3.0, 4.0, 9.0}, {1.0, 2.0}
-OF_CODES = {"flag", "qc", "qa", "qaqc"}  # words of a heading above such numbers; others may be ratings
+OF_CODES = {"flag", "flags", "qc", "qa", "qaqc"}  # words of a heading above such numbers; others may be ratings
 MEANS_GOOD = {"valid", "ok", "use", "used", "good"}
 MEANS_BAD = {"bad", "reject", "rejected", "outlier"}
 SCALED_MARKS = (32.768, 327.68, 3276.8)  # -32768 mm/s of a boat in m/s, dm/s and cm/s
@@ -196,7 +196,7 @@ def without_flagged(path: Path, table: ParsedTable, columns: Mapping[str, int]) 
             flagged = {i for i, text in enumerate(texts) if text and (float(text) != 0.0) != good}
         elif len(codes) == len(known) and codes <= BAD_CODES | GOOD_CODES and OF_CODES & set(words.split()):
             flagged = {i for i, text in enumerate(texts) if text and float(text) in BAD_CODES}
-        elif len(codes) == len(known) and codes == {0.0, 1.0} and OF_CODES & set(words.split()):
+        elif len(codes) == len(known) and {0.0, 1.0} <= codes <= {0.0, 1.0, 2.0} and OF_CODES & set(words.split()):
             raise InputError(
                 f"{shown_path(path)}: expected flags that say which rows are good, got 0 and 1 in column {heading!r}; "
                 "head it `valid` or `bad`, or take out the bad rows and the column."
