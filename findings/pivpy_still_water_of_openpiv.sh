@@ -5,7 +5,7 @@
 #             vectors that OpenPIV flagged as invalid are invalid.
 # Seen:       OpenPIV writes 1 for a masked place, PIVPy takes 1 for a good one. A field of 0.4 m/s without a mask has
 #             0.0 m/s everywhere; with one masked place that one alone keeps what OpenPIV wrote. The flags are
-#             turned as well: OpenPIV's 0 (valid) is PIVPy's 0 (invalid), which fill_nans and the plots use. No warning.
+#             turned as well: OpenPIV's 0 (valid) is PIVPy's 0 (invalid), which clean() and the plots use. No warning.
 # Matters:    a flume or river with a masked bank or stems: mean velocities of 0, or those of the places that the camera
 #             could not see.
 # Documented: otherwise. The docstring of save gives flags (0 is valid) and a mask that marks masked regions, also in

@@ -6,8 +6,8 @@
 # Seen:       discharges enter as logarithms in units of their own standard deviation, the errors as logarithms alone.
 #             At a river with 0.05 to 200 m3/s, where ln Q has a standard deviation of 2.5, 20 % become 0.46 of ln Q, a
 #             factor of 1.6; in a flume from 20 to 32 l/s they become 0.03. No message.
-# Matters:    at a river gaugings of any quality are about equal, and breaks of the curve are lost in errors; in a flume
-#             a poor gauging bends the curve.
+# Matters:    stated errors that are 2.5 times too large at a river, and seven times too small in a flume, where a poor
+#             gauging weighs nearly as much as a good one beside the scatter that is fitted.
 # Documented: otherwise. The docstring says units of discharge, a comment in the source that the error is put on a log
 #             scale. Its maintainer names percentages geometric errors of a fit in logarithms (bdrc issue 3).
 # Versions:   ratingcurve 1.1.0, pymc 5.28.1 and what it needs.
