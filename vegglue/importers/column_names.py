@@ -41,7 +41,7 @@ SPELLINGS = {
     "qm3/s": "m3/s",
 }  # fmt: skip
 # Units in words of lower case, in this order: `cubic feet per second`.
-IN_WORDS = (
+WORDS_OF_UNITS = (
     (r"\bcenti(?=met)", "c"), (r"\bmilli(?=met)", "m"), (r"\bdeci(?=met)", "d"), (r"\bkilo(?=met)", "k"),
     (r"met(re|er)s?\b", "m"), (r"\b(feet|foot)\b", "ft"), (r"\binch(es)?\b", "in"), (r"\blit(re|er)s?\b", "l"),
     (r"\bgallons?\b", "gal"), (r"\bcubic\s+(\w+)", r"\g<1>3"), (r"\bsquare\s+(\w+)", r"\g<1>2"), (r"^per\s+", "1/"),
@@ -108,7 +108,7 @@ def is_like_unit(word: str) -> bool:
 @lru_cache(1024)  # the words of each title and heading, once for each quantity
 def _plain_unit(word: str) -> str:
     text = word.strip().strip("[]()").strip().lower()
-    for words, sign in IN_WORDS:
+    for words, sign in WORDS_OF_UNITS:
         text = re.sub(words, sign, text)
     text = text.replace("³", "3").replace("²", "2").replace("⁻¹", "-1").replace("^", "").replace("**", "")
     text = re.sub(r"[\s.·*]*(s|sec|h)-1$", r"/\1", text)
