@@ -2,11 +2,13 @@
 
 On damaged files the HDF5 library and scipy's reader of MATLAB files may loop, ask for any memory or crash, and nothing
 stops them from within. A digest is no help: it can be forged with the file. Such a process takes a third of a second to
-start, so that one reads all files that a command opens.
+start, so that one reads all files that a command opens. Where processes can be forked each file has a copy of it, made
+once the libraries are there, for some milliseconds: what a damaged file harms ends with its copy.
 """
 
 import atexit
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -23,7 +25,9 @@ from vegglue.errors import StorageError
 # read at a hundred times this rate from a local one.
 LONGEST_START, FEWEST_BYTES = 20.0, 5e6  # [s], [bytes/s]
 MEMORY = 2 << 30  # [bytes] of addresses: libraries take half of one, and values are read by blocks
+CRASHED = "its reader crashed"
 LONGEST_ANSWER = 2000  # [bytes]: pipes hand over up to 4096 at once, so that an answer is whole or not there
+FORKS = hasattr(os, "fork")
 CHILD = "import sys; sys.path.append(sys.argv[1]); from vegglue.sandboxed_reader import serve; serve()"
 _Reader = subprocess.Popen[bytes]
 _ASKING = Lock()
@@ -62,7 +66,7 @@ def why_unreadable(path: Path, size: int, *state: int, by: str) -> str | None:
         except BaseException:  # Ctrl-C: the answer would be taken for that to the next question
             _dismiss(reader, os.getpid())
             raise
-        if why is not None:  # a damaged file may have harmed its reader
+        if why is not None and not FORKS:  # a damaged file may have harmed its reader
             _dismiss(reader, os.getpid())
     return why
 
@@ -73,7 +77,7 @@ def _reader(asking: int) -> _Reader:
     reader = subprocess.Popen(
         [sys.executable, "-P", "-c", CHILD, str(Path(__file__).parents[1])],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0,
-        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}, process_group=0 if FORKS else None,
     )  # fmt: skip
     atexit.register(_dismiss, reader, asking)
     return reader
@@ -84,9 +88,17 @@ def _dismiss(reader: _Reader, asking: int) -> None:
     if os.getpid() != asking:
         return
     _reader.cache_clear()
-    reader.kill()
+    _kill(reader)
     with reader:  # closes its pipes and waits for its end
         pass
+
+
+def _kill(reader: _Reader) -> None:
+    """End a reader and its copy at once."""
+    if not FORKS:
+        reader.kill()
+    elif reader.poll() is None:  # else its number may be another's
+        os.killpg(reader.pid, signal.SIGKILL)
 
 
 def _answer(reader: _Reader, path: Path, by: str, longest: float) -> str | None:
@@ -98,11 +110,11 @@ def _answer(reader: _Reader, path: Path, by: str, longest: float) -> str | None:
     try:
         answer = pool.submit(reader.stdout.readline).result(longest).decode(errors="replace")
     except TimeoutError:
-        reader.kill()  # ends the thread's reading, too
+        _kill(reader)  # ends the thread's reading, too
         return f"it is not read to its end within {longest:.0f} s"
     finally:
         pool.shutdown(wait=False)
-    return "its reader crashed" if not answer else answer.strip() or None
+    return CRASHED if not answer else answer.strip() or None
 
 
 def serve() -> None:
@@ -114,6 +126,13 @@ def serve() -> None:
     _limit("RLIMIT_CORE", 0)
     for line in sys.stdin:
         longest, by, path = line.split()
+        if FORKS:
+            import_module(by.partition(":")[0])
+            if copy := os.fork():
+                _, ended = os.waitpid(copy, 0)
+                if ended:
+                    os.write(sys.stdout.fileno(), CRASHED.encode() + b"\n")
+                continue
         # The other process may have been killed meanwhile: nothing else ends a reading that loops.
         _limit("RLIMIT_CPU", int(time.process_time() + 2.0 * float(longest)) + 2)
         module, _, function = by.partition(":")
@@ -124,6 +143,8 @@ def serve() -> None:
         except Exception as error:  # whatever the library raises
             why = str(error) or type(error).__name__
         os.write(sys.stdout.fileno(), " ".join(why.split()).encode(errors="replace")[:LONGEST_ANSWER] + b"\n")
+        if FORKS:
+            os._exit(0)
 
 
 def _limit(what: str, most: int) -> None:

@@ -173,6 +173,17 @@ def test_a_reader_that_was_ended_is_replaced(tmp_path: Path) -> None:
             assert reader is not kept
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there a reader that crashed is replaced")
+def test_a_file_that_crashes_its_reader_harms_a_copy_of_it(tmp_path: Path) -> None:
+    reader = sandboxed_reader._reader(os.getpid())
+    assert sandboxed_reader.why_unreadable(tmp_path, 1, by="sys:exit") == sandboxed_reader.CRASHED
+    path = tmp_path / "ensemble.h5"
+    write_chunks(path, ALL, a_header())
+    assert sandboxed_reader.why_unreadable(*state_of(path), by=READ_HDF5) is None
+    assert sandboxed_reader._reader(os.getpid()) is reader
+    assert reader.poll() is None
+
+
 def test_a_process_that_was_forked_has_a_reader_of_its_own(tmp_path: Path) -> None:
     path = tmp_path / "ensemble.h5"
     write_chunks(path, ALL, a_header())
