@@ -258,6 +258,19 @@ def test_a_part_with_other_contents_is_gone_on_with_or_set_aside(
     assert_whole(path, a_header())
 
 
+def test_a_part_whose_numbers_are_text_is_set_aside(valid: Valid, tmp_path: Path) -> None:
+    """It ended in a traceback."""
+    path = copy_of(RESULTS[0], valid, tmp_path)
+    change_content(path, ("members", "prediction"), OF_VALUES["text"], None)
+    path.rename(part_file(path))
+    with ensemble_writer(path, a_header()) as writer:
+        assert writer.moved_to is not None
+        for chunk in ALL:
+            append(writer, chunk)
+    writer.moved_to.unlink()
+    assert_whole(path, a_header())
+
+
 def test_room_for_more_than_the_file_holds_is_counted_over_all_names(tmp_path: Path) -> None:
     path = tmp_path / "ensemble.h5"
     with h5py.File(path, "w") as file:

@@ -342,7 +342,10 @@ def _kept_rows(part: Path, header: Header) -> KeptRows | None:
                 return None
             kept = {name: {key: file[name][key][...] for key in keys} for name, keys in GROWING.items()}
             for name, rows in kept.items():
-                if any(values.shape != groups[name].variables[key].values.shape for key, values in rows.items()):
+                own = {key: groups[name].variables[key].values for key in rows}
+                if any(values.shape != own[key].shape for key, values in rows.items()):
+                    return None
+                if not all(np.can_cast(values.dtype, own[key].dtype, "same_kind") for key, values in rows.items()):
                     return None
             for name, group in groups.items():  # whether it holds the values that do not change
                 laid_out = {**group.coordinates, **{key: one.values for key, one in group.variables.items()}}
