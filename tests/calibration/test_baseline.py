@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from built_models import model_of
 from coarse_twin import coarse_twin
@@ -15,8 +16,10 @@ from scipy.special import ndtr
 from vegglue.arrays import Array
 from vegglue.calibration import baseline
 from vegglue.calibration.baseline import MOST_KEPT, PRIOR_POINTS, START_SPREAD, Baseline, kept_baseline, places_of_prior
+from vegglue.calibration.fit import fit, objective
+from vegglue.calibration.noise import noise_of
 from vegglue.case.config import load_case
-from vegglue.engine.interface import Model, Point
+from vegglue.engine.interface import Model, Point, Wanted
 from vegglue.measurements.observations import read_observations
 
 
@@ -133,3 +136,28 @@ def test_places_of_the_prior_begin_in_its_middle_and_fill_each_axis(parameters: 
     assert shares[0].max() < 0.2
     assert shares[-1].min() > 0.8
     assert np.unique(places, axis=0).shape == places.shape
+
+
+def test_where_fits_end_in_different_minima_each_point_of_the_prior_is_a_start() -> None:
+    """Wells of y = sin(4 z), the deeper the nearer to z = -1.2: the two best starts end in others than the deepest."""
+
+    def at(z: Array) -> Point:
+        prediction = np.array([0.05 * np.sin(4.0 * z[0]), 0.015 * (z[0] + 1.2), 0.5 * z[1]])
+        return Point(z, prediction, np.array([[0.2 * np.cos(4.0 * z[0]), 0.0], [0.015, 0.0], [0.0, 0.5]]), {})
+
+    def linearise(model: Any, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
+        return at(z) if wanted(at(z).prediction) else None
+
+    station = pd.DataFrame({"experiment": "a", "kind": "level", "section": "", "x": 0.0, "y": 0.0,
+                            "value": [0.0] * 3, "standard_error": 0.005, "used": True})  # fmt: skip
+    model: Any = SimpleNamespace(
+        engine=SimpleNamespace(linearise=linearise),
+        names=("first", "second"),
+        site=SimpleNamespace(bed=np.zeros((4, 5))),
+    )
+    noise = noise_of(station)
+    starts = sorted([at(z) for z in places_of_prior(2)], key=lambda point: objective(noise, point))
+    of_best = [fit(model, noise, start).objective for start in starts[: baseline.FITTED_POINTS]]
+    found = baseline._best_from_prior(model, noise)
+    assert objective(noise, found) < min(of_best) - baseline.ONE_MINIMUM
+    assert found.z[0] == pytest.approx(-np.pi / 4.0, abs=0.05)
