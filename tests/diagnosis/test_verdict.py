@@ -478,6 +478,10 @@ def test_one_section_in_one_experiment_gives_no_name() -> None:
         told = verdict_on(**found, one_section=OneSection("T"))
         assert (told.kind, tags(told.reasons)) == ("cannot-tell", ["one_section"])
     assert verdict_on(misfit=FITS, one_section=OneSection("T")) == verdict_on(misfit=FITS), "silence has its own rules"
+    doubted = verdict_on(
+        **of_wind | {"misfit": MISSES}, errors=replace(AS_STATED, scale=7.2), one_section=OneSection("T")
+    )
+    assert tags(doubted.reasons) == ["one_section", "errors_larger_than_stated"], "no other doubt stands before it"
 
 
 def test_no_law_is_named_beside_errors_without_sense() -> None:

@@ -166,7 +166,7 @@ def _concluded(inputs: VerdictInputs, plain: Verdict) -> Verdict:
         return replace(plain, reasons=tuple(discharge_mismatches(off)))
     doubt, laws, accepted = _doubt(inputs), inputs.laws, bool(inputs.steps or inputs.places)
     if inputs.one_section is not None and (accepted or laws is not None or inputs.field is not None):
-        return replace(plain, laws=laws, reasons=(doubt or inputs.one_section,))
+        return replace(plain, laws=laws, reasons=(inputs.one_section, doubt) if doubt else (inputs.one_section,))
     if laws is not None:
         nothing_else = not (accepted or inputs.undecided or inputs.field)
         if nothing_else or (not doubt and laws.likelier and not accepted):
