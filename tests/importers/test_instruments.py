@@ -189,6 +189,16 @@ def test_places_by_gps_count_over_a_bottom_that_moves_or_is_lost(
     assert ImportNote(Noted.ENSEMBLES, 151) in found.notes
 
 
+def test_the_way_of_a_boat_that_lost_the_bottom_is_told_if_there_is_no_gps(tmp_path: Path) -> None:
+    """It was bridged by the velocity of one ensemble without a word."""
+    pytest.importorskip("mhkit")
+    (track, *rest) = BOAT
+    told = read_pd0(written(tmp_path / "lost.PD0", pd0(*track, *rest, lost=tuple(range(40, 90)))), START).notes
+    assert ImportNote(Noted.BOTTOM_BRIDGED, pytest.approx(ALONG[90] - ALONG[39], rel=0.05)) in told
+    soon = read_pd0(written(tmp_path / "soon.PD0", pd0(*track, *rest, lost=(40,))), START).notes
+    assert Noted.BOTTOM_BRIDGED not in {one.kind for one in soon if isinstance(one, ImportNote)}
+
+
 def test_a_compass_is_turned_to_true_north(tmp_path: Path) -> None:
     pytest.importorskip("mhkit")
     path = raw_boat(tmp_path)

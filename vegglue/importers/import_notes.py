@@ -57,6 +57,7 @@ class Noted(StrEnum):
     ADCP_AT = auto()  # its draft [m]; its model
     DECLINATION = auto()  # [degrees]
     BY_GPS = auto()  # how fast the bottom drifts against places by GPS, 0 if it stands still [m/s]
+    BOTTOM_BRIDGED = auto()  # the longest way of the boat while the bottom was lost [m]
     DAMAGED = auto()  # how many ensembles
     SURFACE_LAYER = auto()
     ENSEMBLES = auto()  # how many

@@ -38,6 +38,8 @@ SURFACE_BLOCKS = {bytes([0x10, number]) for number in range(6)}
 # The bottom moves if it drifts by more than this share of the speed of the water, Mueller et al. (2013), Techniques and
 # Methods 3-A22 (not compared with the source), and by more standard errors of its mean than this, chosen.
 MOVING_BED, ERRORS_OF_DRIFT = 0.01, 3.0
+# Way of the boat while the bottom was lost that is told [m]. Chosen: bottom track alone places a boat no better.
+LONGEST_WAY = 1.0
 EARTH, FLATTENING = 6_378_137.0, 1.0 / 298.257223563  # equatorial radius [m], and flattening of WGS 84
 # What marks no value in the output of WinRiver, whatever the unit.
 NO_VALUE = -32768.0
@@ -120,6 +122,8 @@ def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
         drift = _drift_of_bottom(boat, moved, against)
         boat = np.where(np.isfinite(boat) & (drift == 0.0), boat, moved)
         reference = (ImportNote(Noted.BY_GPS, drift),)
+    elif (way := _way_while_lost(boat[known], time[known], time)) > LONGEST_WAY:
+        reference = (ImportNote(Noted.BOTTOM_BRIDGED, way),)
     profiles = []
     for one, deep, at, own_velocity, water in zip(found, draft.tolist(), place.tolist(), boat, against, strict=True):
         if not np.isfinite([*at, *own_velocity]).all():
@@ -198,6 +202,14 @@ def _fixes(data: Any) -> Array:
     return np.column_stack(
         [np.interp(seconds, at[sound][order], part[sound][order], np.nan, np.nan) for part in places.T]
     )
+
+
+def _way_while_lost(boat: Array, known: Array, time: Array) -> float:
+    """The longest way [m] of a boat (n, 2) [m/s] between ensembles with bottom track, at times known (n,) [s], that has
+    some of `time` between them: at its velocity after that.
+    """
+    lost = np.diff(np.searchsorted(time, known)) > 1
+    return float((np.hypot(*boat[1:].T) * np.diff(known))[lost].max(initial=0.0))
 
 
 def _metres_from_first(fixes: Array) -> Array:
