@@ -6,8 +6,8 @@
 The most promising hypotheses of each kind are calibrated with the model; their evidence E is Laplace's (`refits`). The
 others of that kind keep their evidence to first order, corrected as that of the best of them was. Instruments do not
 change the flow, so that first order is exact for them but for the parameters; of surveyed lines, which do, the most
-probable is calibrated without its level. Prior weights are in `score_test`. Probabilities are tempered by e, the
-relative error of a fingerprint: the cells and laws of a model are not those of nature, and the more a hypothesis
+probable is calibrated without its level. Prior weights are in `residual_screening`. Probabilities are tempered by e,
+the relative error of a fingerprint: the cells and laws of a model are not those of nature, and the more a hypothesis
 explains the more this counts, as if errors were w^(1/2) times as large.
 
 The position of a local anomaly is searched between the spots of the screening, in the flow with that anomaly:
