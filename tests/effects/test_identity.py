@@ -33,6 +33,8 @@ def test_text_and_value_go_back_and_forth(text: str, identity: EffectIdentity) -
 def test_names_of_the_library_have_no_target() -> None:
     assert all(EffectIdentity.parse(name) == EffectIdentity(name) for name in library())
     assert EffectIdentity.parse("discharge_error[high]").key == "discharge_error_high"
+    before, beyond = (EffectIdentity("station_shift", (section,)) for section in ("x-0.10", "x+0.10"))
+    assert before.key != beyond.key, "as `import` names sections on both sides of a mouth"
 
 
 @pytest.mark.parametrize(

@@ -45,8 +45,11 @@ class EffectIdentity:
 
     @property
     def key(self) -> str:
-        """The text as a word, for the key of a config and the name of a parameter: ``discharge_error_high``."""
-        return re.sub(r"\W", "_", self.text.removesuffix("]"))
+        """The text as a word, for the key of a config and the name of a parameter: ``discharge_error_high``.
+
+        `import` names sections by their place, ``x-0.10`` and ``x+0.10``, which have to stay apart.
+        """
+        return re.sub(r"\W", "_", self.text.removesuffix("]").replace("+", "_plus_"))
 
     @property
     def text(self) -> str:
