@@ -227,11 +227,8 @@ def test_a_reader_ends_with_whoever_asked(tmp_path: Path) -> None:
     raise AssertionError(f"process {reader} goes on")
 
 
-def test_a_part_that_is_read_in_circles_is_set_aside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sandboxed_reader, "LONGEST_START", 2.0)
-    path = tmp_path / "ensemble.h5"
-    write_chunks(path, ALL, a_header())
-    path.write_bytes(endless(path))
+def assert_set_aside(path: Path) -> None:
+    """A file as a growing part is moved away, and the ensemble is written anew."""
     path.rename(part_file(path))
     with ensemble_writer(path, a_header()) as writer:
         assert writer.moved_to is not None
@@ -239,6 +236,14 @@ def test_a_part_that_is_read_in_circles_is_set_aside(tmp_path: Path, monkeypatch
             append(writer, chunk)
     writer.moved_to.unlink()
     assert_whole(path, a_header())
+
+
+def test_a_part_that_is_read_in_circles_is_set_aside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sandboxed_reader, "LONGEST_START", 2.0)
+    path = tmp_path / "ensemble.h5"
+    write_chunks(path, ALL, a_header())
+    path.write_bytes(endless(path))
+    assert_set_aside(path)
 
 
 @settings(max_examples=CHILDREN, **SHARED)
@@ -262,13 +267,7 @@ def test_a_part_whose_numbers_are_text_is_set_aside(valid: Valid, tmp_path: Path
     """It ended in a traceback."""
     path = copy_of(RESULTS[0], valid, tmp_path)
     change_content(path, ("members", "prediction"), OF_VALUES["text"], None)
-    path.rename(part_file(path))
-    with ensemble_writer(path, a_header()) as writer:
-        assert writer.moved_to is not None
-        for chunk in ALL:
-            append(writer, chunk)
-    writer.moved_to.unlink()
-    assert_whole(path, a_header())
+    assert_set_aside(path)
 
 
 def test_room_for_more_than_the_file_holds_is_counted_over_all_names(tmp_path: Path) -> None:
