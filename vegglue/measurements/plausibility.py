@@ -366,10 +366,10 @@ def _judged(case: Case, site: Site, used: pd.DataFrame) -> tuple[list[Implausibl
         for group in groups:
             keep_wrong(group, _judge_values(flow, group), flow.depth)
         # Errors are held against sound values only: velocities of a section that do not go with the discharge are none.
-        wrong = rows.index.isin(found)
-        of_section = [row for row in rows.index[wrong] if found[row][0] in (Symptom.FAST, Symptom.SLOW)]
+        off_already = rows.index.isin(found)
+        of_section = [row for row in rows.index[off_already] if found[row][0] in (Symptom.FAST, Symptom.SLOW)]
         off = rows["section"].isin(rows.loc[of_section, "section"]).to_numpy(bool)
-        unsound = rows.index[wrong | velocity_rows(rows) & off]
+        unsound = rows.index[off_already | velocity_rows(rows) & off]
         for group in groups:
             sound = group[~group.index.isin(unsound)]
             keep_wrong(sound, _judge_errors(flow, sound), flow.depth)
