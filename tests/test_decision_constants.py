@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from vegglue.decision_constants import CHOSEN, constants, described, using
-from vegglue.diagnosis.competition import tempered_probabilities
+from vegglue.diagnosis.odds import tempered_probabilities
 
 
 def test_each_constant_has_a_unit_a_provenance_and_a_basis() -> None:

@@ -9,8 +9,10 @@ from coarse_twin import CASE
 
 from vegglue.calibration import score_test
 from vegglue.case.case_effects import effect_named
-from vegglue.diagnosis import competition
-from vegglue.diagnosis.competition import found_extent, tempered_odds, tempered_probabilities, worth_refitting
+from vegglue.diagnosis import place_search
+from vegglue.diagnosis.competition import worth_refitting
+from vegglue.diagnosis.odds import tempered_odds, tempered_probabilities
+from vegglue.diagnosis.place_search import found_extent
 from vegglue.diagnosis.search_state import followed_further, with_chances
 from vegglue.results.causes import Step
 
@@ -87,7 +89,7 @@ def test_an_extent_has_a_prior_where_only_spots_of_one_length_fit(
 ) -> None:
     """A reach shorter than 3.6 widths has no room for long spots of viscosity."""
     tried: list[Any] = []
-    monkeypatch.setattr(competition, "refits_of", lambda _, trials: tried.extend(trials) or [None for _ in trials])
+    monkeypatch.setattr(place_search, "refits_of", lambda _, trials: tried.extend(trials) or [None for _ in trials])
     place = {"x": 12.0, "y": 0.5, "length": 2.0, "width": 0.5}
     places: Any = SimpleNamespace(
         x=np.array([10.0, 14.0]), y=np.array([0.0, 1.0]), length=np.array(lengths), width=np.array([0.5, 0.5]),

@@ -7,7 +7,8 @@ from scipy.special import logsumexp
 from vegglue.arrays import Array
 from vegglue.calibration.score_test import HypothesisKind, alarm_level, cosines, kind_of_hypotheses, project
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import What, chosen_hypothesis, tempered_probabilities
+from vegglue.diagnosis.competition import What, chosen_hypothesis
+from vegglue.diagnosis.odds import tempered_probabilities
 from vegglue.diagnosis.plan_search import NAMED_AT, chances_named, first_competition
 from vegglue.diagnosis.search_state import rivals_among
 

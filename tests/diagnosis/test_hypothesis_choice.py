@@ -10,11 +10,9 @@ from vegglue.diagnosis.competition import (
     What,
     chance_of_a_place,
     chosen_hypothesis,
-    log_odds_taken,
     nearly_as_likely,
-    odds_against_nothing,
-    under_larger_errors,
 )
+from vegglue.diagnosis.odds import log_odds_taken, odds_against_nothing, under_larger_errors
 
 
 def followed(**evidence: float) -> list[str]:

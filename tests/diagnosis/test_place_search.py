@@ -17,17 +17,8 @@ from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.case.channel_geometry import site_scales
 from vegglue.case.parameter_space import z_of
 from vegglue.decision_constants import constants, using
-from vegglue.diagnosis.competition import (
-    Hypothesis,
-    Window,
-    cannot_be,
-    chances_of,
-    found_place,
-    hypotheses_of,
-    possible_change,
-    promising_spots,
-    window_around,
-)
+from vegglue.diagnosis.competition import Hypothesis, chances_of, hypotheses_of, promising_spots
+from vegglue.diagnosis.place_search import Window, cannot_be, found_place, possible_change, window_around
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of, start_with
 from vegglue.diagnosis.search_state import rivals_in, undecided_of
 from vegglue.effects.definition import Effect
@@ -101,7 +92,7 @@ def test_a_window_counts_by_the_places_that_it_has_seen_again(
     zero, one, spot = np.zeros(x.size), np.ones(x.size), int(x.size // 2)
     places = Places("barrier" if across == 1 else "drag", x, y, one, one, 1.0, zero[None])
     near = Window(0.5 * (x + x[spot]), 0.5 * (y + y[spot]), zero, zero)
-    monkeypatch.setattr("vegglue.diagnosis.competition.window_around", lambda *_: near)
+    monkeypatch.setattr("vegglue.diagnosis.place_search.window_around", lambda *_: near)
     prior = 1.0 / x.size
     logs = zero + np.log(prior)
     kind: Any = SimpleNamespace(scores=zero, size=zero, log_evidence=logs, log_prior=logs)
@@ -120,12 +111,12 @@ def test_what_its_mirror_image_explains_as_well_may_lie_there(monkeypatch: pytes
     places = Places("drag", 0.0 * y, y, one, one, 1.0, np.zeros((1, 7)))
     at = np.linspace(1.0, 3.0, 21)
     near = Window(0.0 * at, at, 6.0 - 10.0 * (at - 2.1) ** 2, 0.0 * at)
-    monkeypatch.setattr("vegglue.diagnosis.competition.window_around", lambda *_: near)
+    monkeypatch.setattr("vegglue.diagnosis.place_search.window_around", lambda *_: near)
     fitted: Any = SimpleNamespace(point=SimpleNamespace(z=np.zeros(2)))
     candidate = place_candidate(OBJECT, places.shapes(5), 1.0)
     refit = Refit(candidate, places.shapes(5), fitted, 0.0, 1.0, (0.5, 1.5))
     moved = replace(refit, shapes={**places.shapes(5), "y": 2.1}, log_factor=6.0)
-    monkeypatch.setattr("vegglue.diagnosis.competition.refits_of", lambda *_: (moved,))
+    monkeypatch.setattr("vegglue.diagnosis.place_search.refits_of", lambda *_: (moved,))
     search: Any = SimpleNamespace(model=SimpleNamespace(case=SimpleNamespace(effects={})))
     kind: Any = SimpleNamespace(scores=np.zeros(7), size=np.zeros(7), log_evidence=evidence, log_prior=np.zeros(7))
     found = found_place(search, places, kind, 5, refit)

@@ -15,7 +15,8 @@ from vegglue.calibration.candidates import Candidate, start_with, with_effect
 from vegglue.calibration.fit import covariance, fit
 from vegglue.calibration.noise import noise_of
 from vegglue.case.parameter_space import theta_at, z_of
-from vegglue.diagnosis.competition import Hypothesis, chances_of, tempering
+from vegglue.diagnosis.competition import Hypothesis, chances_of
+from vegglue.diagnosis.odds import tempering
 from vegglue.diagnosis.refits import RefitTrial, pruned, refits_of
 from vegglue.diagnosis.search_state import rivals_among
 from vegglue.effects.library import library

@@ -15,7 +15,8 @@ from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.calibration.score_test import kind_named
 from vegglue.case.case_effects import effect_named
 from vegglue.case.parameter_space import z_of
-from vegglue.diagnosis.competition import Hypothesis, drag_of_patches, with_patch
+from vegglue.diagnosis.competition import Hypothesis, with_patch
+from vegglue.diagnosis.place_search import drag_of_patches
 from vegglue.diagnosis.refits import RefitTrial, refits_of
 from vegglue.diagnosis.search_state import anomaly_found
 from vegglue.engine.interface import linearise_from

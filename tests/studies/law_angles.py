@@ -30,8 +30,8 @@ from vegglue.calibration.law_screening import LawScreening, law_fingerprints, sc
 from vegglue.calibration.residual_screening import GROUPS
 from vegglue.calibration.score_test import log_factors
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import chances_in_set
 from vegglue.diagnosis.law_search import HELD, MOST_QUANTITIES
+from vegglue.diagnosis.odds import chances_in_set
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most
 

@@ -32,7 +32,8 @@ from vegglue.calibration.residual_screening import kind_of_listed, kinds_of_inst
 from vegglue.calibration.score_test import HypothesisKind
 from vegglue.case.channel_geometry import half_width
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import What, chosen_hypothesis, tempered_probabilities
+from vegglue.diagnosis.competition import What, chosen_hypothesis
+from vegglue.diagnosis.odds import tempered_probabilities
 from vegglue.engine.interface import responses
 from vegglue.parallel import at_most
 from vegglue.workflow.hidden_effect import candidate_of

@@ -2,7 +2,7 @@
 
 Laws would explain what no listed effect does; `discover` writes one down.
 
-    p_j ~ exp((E_j - max E) / w_j)   over laws and all else that was compared, see `competition`
+    p_j ~ exp((E_j - max E) / w_j)   over laws and all else that was compared, see `odds`
 
 They have an alarm of their own, which follows that of everything listed: the listed library goes first. Those that are
 not clearly less likely than what was accepted are calibrated, as in `discover`, and named beside it; a law that leaves
@@ -25,7 +25,8 @@ from vegglue.calibration.residual_screening import Screening
 from vegglue.calibration.score_test import prior_shrinkage
 from vegglue.case.case_effects import parameters_of_effects
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import Hypothesis, chances_in_set
+from vegglue.diagnosis.competition import Hypothesis
+from vegglue.diagnosis.odds import chances_in_set
 from vegglue.diagnosis.refits import Refit
 from vegglue.diagnosis.search_state import SearchState
 from vegglue.effects.grammar import LAWS, SAME_AS

@@ -31,12 +31,10 @@ from vegglue.diagnosis.competition import (
     chosen_hypothesis,
     evidence_under_larger_errors,
     hypotheses_of,
-    log_odds_taken,
     nearly_as_likely,
-    tempered_probabilities,
-    under_larger_errors,
 )
 from vegglue.diagnosis.conclusion import assemble_diagnosis, single_readings
+from vegglue.diagnosis.odds import log_odds_taken, tempered_probabilities, under_larger_errors
 from vegglue.diagnosis.refits import calibrated_with, pruned
 from vegglue.diagnosis.search_state import (
     PriorWeight,
@@ -136,14 +134,14 @@ class SearchBranch:
     hypotheses: Sequence[Hypothesis] = ()
 
 
-def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = None) -> Diagnosis:
+def diagnose_model(model: Model, watch: Watch = silent, held_out: Model | None = None) -> Diagnosis:
     """Find out what a calibrated model lacks, from a start that depends on nothing but the case and its data.
 
     Parameters
     ----------
     watch : callable
         Is called with each phase.
-    unseen : Model, optional
+    held_out : Model, optional
         The model at measurements that no calibration uses, with which silence has to agree.
 
     Raises
@@ -191,7 +189,7 @@ def diagnose_model(model: Model, watch: Watch = silent, unseen: Model | None = N
             one = effects[step.accepted]
             value, low, high = interval95(model, fitted, candidate_in_case(model.case, one.name).parameter)
             effects[one.name] = replace(one, amplitude=replace(one.amplitude, value=value, interval95=(low, high)))
-    return assemble_diagnosis(first, screening, found, effects, unseen, laws, watch)
+    return assemble_diagnosis(first, screening, found, effects, held_out, laws, watch)
 
 
 def _best_branch(

@@ -37,7 +37,8 @@ from vegglue.calibration.law_screening import (
 from vegglue.calibration.residual_screening import refit_start
 from vegglue.case.parameter_space import theta_at
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import REACH, Hypothesis, chances_in_set, hypotheses_of, tempering
+from vegglue.diagnosis.competition import REACH, Hypothesis, hypotheses_of
+from vegglue.diagnosis.odds import chances_in_set, tempering
 from vegglue.diagnosis.refits import Refit, RefitTrial, refits_of
 from vegglue.effects.grammar import SAME_AS, Law, signed
 from vegglue.effects.library import library

@@ -26,7 +26,7 @@ from vegglue.calibration.score_test import HypothesisKind, Projected, prior_shri
 from vegglue.case.schema import Planned
 from vegglue.compilation import compiled
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import tempering
+from vegglue.diagnosis.odds import tempering
 from vegglue.diagnosis.plan_model import PlanModel, bending_of, place_along, ratios_of_lengths
 from vegglue.effects.definition import Amplitude
 from vegglue.measurements.kinds import STREAMWISE
@@ -186,7 +186,7 @@ def first_competition(
 
     T_k are the scores of all hypotheses (`score_test`) if an effect with the trace S, l standard errors long, and
     errors alone make the residual; e_k are the scores of errors alone. The diagnosis is alarmed if the sum of all Bayes
-    factors is above its level. Of the tempered chances of `competition` it then takes what is likeliest, an effect
+    factors is above its level. Of the tempered chances of `odds` it then takes what is likeliest, an effect
     before a place that does not lead by known_first_odds, and reports the fewest groups of similar effects that hold
     set_chance (`search_state.rivals_among`; here the group of an effect is all that are similar to it). Named means
     that the true effect is among them. Refits, and what is found beside a first effect, are left out.

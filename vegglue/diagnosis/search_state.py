@@ -19,13 +19,8 @@ from vegglue.calibration.fit import chi2
 from vegglue.calibration.residual_screening import Screening, screen
 from vegglue.calibration.score_test import alarm_p, kind_named, prior_shrinkage
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.competition import (
-    Hypothesis,
-    chances_of,
-    evidence_under_larger_errors,
-    hypotheses_of,
-    tempered_odds,
-)
+from vegglue.diagnosis.competition import Hypothesis, chances_of, evidence_under_larger_errors, hypotheses_of
+from vegglue.diagnosis.odds import tempered_odds
 from vegglue.diagnosis.refits import Refit, calibrated_with, without_effect
 from vegglue.measurements.kinds import kind_of
 from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues
