@@ -21,7 +21,7 @@ from vegglue.case.schema import ModelError, Planned, PlannedErrors
 from vegglue.case.site_schema import BedLayer
 from vegglue.case.survey_error import BedSurvey, bed_survey_text, line_weights, root_of_covariance
 from vegglue.decision_constants import constants
-from vegglue.diagnosis.comparison import unseen_errors
+from vegglue.diagnosis.comparison import expected_errors
 from vegglue.diagnosis.next_measurement import surveys
 from vegglue.diagnosis.refits import relevelled
 from vegglue.engine.interface import Model, Point, linearise
@@ -229,10 +229,11 @@ def test_ninety_five_of_a_hundred_unseen_values_lie_within_their_bands(surveyed:
         value = point.prediction + off + error * random.standard_normal(error.size)
         its_noise = replace(noise, value=value[noise.rows])
         half = Baseline(seen, its_noise, at_point(its_noise, point), None, None)
-        found = unseen_errors(half, model, point)
+        found = expected_errors(half, model, point)
         assert found is not None
-        left = (off + of_grid * random.standard_normal(error.size) - found.mean)[~used.to_numpy()]
-        within.append(np.abs(left) < 1.96 * found.error[~used.to_numpy()])
+        mean, spread = (of_each[~used.to_numpy()] for of_each in found)
+        left = (off + of_grid * random.standard_normal(error.size))[~used.to_numpy()] - mean
+        within.append(np.abs(left) < 1.96 * spread)
         ratios.append(np.sum(left**2) / np.sum(off[~used.to_numpy()] ** 2))
     assert 0.92 <= np.mean(within) <= 0.975
     assert np.mean(ratios) < 0.5  # what was measured beside them says most of it

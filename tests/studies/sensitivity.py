@@ -88,7 +88,7 @@ def diagnose_all(case: str, wanted: Mapping[str, tuple[float, ...]], commit: str
         run = case_run(on_larger_cells(case, Path(place)), Path(place) / "runs")
         try:
             with using(cast(DecisionConstants, of)), at_most(1), one_thread():  # a fork keeps one thread
-                found = diagnose_model(run.commanded_model, unseen=run.validation_model)
+                found = diagnose_model(run.commanded_model, held_out=run.validation_model)
                 answered = {
                     "kind": found.verdict.kind, "set": sorted(found.set),
                     "places": [one.effect for one in found.places],

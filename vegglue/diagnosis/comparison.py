@@ -103,43 +103,30 @@ def held_out_errors(base: Baseline, held_out: Model) -> HeldOutErrors:
     return HeldOutErrors(float(np.sqrt((error**2).sum() / total)), by_chance)
 
 
-@dataclass(frozen=True)
-class UnseenErrors:
+def expected_errors(base: Baseline, held_out: Model, there: Point) -> tuple[Array, Array] | None:
     """Measured less predicted at stations that no calibration uses, as the calibrated ones let expect.
-
-    Attributes
-    ----------
-    mean, error : ndarray (station,)
-        Mean and standard error, without the error of reading [unit of the station].
-    """
-
-    mean: Array
-    error: Array
-
-
-def unseen_errors(base: Baseline, unseen: Model, there: Point) -> UnseenErrors | None:
-    """Expected errors of a calibrated model at stations that no calibration uses.
 
     e of `errors_elsewhere` with all errors of model and site that stations share. The error of the grid is that
     at the stations, and that of a discharge is independent of those that were calibrated.
 
     Parameters
     ----------
-    unseen : Model
+    held_out : Model
         At these stations.
     there : Point
-        Of `unseen`, at the parameters of the base.
+        Of `held_out`, at the parameters of the base.
 
     Returns
     -------
-    UnseenErrors or None
-        None if no flow is found on the cells of the model's own error.
+    (ndarray (station,), ndarray (station,)) or None
+        Mean and standard error, without the error of reading [unit of the station]; None if no flow is found on the
+        cells of the model's own error.
     """
     where = with_error_there(model_that_errs(base))
-    same = where.model.site.bed.shape == unseen.site.bed.shape
-    coarse = coarser(unseen)
+    same = where.model.site.bed.shape == held_out.site.bed.shape
+    coarse = coarser(held_out)
     on_coarse = None if coarse is None else linearise(coarse, there.z)
-    cells, point = (unseen, there) if same else (coarse, on_coarse)
+    cells, point = (held_out, there) if same else (coarse, on_coarse)
     if cells is None or point is None:
         return None
     allowed = where.model.case.model_error
@@ -153,7 +140,7 @@ def unseen_errors(base: Baseline, unseen: Model, there: Point) -> UnseenErrors |
     own = site_error_columns(cells, point, of_discharge, CellResponses(cells.site.grid, {}))
     of_grid = constants().grid_error_share * (there.prediction - (there if on_coarse is None else on_coarse).prediction)
     variance = np.diag(covariance) + (own**2).sum(axis=1) + of_grid**2
-    return UnseenErrors(mean, np.sqrt(np.maximum(variance, 0.0)))
+    return mean, np.sqrt(np.maximum(variance, 0.0))
 
 
 def errors_elsewhere(where: SearchModel, at_stations: Array, there: Array, point: Point) -> tuple[Array, Array]:
@@ -379,22 +366,23 @@ def model_score(base: Baseline, validation: Model | None = None) -> ModelScore:
     model, noise, point = base.model, base.noise, base.fitted.point
     used, left = model.station.iloc[noise.rows], noise.residual(point.prediction)
     kind, velocity = used["kind"].to_numpy(), leading_velocities(used)
-    section, spread = _held_out(base, used["section"].to_numpy())
-    experiment, _ = _held_out(base, used["experiment"].to_numpy())
+    section, spread = _cross_validated(base, used["section"].to_numpy())
+    experiment, _ = _cross_validated(base, used["experiment"].to_numpy())
     error, surprise = section[velocity] / spread[velocity], np.abs(section[velocity] / spread[velocity])
     density = -0.5 * error**2 - np.log(spread[velocity]) - 0.5 * np.log(2.0 * np.pi)
     known = surprise[np.isfinite(surprise)]
     inside = [float(np.mean(known < ndtri(0.5 + 0.5 * level))) if known.size else float("nan") for level in (0.5, 0.95)]
     validated = within = float("nan")
     if validation is not None and (there := linearise(validation, point.z)) is not None:
-        rows, change = leading_velocities(validation.station), None
+        rows, expected = leading_velocities(validation.station), None
         missed = validation.station["value"].to_numpy(float)[rows] - there.prediction[rows]
         if any(layer.survey is not None for layer in beds_of(model.case)):
-            change = unseen_errors(base, validation, there)  # the bed is calibrated, too
-        if change is not None:
-            missed = missed - change.mean[rows]
+            expected = expected_errors(base, validation, there)  # the bed is calibrated, too
+        if expected is not None:
+            mean, error_there = (of_each[rows] for of_each in expected)
+            missed = missed - mean
             stated = np.nan_to_num(validation.station["standard_error"].to_numpy(float)[rows])
-            within = float(np.mean(np.abs(missed) < NORMAL95 * np.hypot(change.error[rows], stated)))
+            within = float(np.mean(np.abs(missed) < NORMAL95 * np.hypot(error_there, stated)))
         validated = root_mean_square(missed)
     return ModelScore(
         name=model.case.name,
@@ -542,7 +530,7 @@ def _of_velocities(score: ModelScore, by: By, untold: Collection[str]) -> Array:
     return np.where([one in untold for one in group], np.nan, error)[held_out.velocity]
 
 
-def _held_out(base: Baseline, groups: np.ndarray) -> tuple[Array, Array]:
+def _cross_validated(base: Baseline, groups: np.ndarray) -> tuple[Array, Array]:
     """Errors of stations when their group is left out, and the spread they were predicted with (n,), `model_score`."""
     noise, point = base.noise, base.fitted.point
     slope, left = noise.used(point.slope), noise.residual(point.prediction)
