@@ -1,12 +1,12 @@
 """Inputs of verdicts made up for tests, and the verdicts on them."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from diagnoses import a_candidate_effect
 
 from vegglue.calibration.fit import chance_of_misfit
-from vegglue.diagnosis.verdict_rules import VerdictInputs, make_verdict
+from vegglue.diagnosis.verdict_rules import Doubts, VerdictInputs, make_verdict
 from vegglue.results.causes import CandidateEffect, Step
 from vegglue.results.verdict import ChiSquare, EstimatedErrors, Verdict
 from vegglue.wording.sentences import tag_of
@@ -19,18 +19,18 @@ FITS, MISSES, ABSURD = (
 NONE = a_candidate_effect("wind", test={"score": 0.4})
 
 
-def step(*rivals: str, **fields: Any) -> Step:
-    """A step that accepts the first; fields: to be changed."""
+def step(*rivals: str, **changed: Any) -> Step:
+    """A step that accepts the first; changed: other fields."""
     chances = tuple(0.96 / len(rivals) for _ in rivals)
-    return replace(Step(rivals[0], rivals, chances, tuple((name,) for name in rivals), 200.0, 5.0, 1e-4), **fields)
+    return replace(Step(rivals[0], rivals, chances, tuple((name,) for name in rivals), 200.0, 5.0, 1e-4), **changed)
 
 
 def inputs(*steps: Step, candidates: tuple[CandidateEffect, ...] | None = None, **parts: Any) -> VerdictInputs:
     """Of a diagnosis that accepted these steps, each effect a candidate of its own if none are given."""
     own = tuple(a_candidate_effect(name) for step in steps for name in step.rivals) or (NONE,)
-    usual = VerdictInputs(
-        own if candidates is None else tuple(candidates), AS_STATED, FITS, steps, strained=("n_b", 1.0)
-    )
+    doubts = {one.name: parts.pop(one.name) for one in fields(Doubts) if one.name in parts}
+    doubted = replace(Doubts(strained=("n_b", 1.0)), **doubts)
+    usual = VerdictInputs(own if candidates is None else tuple(candidates), AS_STATED, FITS, doubted, steps)
     return replace(usual, **parts)
 
 

@@ -207,6 +207,9 @@ class DecisionConstants:
         "(2.3, named rightly) and F (6.0, wrongly) of docs/measured.md; in 347 runs of open, drawn and measured sites "
         "what is named beside these two has at most 1.7",
     )  # fmt: skip
+    absurd_model_error: float = _constant(
+        4.0, "-", CHOSEN, "the model's own error over the allowed one above which no law is believed: four times"
+    )
     far_off_prior: float = _constant(
         4.0, "standard deviations", CHOSEN, "distance from its prior beyond which a parameter replaces a cause, and "
         "size over a plausible one beyond which an effect or a place does; after river-f, whose place of a wrong kind "

@@ -34,12 +34,13 @@ from vegglue.diagnosis.candidate_effects import (
 )
 from vegglue.diagnosis.child_config import candidate_at
 from vegglue.diagnosis.comparison import HeldOutErrors, held_out_errors, largest_error_between
-from vegglue.diagnosis.competition import cannot_be, possible_change, tempering
 from vegglue.diagnosis.field_scan import fields_by_evidence, free_of_prior, log_density_of_residual, map_of_field
 from vegglue.diagnosis.handbook import parameter_doubts
 from vegglue.diagnosis.law_search import laws_beside_accepted
+from vegglue.diagnosis.odds import tempering
+from vegglue.diagnosis.place_search import cannot_be, possible_change
 from vegglue.diagnosis.search_state import SearchState, rivals_in
-from vegglue.diagnosis.verdict_rules import VerdictInputs, make_verdict
+from vegglue.diagnosis.verdict_rules import Doubts, VerdictInputs, make_verdict
 from vegglue.effects.definition import Stage
 from vegglue.effects.identity import EffectIdentity
 from vegglue.engine.interface import Model, Point, flow_at_centres
@@ -52,7 +53,6 @@ from vegglue.progress import Watch
 from vegglue.results.causes import (
     TERMS_AT_PLACES,
     CandidateEffect,
-    CandidateLaws,
     FieldFound,
     FieldMapKept,
     LocalAnomaly,
@@ -73,7 +73,6 @@ from vegglue.results.verdict import (
     PlacesOnMap,
     ShearLayer,
     TooShallow,
-    Verdict,
 )
 from vegglue.version import VERSION
 
@@ -190,19 +189,37 @@ def assemble_diagnosis(
         last, effects = first, candidate_effects_of(first)
         measured_bed = submit(_measured_bed, last, found)
     found = replace(found, places=tuple(as_calibrated(one, last.base) for one in found.places))
+    base, before = last.base, first.base
     ranked = tuple(sorted(effects.values(), key=lambda one: (not one.amplitude.refitted, -(one.test.score**2))))
     misfit, errors = misfit_of(first, last, found.flagged), estimated_errors(last, found)
+    model_error = _model_error(last)
     likely = laws is not None and laws.likelier and not found.accepted
     field, field_map = (None, None) if likely else _field(first, last, found, misfit)
-    base, before = last.base, first.base
-    model_error = _model_error(last)
-    hangs_on = name_without_a_section(first, found)
-    # Whether silence is earned is a question only if nothing was found.
-    silent, unseen = not (found.steps or found.places or found.undecided), HeldOutErrors(float("nan"), 1.0)
-    if silent and held_out is not None:
-        unseen = held_out_errors(base, held_out)
+    undecided = () if found.undecided is None else rivals_in(found.undecided)
+    doubts, beside = doubts_of(first, last, found, held_out), significant_effects(last, found)
     bed_map, of_bed = measured_bed()
-    verdict = _verdict(last, found, ranked, misfit, errors, field, laws, model_error, silent, unseen, hangs_on, of_bed)
+    verdict = make_verdict(
+        VerdictInputs(
+            candidates=ranked,
+            errors=errors,
+            misfit=misfit.size,
+            doubts=doubts,
+            steps=found.steps,
+            places=found.places,
+            instruments=found.instruments,
+            undecided=undecided,
+            implausible=found.implausible,
+            field=field,
+            laws=laws,
+            model_error=model_error,
+            not_excluded=() if found.implausible else not_excluded(last),
+            significant_effects=beside,
+            remainder=bool(beside) and not significant_effects(last, found, found.slack),
+            surroundings=surroundings_of(last, found, undecided),
+            excluded=base.model.case.exclude or {},
+            bed=of_bed,
+        )
+    )
     strongest = first.ranking[:COMPARED]
     columns = [first.best_column(j) for j in strongest]
     # Scores of the term of the first place that was found, else of drag, before anything was accepted.
@@ -310,65 +327,53 @@ def bed_of_measurements(last: Screening) -> tuple[FieldMapKept | None, tuple[Bed
     return kept, tuple(sorted(found, key=lambda one: -one.local_log_factor)[:BED_CORRECTIONS])
 
 
-def _verdict(
-    last: Screening,
-    found: SearchState,
-    ranked: tuple[CandidateEffect, ...],
-    misfit: Misfit,
-    errors: EstimatedErrors,
-    field: FieldFound | None,
-    laws: CandidateLaws | None,
-    model_error: ModelErrorUsed | None,
-    silent: bool,
-    unseen: HeldOutErrors,
-    hangs_on: NameHangsOnSection | None,
-    of_bed: tuple[BedCorrected, ...],
-) -> Verdict:
-    """The verdict on what was found, once all that it rests on is computed."""
+def doubts_of(first: Screening, last: Screening, found: SearchState, held_out: Model | None) -> Doubts:
+    """What may take a name or silence from the verdict on what was found.
+
+    Parameters
+    ----------
+    held_out : Model or None
+        The model at measurements that no calibration uses. These and the errors between the sections are asked only if
+        nothing was found: whether silence is earned.
+    """
     base, model = last.base, last.base.model
     carried = submit(mismatched_discharges, model.case, model.site, model.station)
     strained, far = furthest_off_prior(model, base.fitted.point.z)
-    # Whether two single readings are excluded that stand side by side in one section.
-    rows = single_readings(base.noise, found)
-    neighbours = any(0.0 < base.noise.separation[a, b] < constants().neighbours_within for a in rows for b in rows)
-    beside, undecided = significant_effects(last, found), () if found.undecided is None else rivals_in(found.undecided)
-    surroundings: list[Note] = [*mapped_places(model.case, named_places(found.places, undecided))]
-    surroundings += measured_stretch(model.case, model.station)
-    surroundings += parameter_doubts(base)
-    surroundings += inflow_develops(model, found.effects)
-    surroundings += cells_too_coarse(base.noise, model.station)
-    surroundings += shear_layers(model, base.fitted.point, found.places)
-    if not any(one.x.size for one in last.fingerprints.places):
-        surroundings.append(TooShallow(least_depth(model)))
-    return make_verdict(
-        VerdictInputs(
-            candidates=ranked,
-            errors=errors,
-            misfit=misfit.size,
-            steps=found.steps,
-            places=found.places,
-            instruments=found.instruments,
-            undecided=undecided,
-            implausible=found.implausible,
-            field=field,
-            laws=laws,
-            model_error=model_error,
-            not_excluded=() if found.implausible else not_excluded(last),
-            held_out=unseen.ratio,
-            by_chance=unseen.by_chance,
-            neighbours=neighbours,
-            strained=(strained, far),
-            strained_without=strained_without_a_section(base, strained) if far > constants().far_off_prior else None,
-            between=largest_error_between(base) if silent else 1.0,
-            carried=tuple(carried()),
-            significant_effects=beside,
-            remainder=bool(beside) and not significant_effects(last, found, found.slack),
-            surroundings=tuple(surroundings),
-            excluded=model.case.exclude or {},
-            hangs_on=hangs_on,
-            one_section=only_section(model.station.iloc[base.noise.rows]),
-            bed=of_bed,
-        )
+    rows, silent = single_readings(base.noise, found), not (found.steps or found.places or found.undecided)
+    errors = HeldOutErrors(float("nan"), 1.0)
+    if silent and held_out is not None:
+        errors = held_out_errors(base, held_out)
+    return Doubts(
+        held_out=errors.ratio,
+        by_chance=errors.by_chance,
+        between=largest_error_between(base) if silent else 1.0,
+        neighbours=any(0.0 < base.noise.separation[a, b] < constants().neighbours_within for a in rows for b in rows),
+        strained=(strained, far),
+        strained_without=strained_without_a_section(base, strained) if far > constants().far_off_prior else None,
+        hangs_on=name_without_a_section(first, found),
+        one_section=only_section(model.station.iloc[base.noise.rows]),
+        carried=tuple(carried()),
+    )
+
+
+def surroundings_of(last: Screening, found: SearchState, undecided: Sequence[Rival]) -> tuple[Note, ...]:
+    """Notes on the map, the measured stretch, the parameters, the inflow, the cells and the depth.
+
+    Parameters
+    ----------
+    undecided : sequence of Rival
+        Hypotheses of which none leads.
+    """
+    base, model = last.base, last.base.model
+    bare = not any(one.x.size for one in last.fingerprints.places)
+    return (
+        *mapped_places(model.case, named_places(found.places, undecided)),
+        *measured_stretch(model.case, model.station),
+        *parameter_doubts(base),
+        *inflow_develops(model, found.effects),
+        *cells_too_coarse(base.noise, model.station),
+        *shear_layers(model, base.fitted.point, found.places),
+        *((TooShallow(least_depth(model)),) if bare else ()),
     )
 
 

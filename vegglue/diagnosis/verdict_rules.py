@@ -53,6 +53,42 @@ TERMS_OF_DISCHARGES, OF_DEVICES = ("inflow", "bed"), ("device_gain", "zero_offse
 
 
 @dataclass(frozen=True)
+class Doubts:
+    """What may take a name or silence from a verdict.
+
+    Attributes
+    ----------
+    held_out, by_chance : float
+        Errors at held-out measurements over the expected ones [-], NaN without any, infinite without a flow; and
+        what of that errors alone exceed in 5 % of cases.
+    between : float
+        Errors between the sections over those of the data [-].
+    neighbours : bool
+        Whether readings side by side are excluded.
+    strained : (str, float)
+        The parameter furthest off its prior, and how far [standard deviations].
+    strained_without : (str, float) or None
+        The section without which it is not too far, and how far then.
+    hangs_on : NameHangsOnSection or None
+        The section without which another name leads.
+    one_section : OneSection or None
+        That of all measurements.
+    carried : tuple of CarriedDischarge
+        Sections that clearly carry another discharge than stated.
+    """
+
+    held_out: float = float("nan")
+    by_chance: float = 1.0
+    between: float = 1.0
+    neighbours: bool = False
+    strained: tuple[str, float] = ("", 0.0)
+    strained_without: tuple[str, float] | None = None
+    hangs_on: NameHangsOnSection | None = None
+    one_section: OneSection | None = None
+    carried: tuple[CarriedDischarge, ...] = ()
+
+
+@dataclass(frozen=True)
 class VerdictInputs:
     """What a verdict rests on.
 
@@ -72,19 +108,6 @@ class VerdictInputs:
         Values that no flow can have.
     not_excluded : tuple of tuple of str
         Groups of effects among which one that is there undetected is.
-    held_out, by_chance : float
-        Errors at held-out measurements over the expected ones [-], NaN without any, infinite without a flow; and
-        what of that errors alone exceed in 5 % of cases.
-    neighbours : bool
-        Whether readings side by side are excluded.
-    strained : (str, float)
-        The parameter furthest off its prior, and how far [standard deviations].
-    strained_without : (str, float) or None
-        The section without which it is not too far, and how far then.
-    between : float
-        Errors between the sections over those of the data [-].
-    carried : tuple of CarriedDischarge
-        Sections that clearly carry another discharge than stated.
     significant_effects : mapping of float
         p of those that were not accepted, by name [-].
     remainder : bool
@@ -93,10 +116,6 @@ class VerdictInputs:
         Notes on the map, the measured stretch, the depth and the parameters.
     excluded : mapping of str
         Effects that cannot act at the site, with the reason of each.
-    hangs_on : NameHangsOnSection or None
-        The section without which another name leads.
-    one_section : OneSection or None
-        That of all measurements.
     bed : tuple of BedCorrected
         Where it differs from the surveyed one, the clearest first.
     """
@@ -104,6 +123,7 @@ class VerdictInputs:
     candidates: tuple[CandidateEffect, ...]
     errors: EstimatedErrors
     misfit: ChiSquare
+    doubts: Doubts
     steps: tuple[Step, ...] = ()
     places: tuple[LocalAnomaly, ...] = ()
     instruments: tuple[FaultyInstrument, ...] = ()
@@ -113,19 +133,10 @@ class VerdictInputs:
     laws: CandidateLaws | None = None
     model_error: ModelErrorUsed | None = None
     not_excluded: tuple[tuple[str, ...], ...] = ()
-    held_out: float = float("nan")
-    by_chance: float = 1.0
-    neighbours: bool = False
-    strained: tuple[str, float] = ("", 0.0)
-    strained_without: tuple[str, float] | None = None
-    between: float = 1.0
-    carried: tuple[CarriedDischarge, ...] = ()
     significant_effects: Mapping[str, float] = by_default(default_factory=dict)
     remainder: bool = False
     surroundings: tuple[Note, ...] = ()
     excluded: Mapping[str, str] = by_default(default_factory=dict)
-    hangs_on: NameHangsOnSection | None = None
-    one_section: OneSection | None = None
     bed: tuple[BedCorrected, ...] = ()
 
 
@@ -151,7 +162,7 @@ def make_verdict(inputs: VerdictInputs) -> Verdict:
             remaining.append(verdict.ErrorsStillLarger(inputs.errors.scale))
         if ranked := sorted(inputs.significant_effects.items(), key=lambda one: one[1]):
             remaining.append(verdict.EffectsStillSignificant(tuple(ranked), inputs.remainder))
-    explained = () if found.doubts_the_data else tuple(discharge_mismatches(inputs.carried))
+    explained = () if found.doubts_the_data else tuple(discharge_mismatches(inputs.doubts.carried))
     sure = not (found.kind == "cannot-tell" or found.reasons or remaining or found.field or found.laws)
     bed = inputs.bed[0] if inputs.bed and sure and found.anomaly is None else None
     found = replace(found, remaining=tuple(remaining), may_explain=explained, bed=bed)
@@ -165,8 +176,9 @@ def _concluded(inputs: VerdictInputs, plain: Verdict) -> Verdict:
     if off := _unexplained(inputs):
         return replace(plain, reasons=tuple(discharge_mismatches(off)))
     doubt, laws, accepted = _doubt(inputs), inputs.laws, bool(inputs.steps or inputs.places)
-    if inputs.one_section is not None and (accepted or laws is not None or inputs.field is not None):
-        return replace(plain, laws=laws, reasons=(inputs.one_section, doubt) if doubt else (inputs.one_section,))
+    lone = inputs.doubts.one_section
+    if lone is not None and (accepted or laws is not None or inputs.field is not None):
+        return replace(plain, laws=laws, reasons=(lone, doubt) if doubt else (lone,))
     if laws is not None:
         nothing_else = not (accepted or inputs.undecided or inputs.field)
         if nothing_else or (not doubt and laws.likelier and not accepted):
@@ -208,19 +220,19 @@ def _unexplained(inputs: VerdictInputs) -> list[CarriedDischarge]:
         acts = not one.target or one.name in OF_DEVICES or bool({section.experiment, section.section} & set(one.target))
         return one.name in OF_DISCHARGES and acts
 
-    return [section for section in inputs.carried if not any(may_be_why(one, section) for one in believed)]
+    return [section for section in inputs.doubts.carried if not any(may_be_why(one, section) for one in believed)]
 
 
 def _doubt(inputs: VerdictInputs) -> Reason | None:
     """Why no name can be believed, None when it can."""
-    parameter, far = inputs.strained
+    parameter, far = inputs.doubts.strained
     ratio = inputs.misfit.value / max(inputs.misfit.freedom, 1)
     if ratio > constants().absurd_misfit:
         return verdict.MisfitBeyondErrors(math.sqrt(ratio))
     if inputs.errors.scale > constants().absurd_errors:
         return verdict.ErrorsLargerThanStated(inputs.errors.scale)
     if far > constants().far_off_prior:
-        return verdict.ParameterFarFromPrior(parameter, far, inputs.strained_without)
+        return verdict.ParameterFarFromPrior(parameter, far, inputs.doubts.strained_without)
     names = {step.accepted for step in inputs.steps}
     at_bound = []
     for one in (each for each in inputs.candidates if each.name in names):
@@ -236,7 +248,9 @@ def _doubt(inputs: VerdictInputs) -> Reason | None:
     sizes = [(one.amplitude.relative_size, one.name) for one in inputs.candidates if one.name in names]
     sizes += [(abs(one.amplitude) / one.plausible, f"{one.term} at a place") for one in inputs.places]
     size, name = max(sizes, default=(0.0, ""))
-    return verdict.AmplitudeBeyondPlausible(name, float(size)) if size > constants().far_off_prior else inputs.hangs_on
+    if size > constants().far_off_prior:
+        return verdict.AmplitudeBeyondPlausible(name, float(size))
+    return inputs.doubts.hangs_on
 
 
 def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt: Reason | None) -> Verdict:
@@ -244,12 +258,12 @@ def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt
     that is clearly off goes before laws that are not likelier than all else, except readings side by side.
     """
     found = replace(plain, laws=laws)
-    used, absurd = inputs.model_error, math.sqrt(constants().absurd_misfit)
-    if inputs.errors.scale > absurd:
+    used = inputs.model_error
+    if inputs.errors.scale > math.sqrt(constants().absurd_misfit):
         doubt = doubt or verdict.ErrorsLargerThanStated(inputs.errors.scale)
-    if used is not None and used.needed > 2.0 * absurd:  # four times what is allowed; chosen, not measured
+    if used is not None and used.needed > constants().absurd_model_error:
         doubt = doubt or verdict.ModelErrorExceeded(used.needed, used.friction)
-    if inputs.neighbours and not laws.likelier:
+    if inputs.doubts.neighbours and not laws.likelier:
         doubt = doubt or verdict.NeighboursExcluded()
     if doubt:
         return replace(found, reasons=(doubt,))
@@ -262,8 +276,8 @@ def _with_laws(inputs: VerdictInputs, plain: Verdict, laws: CandidateLaws, doubt
 
 def _silent(inputs: VerdictInputs, plain: Verdict) -> Verdict:
     """Nothing is missing, or an instrument is off, if silence is earned."""
-    clear = tuple(filter(_is_clear, inputs.instruments))
-    all_clear = bool(clear) and len(clear) == len(inputs.instruments) and not inputs.neighbours
+    doubts, clear = inputs.doubts, tuple(filter(_is_clear, inputs.instruments))
+    all_clear = bool(clear) and len(clear) == len(inputs.instruments) and not doubts.neighbours
     named = inputs.instruments if all_clear else ()
     if inputs.misfit.p < constants().poor_fit_chance:
         return replace(plain, reasons=(verdict.MisfitUnexplained(),))
@@ -272,19 +286,19 @@ def _silent(inputs: VerdictInputs, plain: Verdict) -> Verdict:
         unearned.append(verdict.ErrorsLargerThanStated(errors.scale))
     if errors.correlation > constants().largest_correlation:
         unearned.append(verdict.CorrelatedErrors(errors.correlation))
-    if inputs.neighbours:
+    if doubts.neighbours:
         unearned.append(verdict.NeighboursExcluded())
     if used is not None and used.asks_for_more:
         unearned.append(verdict.ModelErrorExceeded(used.needed, used.friction))
-    if inputs.held_out == math.inf:
+    if doubts.held_out == math.inf:
         unearned.append(verdict.NoFlowHeldOut())
-    elif inputs.held_out > max(constants().held_out_ratio, inputs.by_chance):
-        unearned.append(verdict.HeldOutMissed(inputs.held_out))
+    elif doubts.held_out > max(constants().held_out_ratio, doubts.by_chance):
+        unearned.append(verdict.HeldOutMissed(doubts.held_out))
     if unearned:
         return replace(plain, reasons=(unearned[0],), instruments=named)
-    if inputs.between > constants().held_out_ratio:
+    if doubts.between > constants().held_out_ratio:
         kind: VerdictKind = "instrument" if all_clear else "cannot-tell"
-        return replace(plain, kind=kind, reasons=(verdict.UncertainBetweenSections(inputs.between),), instruments=named)
+        return replace(plain, kind=kind, reasons=(verdict.UncertainBetweenSections(doubts.between),), instruments=named)
     if plain.tested.testable < constants().testable_share * max(len(inputs.candidates), 1):
         return replace(plain, reasons=(verdict.FewTestable(),))
     return replace(plain, kind="instrument" if clear else "nothing-missing", instruments=clear, clears_the_model=True)
@@ -336,7 +350,7 @@ def effect_found(step: Step, candidates: Iterable[CandidateEffect]) -> EffectFou
 def _notes(inputs: VerdictInputs, found: Verdict) -> Iterable[Note]:
     """What else should be known, on discharges and on what is named first."""
     misfit, errors, accepted = inputs.misfit, inputs.errors, tuple(step.accepted for step in inputs.steps)
-    yield from discharge_mismatches(inputs.carried)
+    yield from discharge_mismatches(inputs.doubts.carried)
     if is_too_small(misfit.value, misfit.freedom):
         yield verdict.MisfitTooSmall(misfit.value, misfit.freedom)
     by_name = {one.name: one for one in inputs.candidates}
