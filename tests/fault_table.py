@@ -240,7 +240,7 @@ Members are kept in chunks.
 
 {rows}
 
-A hanging worker cannot be distinguished from a slow one: the command waits. Stop it with Ctrl-C; finished work is kept.
+If a worker hangs the command waits, as for a slow one: stop it with Ctrl-C; finished work is kept.
 
 ## Kills
 
@@ -258,13 +258,11 @@ A hanging worker cannot be distinguished from a slow one: the command waits. Sto
 
 ## Damaged files from others
 
-Beside [the rules of tables](own_files.md#how-tables-are-read), `import`
-
-- **leaves out** codes of gauging offices (Ice, Eqp, -999999), and raw ensembles of a boat with a wrong checksum or
-  size, cut short, or without bottom track or ranges;
-- **refuses** velocities relative to the boat (reference NONE), a jump of the boat, another coordinate system, datum or
-  unit of a map, places 20 km from the site, files of another kind by how they begin, missing-value codes in the site
-  file, stems and corners, damaged MATLAB files, and files that unpack to more than 100 MB.
+Beside [the rules of tables](own_files.md#how-tables-are-read), `import` leaves out codes of gauging offices (Ice, Eqp,
+-999999), and raw ensembles of a boat with a wrong checksum or size, cut short, or without bottom track or ranges. It
+refuses velocities relative to the boat (reference NONE), a jump of the boat, missing-value codes in the site file,
+stems and corners, damaged MATLAB files, files of another kind by how they begin, and files that unpack to more than
+100 MB.
 
 ## Following a run
 

@@ -165,14 +165,18 @@ def _data_limits(
 
 PAGE = """# How often the diagnosis is right
 
+{sets} synthetic data sets, most with a hidden cause, were diagnosed. Under the conditions below,
+of {lines} targets {met} are met. A target is met only if the share itself reaches it, whatever its 95 % interval
+(Clopper and Pearson), in at least {few} data sets.
+
 ## Protocol
 
 - **Truth.** A second solver (`tests/studies/second_solver.py`): explicit finite volumes with their own grid, waterline
   and closures, coded from the same formulas without any code of vegglue, on finer cells.
 - **Two channels.** The small channel: 32 m, two patches, 93 stations (`configs/twin.yaml`), {twin} data sets. The field
   campaign: 100 m, seven patches, 270 stations (`configs/campaign.yaml`), {campaign} data sets.
-- **Errors of measurement** are independent, with standard errors of 1 cm/s for velocities and 3 mm for levels; with
-  nothing hidden also correlated between neighbours by 0.5, or 1.5 times as large as stated.
+- **Errors of measurement**: independent, 1 cm/s for velocities and 3 mm for levels; with nothing hidden also correlated
+  between neighbours by 0.5, or 1.5 times as large as stated.
 - **Imperfect sites**: floor of the bank law 1.1 to 1.6 (1.3 in the model); the logarithm above plants 0.85 to 1.15
   times Baptist's; bed under plants of 45 to 75 m^(1/2)/s (60 in the model); eddy viscosity 0.5 to 2.5 times the stated
   one; sides of patches up to 0.1 m off; stems 12 %, the bed 1 cm, probes 2 cm and discharges 1 % off. Every cause is
@@ -183,17 +187,14 @@ PAGE = """# How often the diagnosis is right
   or two of these, with a signal of 3 or 6 standard errors (s.e.): the norm of the change of the predictions that
   calibration cannot absorb, in standard errors of data, grid, model and site together.
 
+## Result
+
 - **Name**: a cause in a verdict that names one; causes found before a verdict of `cannot-tell` do not count. **False**:
   neither hidden nor an imperfection of the site (of the right sign); an anomaly over 1.5 m from every object.
 - **In the credible set**: among the hypotheses of the verdict or, with nothing false named, among what is not excluded.
   **Groups**: effects that the data cannot distinguish.
 - **Not inspected**: without objects that were looked at, or changed, while rules were chosen.
 - **Held-out error**: at sections without measurements, with the error of a probe added.
-
-## Result
-
-Under these conditions, of {lines} targets {met} are met. A target is met only if the share itself reaches it, whatever
-its 95 % interval (Clopper and Pearson), in at least 20 data sets. All {sets} data sets:
 
 {table}
 

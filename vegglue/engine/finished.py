@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from vegglue.measurements.their_flow import TheirFlow
 
 # Largest differences of both flows at which the slopes of one stand for the other. Derived: evidence takes the trace of
-# an effect as known to 15 % (decision 18); friction gives u ~ h^(2/3), and its slope S ~ h^(-10/3), so that 5 % of the
+# an effect as known to 15 % (decision 15); friction gives u ~ h^(2/3), and its slope S ~ h^(-10/3), so that 5 % of the
 # depth change S by 15 %.
 MOST_APART, MOST_LEVEL_APART, MOST_AREA_APART = 0.15, 0.05, 0.15
 # Shallower than this share of the mean depth [-] neither flow is compared: there, films and steps of the mesh decide.
