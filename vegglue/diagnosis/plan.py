@@ -102,11 +102,6 @@ def plan_measurements(
         One effect, and its size [unit of its amplitude], a plausible one if None.
     between : sequence of two str
         Effects to be told from each other.
-    watch : Watch
-
-    Returns
-    -------
-    FieldPlan
 
     Raises
     ------
@@ -172,7 +167,6 @@ class ShownByPlan:
     ----------
     noise : Noise
         Of the stations of the plan.
-    fingerprints : Fingerprints
     kinds : tuple of HypothesisKind
         As in a screening, the first of listed effects.
     level : float
@@ -227,16 +221,7 @@ def _first_at(x: Array, chance: Array, wanted: float) -> float:
 
 
 def shown_by(wide: PlanModel) -> ShownByPlan:
-    """The screening of a diagnosis of the stations of the plan, before there is a residual.
-
-    Parameters
-    ----------
-    wide : PlanModel
-
-    Returns
-    -------
-    ShownByPlan
-    """
+    """The screening of a diagnosis of the stations of the plan, before there is a residual."""
     known, draw = wide.known, wide.draws[0]
     station = draw.model.station.iloc[known].reset_index(drop=True)
     case = draw.model.case

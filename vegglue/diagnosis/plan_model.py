@@ -72,8 +72,6 @@ class PlanDraw:
 
     Attributes
     ----------
-    model : Model
-    point : Point
     slope : ndarray (N, p)
     values : ndarray (N, k)
         Fingerprints of one setting of each candidate [unit of the row per unit of gain].
@@ -104,7 +102,6 @@ class PlanModel:
         Of each of these.
     error, grid_error : ndarray (N,)
         Standard errors, and those of the grid, see `noise` [unit of the row].
-    candidates : tuple of Candidate
     draws : tuple of PlanDraw
         The middle of the priors on the cells of the search, with every flow that is or could be measured; then the
         middle and places around it on the coarsest cells.
@@ -146,8 +143,6 @@ def verticals_at(
 
     Parameters
     ----------
-    model : Model
-    experiment : str
     x : float
         [m]
     spacing : float
@@ -177,15 +172,6 @@ def place_along(case: Case, x: float) -> float:
 
 def planned_pieces(model: Model, planned: Planned) -> list[PlannedPiece]:
     """The pieces that a case plans, one for each experiment.
-
-    Parameters
-    ----------
-    model : Model
-    planned : Planned
-
-    Returns
-    -------
-    list of PlannedPiece
 
     Raises
     ------
@@ -242,7 +228,6 @@ def possible_pieces(
 
     Parameters
     ----------
-    model : Model
     planned : Planned
         With costs and errors.
     at_hand : DataFrame
@@ -333,10 +318,8 @@ def stations_of(
 
     Parameters
     ----------
-    model : Model
     planned : Planned
         Whose errors they have where stated, else those of the same kind at hand, else the usual ones.
-    pieces : sequence of PlannedPiece
     at_hand : DataFrame
         The used stations.
 
@@ -378,15 +361,10 @@ def plan_model(
     ----------
     model : Model
         On the case's own cells.
-    planned : Planned
     at_hand : DataFrame
         The used stations.
     base, possible : sequence of PlannedPiece
         The plan, and what could be added.
-
-    Returns
-    -------
-    PlanModel
 
     Raises
     ------
@@ -555,10 +533,6 @@ def errors_at(wide: PlanModel, draw: PlanDraw, rows: np.ndarray) -> tuple[Array,
 def relative_lengths(wide: PlanModel) -> Array:
     """|S| around the middle of the priors over |S| in the middle, on the coarsest cells.
 
-    Parameters
-    ----------
-    wide : PlanModel
-
     Returns
     -------
     ndarray (draws, candidates)
@@ -621,10 +595,6 @@ def bending_of(wide: PlanModel) -> Array:
     mean of both signs, on the coarsest cells in the middle of the priors, at the stations of the plan, or at all that
     are possible if it has none.
 
-    Parameters
-    ----------
-    wide : PlanModel
-
     Returns
     -------
     ndarray (candidates,)
@@ -684,7 +654,6 @@ def with_chosen(wide: PlanModel, chosen: Sequence[int]) -> PlanModel:
 
     Parameters
     ----------
-    wide : PlanModel
     chosen : sequence of int
         Of its pieces.
 

@@ -203,10 +203,6 @@ def first_competition(
         Whitened errors alone [-], NAMED_DRAWS of them are used.
     level : float
         ln of the sum of Bayes factors at which the diagnosis is alarmed [-].
-
-    Returns
-    -------
-    FirstCompetition
     """
     effects = len(columns)
     of_others = [one.size.size for one in kinds[1:]]
@@ -233,7 +229,6 @@ def chances_named(competition: FirstCompetition, truths: Sequence[Projected]) ->
 
     Parameters
     ----------
-    competition : FirstCompetition
     truths : sequence of Projected
         Of each effect, at shapes that it may have.
 
@@ -536,19 +531,12 @@ def plan_search(
 
     Parameters
     ----------
-    wide : PlanModel
-    question : PlanQuestion
-    planned : Planned
     level : float
         ln of the sum of Bayes factors at which anything is named [-].
     present : frozenset of str
         Experiments that are measured in anyhow.
     beyond : ndarray (candidates,)
         By how much the score of each has to be above that of the level [standard errors].
-
-    Returns
-    -------
-    PlanSearch
     """
     match question:
         case OneEffect():

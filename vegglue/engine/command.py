@@ -371,12 +371,7 @@ def _changes(settings: CommandEngine) -> Changes:
 
 
 def own_parameters(case: Case) -> tuple[str, ...]:
-    """Names of the parameters that a command gets: all but those of `effects`, which the built-in engine adds.
-
-    Parameters
-    ----------
-    case : Case
-    """
+    """Names of the parameters that a command gets: all but those of `effects`, which the built-in engine adds."""
     of_effects = {value for place, value, _ in values(case) if place[0] == "effects"}
     elsewhere = {value for place, value, _ in values(case) if place[0] != "effects"}
     return tuple(name for name in case.parameters if name in elsewhere or name not in of_effects)

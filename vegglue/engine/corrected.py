@@ -233,12 +233,7 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slope
 
 
 def without_effects(model: Model) -> Model:
-    """The model that a command stands for: no effects, the parameters that the command is given, the built-in engine.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """The model that a command stands for: no effects, the parameters that the command is given, the built-in engine."""
     names = own_parameters(model.case)
     parameters = {name: model.case.parameters[name] for name in names}
     return replace(model, case=model.case.model_copy(update={"effects": {}, "parameters": parameters}), engine=NEWTON)

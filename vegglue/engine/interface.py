@@ -172,7 +172,6 @@ def linearise(model: Model, z: Array, near: Point | None = None, wanted: Wanted 
 
     Parameters
     ----------
-    model : Model
     z : (p,) [standard deviations of the prior]
     near : Point, optional
         A point to start from, of this model or of one on cells of twice the size.
@@ -209,7 +208,6 @@ def linearise_around(model: Model, z: Array, near: Point) -> list[Point | None]:
 
     Parameters
     ----------
-    model : Model
     z : (m, p) [standard deviations of the prior]
     near : Point
         Of this model.
@@ -227,7 +225,6 @@ def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
 
     Parameters
     ----------
-    model : Model
     points : sequence of Point
         Some that are known, to start from, of the model or of one without its last parameters.
     z : (m, p) [standard deviations of the prior]
@@ -243,12 +240,6 @@ def predict(model: Model, points: Sequence[Point], z: Array) -> Array:
 def responses(model: Model, point: Point, causes: Sequence[Cause]) -> Array:
     """df / d(amplitude - off)^power at off: the fingerprints of causes at a point.
 
-    Parameters
-    ----------
-    model : Model
-    point : Point
-    causes : sequence of Cause
-
     Returns
     -------
     (n, causes)
@@ -262,10 +253,8 @@ def responses_at(model: Model, points: Sequence[Point], causes: Sequence[Cause])
 
     Parameters
     ----------
-    model : Model
     points : sequence of Point
         Of the same experiments.
-    causes : sequence of Cause
 
     Returns
     -------
@@ -279,13 +268,6 @@ def responses_to_cells(model: Model, point: Point, experiment: str, terms: Seque
     """df / d term for a change of it in each cell, of some stations at a time: those of all may not fit the memory
     beside what they are made of.
 
-    Parameters
-    ----------
-    model : Model
-    point : Point
-    experiment : str
-    terms : sequence of Term
-
     Yields
     ------
     (n,), mapping of str to (n, nx, ny)
@@ -296,11 +278,6 @@ def responses_to_cells(model: Model, point: Point, experiment: str, terms: Seque
 
 def relinearised(model: Model, point: Point) -> Point:
     """The point with nothing reused from a flow nearby: its responses to cells are exact to a per cent.
-
-    Parameters
-    ----------
-    model : Model
-    point : Point
 
     Returns
     -------
@@ -315,7 +292,6 @@ def linearise_as_coarse(model: Model, point: Point, before: Point, after: Point)
 
     Parameters
     ----------
-    model : Model
     point : Point
         To start from.
     before, after : Point
@@ -331,16 +307,5 @@ def linearise_as_coarse(model: Model, point: Point, before: Point, after: Point)
 
 
 def flow_at_centres(model: Model, point: Point, experiment: str) -> CentreFlow:
-    """Depth and velocities of one experiment at a point.
-
-    Parameters
-    ----------
-    model : Model
-    point : Point
-    experiment : str
-
-    Returns
-    -------
-    CentreFlow
-    """
+    """Depth and velocities of one experiment at a point."""
     return model.engine.flow_at_centres(model, point, experiment)

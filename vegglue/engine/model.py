@@ -34,10 +34,6 @@ LONG_CELL = 2.0
 def coarser(model: Model) -> Model | None:
     """The model on cells of twice the size.
 
-    Parameters
-    ----------
-    model : Model
-
     Returns
     -------
     Model or None
@@ -49,11 +45,6 @@ def coarser(model: Model) -> Model | None:
 
 def coarser_grid(case: Case, site: Site) -> tuple[Case, Site] | None:
     """The case on cells of twice the size, or of twice the width only if they are more than twice as long as wide.
-
-    Parameters
-    ----------
-    case : Case
-    site : Site
 
     Returns
     -------
@@ -70,13 +61,7 @@ def coarser_grid(case: Case, site: Site) -> tuple[Case, Site] | None:
 
 
 def ever_coarser(case: Case, site: Site) -> list[tuple[Case, Site]]:
-    """The case on its grid and on ever coarser ones, see `coarser_grid`, the coarsest first.
-
-    Parameters
-    ----------
-    case : Case
-    site : Site
-    """
+    """The case on its grid and on ever coarser ones, see `coarser_grid`, the coarsest first."""
     grids = [(case, site)]
     while (coarse := coarser_grid(*grids[0])) is not None:
         grids.insert(0, coarse)

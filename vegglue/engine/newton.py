@@ -127,8 +127,6 @@ def problem_at(model: Model, experiment: str, z: Array) -> Problem:
 
     Parameters
     ----------
-    model : Model
-    experiment : str
     z : (p,) or (m, p) [standard deviations of the prior]
     """
     return build_problem(model.case, model.site, experiment, theta_at(model.case, z))
@@ -254,10 +252,6 @@ def _from_coarser_cells(model: Model, experiment: str, z: Array, problem: Proble
 def on_half_as_many_cells(model: Model) -> Model | None:
     """A model on half as many cells along and across, to whole numbers.
 
-    Parameters
-    ----------
-    model : Model
-
     Returns
     -------
     Model or None
@@ -329,8 +323,6 @@ def predict_near(model: Model, point: Point, z: Array) -> Array:
 
     Parameters
     ----------
-    model : Model
-    point : Point
     z : (m, p) [standard deviations of the prior]
 
     Returns

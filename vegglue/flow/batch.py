@@ -59,7 +59,6 @@ def blend(states: Array, some: NDArray[np.int64], weights: Array, south: int, no
     some : (n,)
         Members whose states x_n are.
     weights : (b, n)
-    south, north : int
     """
     nx, rows, members = states.shape[1], north - south, weights.shape[0]
     blended, column = np.empty((nx, 3, rows, members)), np.empty((members, 3, rows))

@@ -222,7 +222,6 @@ def chord(problem: Problem, start: Array, shared: Factors, tolerance: float, mos
 
     Parameters
     ----------
-    problem : Problem
     start : (nx, 3, ny, m)
     shared : Factors
         M, of a reference member.

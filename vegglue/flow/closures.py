@@ -97,7 +97,6 @@ def bed_drag(problem: Problem, depth: Array, columns: slice = slice(None)) -> Ar
 
     Parameters
     ----------
-    problem : Problem
     depth : (columns, ny, m) [m]
         At the centres of cells.
     columns : slice
@@ -113,7 +112,6 @@ def drag(problem: Problem, depth: Array) -> Array:
 
     Parameters
     ----------
-    problem : Problem
     depth : (nx, ny, m) [m]
     """
     rate = bed_drag(problem, depth)
@@ -138,7 +136,6 @@ def wall_rates(problem: Problem, depth: Array) -> tuple[tuple[int, Array], ...]:
 
     Parameters
     ----------
-    problem : Problem
     depth : (nx, ny, m) [m]
 
     Returns
@@ -170,7 +167,6 @@ def bent_plants(problem: Problem, state: Array, depth: Array) -> tuple[Array, Ar
 
     Parameters
     ----------
-    problem : Problem
     state, depth : (nx, 3, ny, m), (nx, ny, m) [m]
     """
     geometry, stages = problem.geometry, {active.effect.stage for active in problem.effects}

@@ -61,7 +61,6 @@ def residual_of(
 
     Parameters
     ----------
-    problem : Problem
     state, depth : (nx, 3, ny, m), (nx, ny, m) [m]
     sides, closed
         See `side_fluxes` and `closures`.
@@ -126,7 +125,6 @@ def storage(problem: Problem, level: Array) -> Array:
 
     Parameters
     ----------
-    problem : Problem
     level : (nx, ny, m) [m]
     """
     above = above_bed(problem, level) - FILM_ON_LAND * problem.film
@@ -142,7 +140,6 @@ def side_fluxes(problem: Problem, depth: Array) -> tuple[Array, Array, Array]:
 
     Parameters
     ----------
-    problem : Problem
     depth : (nx, ny, m) [m]
 
     Returns
@@ -164,7 +161,6 @@ def side_discharges(problem: Problem, depth: Array) -> Array:
 
     Parameters
     ----------
-    problem : Problem
     depth : (nx, ny, m) [m]
     """
     entering = np.zeros((problem.shape[0], problem.members))
@@ -188,8 +184,6 @@ def inflow_parts(problem: Problem, inflow: InflowSegment, depth: Array) -> Array
 
     Parameters
     ----------
-    problem : Problem
-    inflow : InflowSegment
     depth : (cell, m) [m]
         Of its cells.
     """

@@ -59,9 +59,7 @@ def sharing_at(problem: Problem, state: Array, inflow: InflowSegment) -> Sharing
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, 1)
-    inflow : InflowSegment
     """
     raised = state.copy()
     raised[:, LEVEL] += RAISE
@@ -88,8 +86,6 @@ def changes_of_whole(problem: Problem, inflow: InflowSegment, before: Array, aft
 
     Parameters
     ----------
-    problem : Problem
-    inflow : InflowSegment
     before, after : (nx, ny, 1), (nx, ny, m) [m]
         Depths.
     """
@@ -123,7 +119,6 @@ def answer_to_discharge(problem: Problem, state: Array, inflow: InflowSegment) -
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, 1)
     inflow : InflowSegment
         Of the problem; Q is its discharge.
@@ -276,9 +271,7 @@ def solved(inverse: BlockFactors | SharedFactors, right: Array | Single, transpo
 
     Parameters
     ----------
-    inverse : BlockFactors or SharedFactors
     right : (nx, 3, ny, m)
-    transposed : bool
     """
     nx, _, ny, m = right.shape
     with np.errstate(over="ignore"):  # of a member that runs away, known by its correction
@@ -294,7 +287,6 @@ def jacobian(problem: Problem, state: Array) -> BlockJacobian | SparseJacobian:
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, 1)
     """
     nx, _, ny, _ = state.shape
@@ -342,7 +334,6 @@ def factors(problem: Problem, state: Array) -> Factors:
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, 1)
     """
     inverse = jacobian(problem, state).inverse()

@@ -28,7 +28,6 @@ def with_changed_term(problem: Problem, geometry: ChannelGeometry, term: Term, c
     ----------
     problem, geometry
         Of one member, and what effects see of its channel.
-    term : Term
     change
         (nx, ny, m) [unit of the term].
 

@@ -102,10 +102,8 @@ def march(problem: Problem, state: Array, time_step: float, steps: int, theta: f
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, m)
     time_step : [s]
-    steps : int
     theta : 1/2 .. 1 [-]
         Weight of the gravity terms at the end of a step.
     """
@@ -194,11 +192,9 @@ def march_to_rest(problem: Problem, start: Array, tolerance: float, how: FallBac
 
     Parameters
     ----------
-    problem : Problem
     start : (nx, 3, ny, 1)
     tolerance : [m, m/s]
         Largest correction of a steady state.
-    how : FallBack
     """
     state, per_try = start, max(round(how.span / TRIES / how.step), 1)
     for tried in range(1, TRIES + 1):

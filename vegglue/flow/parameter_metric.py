@@ -150,7 +150,6 @@ def nearest_members(coordinates: Array, some: np.ndarray, centre: Array, most: i
         Which members.
     centre : (d,)
         To which they are near.
-    most : int
     """
     return some[np.argsort(squared_distances(coordinates[some], centre), kind="stable")[:most]]
 

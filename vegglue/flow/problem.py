@@ -203,7 +203,6 @@ def above_bed(problem: Problem, level: Array) -> Array:
 
     Parameters
     ----------
-    problem : Problem
     level : (nx, ny, m) [m]
     """
     above = level - problem.bed[:, :, None]
@@ -223,7 +222,6 @@ def take(problem: Problem, members: NDArray[np.int64]) -> Problem:
 
     Parameters
     ----------
-    problem : Problem
     members : (n,)
         Their indices, which may repeat.
     """
@@ -265,7 +263,6 @@ def crop(problem: Problem, south: int, north: int) -> Problem:
 
     Parameters
     ----------
-    problem : Problem
     south, north : int
         No inflow may enter through a side that is cut off.
     """

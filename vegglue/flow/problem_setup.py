@@ -190,7 +190,6 @@ def share_under_water(case: Case, site: Site, setting: Experiment) -> Array:
     ----------
     case, site
         The case on its grid.
-    setting : Experiment
     """
     return np.clip(expected_depth(case, site, setting) / (WHERE_WATER_ENTERS * site_scales(case, site).depth), 0.0, 1.0)
 

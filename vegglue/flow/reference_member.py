@@ -97,11 +97,9 @@ def linearised_median(
 
     Parameters
     ----------
-    problem_of : callable
     parameters : int
         d.
     tolerance : [m, m/s]
-    how : FallBack
 
     Returns
     -------
@@ -135,11 +133,9 @@ def solve_alone(problem: Problem, warm: Array | None, tolerance: float, how: Fal
 
     Parameters
     ----------
-    problem : Problem
     warm : (nx, 3, ny, 1) or None
     tolerance : [m, m/s]
         Largest correction.
-    how : FallBack
     """
     spent = 0
     for start in [warm, None] if warm is not None else [None]:
@@ -209,10 +205,6 @@ def settled(problem: Problem, warm: Array | None, tolerance: float) -> Attempt:
         A state nearby to begin from (nx, 3, ny, 1); a rough estimate if None, and then by Newton only.
     tolerance
         Of corrections [m, m/s].
-
-    Returns
-    -------
-    Attempt
     """
     if warm is None:
         return _by_newton(problem, backwater(problem), tolerance, FROM_AFAR)

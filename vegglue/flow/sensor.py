@@ -437,9 +437,7 @@ def flow_fields(problem: Problem, state: Array, grid: Grid) -> FlowFields:
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, m)
-    grid : Grid
     """
     now = faces(problem, state)
     centres = _at_centres(now, slice(0, grid.x.size))[..., 0]

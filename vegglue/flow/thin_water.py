@@ -241,7 +241,6 @@ def eased(problem: Problem, state: Array, slope: Array, at_outlet: NDArray[np.bo
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, m)
     slope : (nx, 3, ny, 1) [1/s]
         `slope_of_friction` of the reference member.
@@ -260,7 +259,6 @@ def slope_of_friction(problem: Problem, state: Array) -> Array:
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, m)
     """
     depth = cell_depths(problem, state)
@@ -273,7 +271,6 @@ def thickness(problem: Problem, state: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, 1)
 
     Returns
@@ -293,7 +290,6 @@ def where_thin(problem: Problem, state: Array, thick: Array) -> NDArray[np.bool_
 
     Parameters
     ----------
-    problem : Problem
     state : (nx, 3, ny, m)
     thick : (nx, 3, ny) [m]
         h_c, see `thickness`.
@@ -308,11 +304,9 @@ def carry_thin(
 
     Parameters
     ----------
-    problem : Problem
     values : (nx, 3, ny, m) [m/s]
     state, thin, thick
         As `where_thin` has them, and what it gives.
-    back : bool
     """
     stretch(values, state, thin, *problem.wetting, thick, np.inf, back)
 

@@ -21,7 +21,6 @@ def wet_band(problem: Problem, start: Array) -> tuple[int, int]:
 
     Parameters
     ----------
-    problem : Problem
     start : (nx, 3, ny, m)
     """
     above = above_bed(problem, start[:, LEVEL]).max(axis=(0, 2))
@@ -72,7 +71,6 @@ def widen(part: Array, rows: int, band: tuple[int, int]) -> Array:
     Parameters
     ----------
     part : (nx, 3, band rows, m)
-    rows : int
     band : (start, stop)
 
     Returns
