@@ -49,7 +49,6 @@ def test_the_chance_is_that_of_a_noncentral_chi2() -> None:
     expected = scipy.stats.ncx2.sf(threshold**2, 1, length**2)
     assert detection_chance(length, threshold) == pytest.approx(np.asarray(expected), abs=1e-9)
     assert detection_chance(detected_length(threshold), threshold) == pytest.approx(np.full(2, 0.9))
-    assert detection_chance(detected_length(threshold, 0.9, 1), threshold, 1) == pytest.approx(np.full(2, 0.9))
 
 
 @pytest.mark.parametrize("gain", [0.0, 0.3, 0.6])

@@ -10,7 +10,7 @@ from vegglue.case.channel_geometry import channel_geometry
 from vegglue.case.config import load_case
 from vegglue.case.gridded_site import Site, build_site
 from vegglue.case.schema import Case
-from vegglue.case.zones import area_of, corners_of, share_in_patch
+from vegglue.case.zones import corners_of, share_in_patch, signed_area
 from vegglue.diagnosis.channel_check import PatchHidden, remarks_on_patches
 from vegglue.flow.closures import drag
 from vegglue.flow.problem_setup import build_problem
@@ -59,7 +59,7 @@ def test_a_patch_across_cells_covers_parts_of_them(tmp_path: Path) -> None:
 )
 def test_a_polygon_covers_its_area(tmp_path: Path, corners: list[list[float]]) -> None:
     case, site = case_with(tmp_path, f"polygon: {corners}")
-    meant = area_of(corners_of(case, case.plants.patches[0]))
+    meant = abs(signed_area(corners_of(case, case.plants.patches[0])))
     assert site.cover.sum() * CELL == pytest.approx(meant, rel=0.01)
     assert site.cover.min() >= 0.0
     assert site.cover.max() <= 1.0

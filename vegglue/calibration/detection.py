@@ -87,7 +87,7 @@ def detection_chance(length: Array, threshold: Array, only_sign: np.ndarray | in
     return np.asarray(ndtr(np.abs(length) - threshold) + other)
 
 
-def detected_length(threshold: Array, chance: float = PLANNED_POWER, only_sign: np.ndarray | int = 0) -> Array:
+def detected_length(threshold: Array, chance: float = PLANNED_POWER) -> Array:
     """l at which `detection_chance` is `chance`, by halving.
 
     Parameters
@@ -96,8 +96,6 @@ def detected_length(threshold: Array, chance: float = PLANNED_POWER, only_sign: 
         t [standard errors].
     chance : float
         [-]
-    only_sign : ndarray of int
-        As of `detection_chance`.
 
     Returns
     -------
@@ -106,7 +104,7 @@ def detected_length(threshold: Array, chance: float = PLANNED_POWER, only_sign: 
     """
 
     def enough(length: Array) -> Mask:
-        return np.asarray(detection_chance(length, threshold, only_sign) >= chance)
+        return np.asarray(detection_chance(length, threshold) >= chance)
 
     return lowest(enough, np.zeros_like(threshold), threshold + 10.0)
 

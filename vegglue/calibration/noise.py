@@ -22,7 +22,7 @@ import scipy.special
 from vegglue.arrays import Array
 from vegglue.decision_constants import constants
 from vegglue.errors import InputError
-from vegglue.measurements.kinds import kind_of, unstated_errors
+from vegglue.measurements.kinds import correlated_rows, unstated_errors
 from vegglue.measurements.observations import section_places
 from vegglue.parallel import in_threads
 from vegglue.wording.sentences import sentence
@@ -163,11 +163,10 @@ def _separation(used: pd.DataFrame) -> Array:
     """
     separation = np.full((len(used), len(used)), np.inf)
     np.fill_diagonal(separation, 0.0)
-    correlated = np.array([kind_of(str(name)).correlated for name in used["kind"]], dtype=bool)
     keys = used[["experiment", "section", "kind"]].agg("\n".join, axis=1).to_numpy()
     own = used[["x", "y"]].to_numpy(float)
     in_line = np.column_stack([section_places(used).to_numpy(float), own[:, 1]])
-    for key in np.unique(keys[correlated]):
+    for key in np.unique(keys[correlated_rows(used)]):
         here = np.flatnonzero(keys == key)
         line = np.unique(in_line[here], axis=0)
         spacing = np.median(np.hypot(*np.diff(line, axis=0).T)) if len(line) > 1 else 1.0

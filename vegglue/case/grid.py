@@ -214,8 +214,7 @@ def curvature_of(grid: Grid) -> Array:
     """kappa = dtheta/ds of the centreline in each column of cells, (nx,) [1/m], positive where it turns left."""
     if grid.centreline is None:
         return np.zeros(grid.x.size)
-    edges = np.append(grid.x - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx)
-    return np.asarray(np.diff(heading_at(grid.centreline, edges)) / grid.dx)
+    return np.asarray(np.diff(heading_at(grid.centreline, edges(grid.x, grid.dx))) / grid.dx)
 
 
 def cell_stretch(grid: Grid) -> Array:
@@ -235,3 +234,8 @@ def places_on_map(grid: Grid) -> tuple[Array, Array]:
 def centres(edge: float, size: float, count: int) -> Array:
     """x_i = edge + (i + 1/2) size, shape (count,) [m]."""
     return np.asarray(edge + (np.arange(count) + 0.5) * size, dtype=np.float64)
+
+
+def edges(middles: Array, size: float) -> Array:
+    """The edges (n + 1,) of n cells side by side, from their centres and their size [m]: the inverse of `centres`."""
+    return np.append(middles - 0.5 * size, middles[-1] + 0.5 * size)

@@ -156,6 +156,12 @@ def theta_at(case: Case, z: Array) -> dict[str, Array]:
     return parameters_at(case, ndtr(np.clip(np.atleast_2d(z), -FURTHEST, FURTHEST)))
 
 
+def thetas_at(case: Case, z: Array) -> list[dict[str, float]]:
+    """`theta_at` z (m, p), one member after the other [units of the parameters]."""
+    theta = theta_at(case, z)
+    return [{name: float(values[member]) for name, values in theta.items()} for member in range(len(z))]
+
+
 def z_at(case: Case, theta: dict[str, Array]) -> Array:
     """z_j = Phi^-1(F_j(theta_j)) (m, p) [-], the inverse of `theta_at`, at most FURTHEST from 0.
 

@@ -66,15 +66,15 @@ def in_polygon(corners: Polygon, grid: Grid) -> Mask:
     return inside
 
 
-def area_of(outline: Array) -> float:
-    """A = |sum(x_i y_(i+1) - x_(i+1) y_i)| / 2 [m2].
+def signed_area(outline: Array) -> float:
+    """A = sum(x_i y_(i+1) - x_(i+1) y_i) / 2 [m2], above 0 counterclockwise.
 
     Parameters
     ----------
     outline : (corners, 2) [m]
     """
     x, y = outline.T
-    return float(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 # Lines in each row of cells along which a polygon is measured [-]: of a side along the channel a cell is then known to

@@ -17,7 +17,7 @@ from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds, prior_range, value_at
 from vegglue.case.schema import Case
 from vegglue.case.survey_error import stands_out
-from vegglue.case.zones import BANK_SLOPE, area_of, corners_of, share_in_patch, slope
+from vegglue.case.zones import BANK_SLOPE, corners_of, share_in_patch, signed_area, slope
 from vegglue.diagnosis.flow_check import dry_outlets
 from vegglue.measurements.kinds import UnstatedErrors, Unused, unstated_errors
 from vegglue.measurements.observations import Observations
@@ -363,7 +363,7 @@ def remarks_on_patches(case: Case, site: Site) -> Iterator[object]:
     cell, (x, y) = site.grid.dx * site.grid.dy, (site.grid.x, site.grid.y)
     for index, patch in enumerate(case.plants.patches):
         corners = corners_of(case, patch)
-        area, share = area_of(corners), share_in_patch(case, patch, site.grid)
+        area, share = abs(signed_area(corners)), share_in_patch(case, patch, site.grid)
         covered, hidden = float(share.sum() * cell), int(((share > 0.5) & (site.patch != index)).sum())
         beyond = None
         for axis, along, (low, high) in zip("xy", corners.T, (case.grid.x, case.grid.y), strict=True):

@@ -12,7 +12,7 @@ import scipy.linalg
 from scipy.special import chdtri, ndtri
 
 from vegglue.arrays import Array
-from vegglue.calibration.baseline import Baseline, SearchModel, model_that_errs, with_error_there
+from vegglue.calibration.baseline import Baseline, SearchModel, grid_difference, model_that_errs, with_error_there
 from vegglue.calibration.fit import interval95
 from vegglue.calibration.model_error import (
     CellResponses,
@@ -138,7 +138,7 @@ def expected_errors(base: Baseline, held_out: Model, there: Point) -> tuple[Arra
     mean, covariance = errors_elsewhere(where, at_stations[where.noise.rows], elsewhere, point)
     of_discharge = ModelError(discharge=allowed.discharge)
     own = site_error_columns(cells, point, of_discharge, CellResponses(cells.site.grid, {}))
-    of_grid = constants().grid_error_share * (there.prediction - (there if on_coarse is None else on_coarse).prediction)
+    of_grid = constants().grid_error_share * grid_difference(there, on_coarse)
     variance = np.diag(covariance) + (own**2).sum(axis=1) + of_grid**2
     return mean, np.sqrt(np.maximum(variance, 0.0))
 

@@ -19,7 +19,7 @@ from vegglue.case.schema import Case
 from vegglue.case.zones import corners_of, distance_to_outline
 from vegglue.diagnosis.flow_check import dry_outlets, exchanged_components
 from vegglue.measurements.adv_section import average_of, upward_column
-from vegglue.measurements.kinds import Unused, kind_of, velocity_rows
+from vegglue.measurements.kinds import Unused, kind_of, point_rows, velocity_rows
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plausibility import ImplausibleOutlet, ImplausibleValues, implausible_values
 from vegglue.measurements.section_discharge import neighbour_error
@@ -160,7 +160,7 @@ def remarks_on_stations(case: Case, site: Site, observations: Observations) -> I
 def remarks_on_land(case: Case, site: Site, observations: Observations) -> Iterator[StationsOnLand]:
     """Of each experiment the stations above the expected water; none if its outlet is dry, a remark of its own."""
     table, dry_ones = observations.table, dry_outlets(case, site)
-    inside = table[(table["reason"] != Unused.OUTSIDE) & _at_point(table) & ~table["experiment"].isin(list(dry_ones))]
+    inside = table[(table["reason"] != Unused.OUTSIDE) & point_rows(table) & ~table["experiment"].isin(list(dry_ones))]
     for experiment, rows in inside.groupby("experiment", sort=False):
         depth = expected_depth(case, in_experiment(site, str(experiment)), case.experiments[str(experiment)])
         i, j = (np.abs(np.subtract.outer(rows[name].to_numpy(), at)).argmin(axis=1)
@@ -174,7 +174,7 @@ def remarks_on_land(case: Case, site: Site, observations: Observations) -> Itera
 
 def remarks_on_shared_places(observations: Observations) -> Iterator[SharedPlaces]:
     """Stations in use where another of their kind and experiment stands: a file may be a copy, or a place wrong."""
-    table = observations.table[observations.table["used"] & _at_point(observations.table)]
+    table = observations.table[observations.table["used"] & point_rows(observations.table)]
     shared = table[table.duplicated(["experiment", "kind", "x", "y"], keep=False)]
     for (experiment, kind), rows in shared.groupby(["experiment", "kind"], sort=False):
         x, y = _first(rows)
@@ -243,10 +243,6 @@ def remarks_on_implausible_values(
     table, exchanged = observations.table, exchanged_components(case, observations)
     excused = velocity_rows(table) & table["experiment"].isin(list(exchanged))
     return implausible_values(case, site, table.assign(used=table["used"] & ~excused))
-
-
-def _at_point(table: pd.DataFrame) -> np.ndarray:
-    return np.array([kind_of(str(kind)).at_point for kind in table["kind"]], dtype=bool)
 
 
 def _first(table: pd.DataFrame) -> Place:

@@ -19,7 +19,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array
-from vegglue.case.parameter_space import FURTHEST, theta_at
+from vegglue.case.parameter_space import FURTHEST, thetas_at
 from vegglue.engine.command import CommandRuns, command_predictions, own_parameters
 from vegglue.engine.interface import Cause, Engine, Model, Point, Wanted, linearise
 from vegglue.engine.newton import NEWTON
@@ -233,7 +233,7 @@ def correction_at(runs: CommandRuns, model: Model, z: Array, watch: Watch, slope
 
 
 def without_effects(model: Model) -> Model:
-    """The model that a command stands for: no effects, the parameters that the command is given, the built-in engine."""
+    """The model that a command stands for: no effects, the parameters that the command gets, the built-in engine."""
     names = own_parameters(model.case)
     parameters = {name: model.case.parameters[name] for name in names}
     return replace(model, case=model.case.model_copy(update={"effects": {}, "parameters": parameters}), engine=NEWTON)
@@ -246,7 +246,5 @@ def _own_parameters(model: Model, z: Array, names: Sequence[str]) -> Array:
 
 def _run_command(runs: CommandRuns, model: Model, bare: Model, z: Array, watch: Watch) -> tuple[Array, list[str]]:
     """Runs of the command at z (m, q)."""
-    theta = theta_at(bare.case, z)
-    thetas = [{name: float(values[member]) for name, values in theta.items()} for member in range(len(z))]
     why = RUNNING_COMMAND.format(model.case.name)
-    return command_predictions(runs, bare.case, model.station, thetas, watch, why)
+    return command_predictions(runs, bare.case, model.station, thetas_at(bare.case, z), watch, why)

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from vegglue.arrays import Array, Single
-from vegglue.case.grid import Grid
+from vegglue.case.grid import Grid, edges
 from vegglue.effects.active_effect import ActiveEffect, applied
 from vegglue.effects.physical_constants import FILM_ON_LAND
 from vegglue.effects.surroundings import Reading, across
@@ -103,8 +103,7 @@ def between(points: Array, first: float, step: float, size: int) -> tuple[NDArra
 
 def nearest_face(grid: Grid, x: float) -> int:
     """The west-east face nearest to x [m], 0 .. nx."""
-    edges = np.append(grid.x - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx)
-    return int(np.argmin(np.abs(edges - x)))
+    return int(np.argmin(np.abs(edges(grid.x, grid.dx) - x)))
 
 
 def _surrounding_centres(

@@ -18,6 +18,7 @@ from vegglue.arrays import Array
 from vegglue.case.grid import Centreline, centreline_of
 from vegglue.case.resolved_config import Tree
 from vegglue.case.site_schema import NEAREST_POINTS, CentrelineShape, Frame
+from vegglue.case.zones import signed_area
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import UNITS, names_without_unit, role_of, words_of
 from vegglue.importers.column_roles import columns_of_table, taken_as_si
@@ -320,10 +321,8 @@ def _outlines(geometry: Mapping[str, Any]) -> Iterator[Ring]:
     the other way round, so that their areas are taken off.
     """
 
-    def area(ring: Ring) -> float:
-        """A = sum((x_i - x_0) (y_(i+1) - y_0) - (x_(i+1) - x_0) (y_i - y_0)) / 2, above 0 counterclockwise."""
-        x, y = (np.array(ring) - ring[0]).T
-        return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    def runs_left(ring: Ring) -> bool:
+        return signed_area(np.array(ring) - ring[0]) > 0.0  # from its first corner: map coordinates are large
 
     parts = {"Polygon": [geometry["coordinates"]], "MultiPolygon": geometry["coordinates"]}
     for part in parts.get(geometry["type"], []):
@@ -332,7 +331,7 @@ def _outlines(geometry: Mapping[str, Any]) -> Iterator[Ring]:
             outer, *holes = [ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring for ring in rings]
             outline = list(outer)
             for hole in holes:
-                turned = hole[::-1] if (area(hole) > 0.0) == (area(outer) > 0.0) else hole
+                turned = hole[::-1] if runs_left(hole) == runs_left(outer) else hole
                 outline += [outer[0], *turned, turned[0]]
             yield outline
 

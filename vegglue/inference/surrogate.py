@@ -32,7 +32,7 @@ from scipy.spatial.distance import cdist
 from vegglue.arrays import Array, Mask
 from vegglue.calibration.fit import fit_from
 from vegglue.calibration.noise import Noise, with_more_error
-from vegglue.case.parameter_space import middle_value, theta_at
+from vegglue.case.parameter_space import middle_value, theta_at, thetas_at
 from vegglue.engine.command import CommandRuns, command_predictions
 from vegglue.engine.corrected import rows_of_stations, with_correction, without_effects
 from vegglue.engine.interface import Model, linearise, predict
@@ -294,9 +294,7 @@ def learn(command: CommandToLearn, base: ModesAndErrors, start: Mixture, watch: 
 
     def difference_at(z: Array) -> Array:
         """f_c - F_0 (m, n) at z (m, q), NaN if the command failed or there is no flow."""
-        theta = theta_at(bare.case, z)
-        thetas = [{name: float(values[row]) for name, values in theta.items()} for row in range(len(z))]
-        why = LEARNING.format(case.name)
+        thetas, why = thetas_at(bare.case, z), LEARNING.format(case.name)
         found, _ = command_predictions(command.runs, bare.case, model.station, thetas, watch, why)
         return found - predict(bare, [middle], z)
 

@@ -112,13 +112,8 @@ KINDS = {
 }
 
 
-def kind_of(name: str, where: str = "observations") -> Kind:
+def kind_of(name: str) -> Kind:
     """The kind of that name.
-
-    Parameters
-    ----------
-    where : str
-        How a refusal begins.
 
     Raises
     ------
@@ -126,7 +121,7 @@ def kind_of(name: str, where: str = "observations") -> Kind:
         If it is none of KINDS.
     """
     if name not in KINDS:
-        raise InputError(f"{where}: expected a kind among {', '.join(KINDS)}, got {name!r}; correct it.")
+        raise InputError(f"observations: expected a kind among {', '.join(KINDS)}, got {name!r}; correct it.")
     return KINDS[name]
 
 
@@ -143,6 +138,16 @@ def velocity_rows(station: pd.DataFrame) -> NDArray[np.bool_]:
         If a kind is unknown.
     """
     return np.array([kind_of(str(name)).velocity for name in station["kind"]], dtype=bool)
+
+
+def point_rows(station: pd.DataFrame) -> NDArray[np.bool_]:
+    """Which stations measure at a point (x, y), not through a section at x (station,); as `velocity_rows`."""
+    return np.array([kind_of(str(name)).at_point for name in station["kind"]], dtype=bool)
+
+
+def correlated_rows(station: pd.DataFrame) -> NDArray[np.bool_]:
+    """Which stations have errors that neighbours of their section share (station,); as `velocity_rows`."""
+    return np.array([kind_of(str(name)).correlated for name in station["kind"]], dtype=bool)
 
 
 def leading_velocities(station: pd.DataFrame) -> NDArray[np.bool_]:

@@ -12,7 +12,18 @@ from vegglue.case.size_limits import MOST_STATIONS
 from vegglue.errors import InputError, shown_path
 from vegglue.measurements.adv_section import Section, across_averages, average_of, read_section
 from vegglue.measurements.csv_table import read_table, refuse_repeated, refuse_rows
-from vegglue.measurements.kinds import KINDS, STREAMWISE, TRANSVERSE, WATER_LEVEL, Kind, Unused, kind_of
+from vegglue.measurements.kinds import (
+    KINDS,
+    STREAMWISE,
+    TRANSVERSE,
+    WATER_LEVEL,
+    Kind,
+    Unused,
+    correlated_rows,
+    kind_of,
+    point_rows,
+    velocity_rows,
+)
 from vegglue.measurements.section_discharge import Discharge
 from vegglue.measurements.vertical_profile import CanopyHeight, ProfileFit
 from vegglue.wording.numbers import nearest
@@ -176,18 +187,16 @@ def read_observations(case: Case) -> Observations:
         )
     table = station_table(*stations)
     # Outside the grid the model has no flow. A discharge has no y of its own.
-    at_point = np.array([kind_of(name).at_point for name in table["kind"]], dtype=bool)
-    inside = table["x"].between(*case.grid.x) & (table["y"].between(*case.grid.y) | ~at_point)
+    inside = table["x"].between(*case.grid.x) & (table["y"].between(*case.grid.y) | ~point_rows(table))
     reason = table["reason"].mask(table["used"] & ~inside, Unused.OUTSIDE)
     table = table.assign(used=table["used"] & inside, reason=reason)
     if case.friction.walls is not None:
         (south, north), half_cell = case.grid.y, NEAR_WALL * case.grid.cell[1]
         beside = np.minimum(table["y"] - south, north - table["y"]) < half_cell
-        beside &= np.array([kind_of(name).velocity for name in table["kind"]], dtype=bool) & table["used"]
+        beside &= velocity_rows(table) & table["used"]
         table = table.assign(used=table["used"] & ~beside, reason=table["reason"].mask(beside, Unused.AT_WALL))
     # Errors of two stations at one place of a section would count as one error.
-    correlated = np.array([kind_of(name).correlated for name in table["kind"]], dtype=bool)
-    twice = table.duplicated(["experiment", "section", "kind", "x", "y"]) & correlated
+    twice = table.duplicated(["experiment", "section", "kind", "x", "y"]) & correlated_rows(table)
     if twice.any():
         one = table.loc[twice.idxmax()]
         raise InputError(

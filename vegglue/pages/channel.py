@@ -14,6 +14,7 @@ from matplotlib.patches import Polygon
 
 from vegglue.arrays import Array
 from vegglue.case.channel_geometry import expected_depth
+from vegglue.case.grid import edges
 from vegglue.case.gridded_site import Site, in_experiment
 from vegglue.case.parameter_space import Bounds
 from vegglue.case.schema import Case
@@ -107,8 +108,7 @@ def _draw_plan(axes: Axes, case: Case, site: Site, observations: Observations) -
     grid, table = site.grid, observations.table
     axes.imshow(
         site.friction_class.T, origin="lower", aspect="auto", interpolation="nearest", vmin=-0.5,
-        extent=(grid.x[0] - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx, grid.y[0] - 0.5 * grid.dy,
-                grid.y[-1] + 0.5 * grid.dy),
+        extent=(*edges(grid.x, grid.dx)[[0, -1]], *edges(grid.y, grid.dy)[[0, -1]]),
         cmap=ListedColormap([_class_colour(index) for index in range(len(site.class_names))]),
         vmax=len(site.class_names) - 0.5,
     )  # fmt: skip

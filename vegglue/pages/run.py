@@ -15,7 +15,7 @@ from vegglue.case.schema import Case
 from vegglue.flow.problem import VegetatedCells
 from vegglue.flow.problem_setup import build_problem
 from vegglue.flow.sensor import FlowFields
-from vegglue.measurements.kinds import kind_of
+from vegglue.measurements.kinds import point_rows
 from vegglue.measurements.observations import Observations
 from vegglue.measurements.plant_survey import RigidCylinder
 from vegglue.pages.style import Picture, publish, publish_text
@@ -137,5 +137,4 @@ def station_zones(run: Run) -> list[str]:
     names = np.array(run.site.class_names)[run.site.friction_class[column, row]]
     cells = {experiment: planted_cells(run, experiment) for experiment in table["experiment"].unique()}
     among = [cells[experiment][i, j] for experiment, i, j in zip(table["experiment"], column, row, strict=True)]
-    whole = [not kind_of(name).at_point for name in table["kind"]]
-    return [str(name) for name in np.where(whole, "section", np.where(among, "plants", names))]
+    return [str(name) for name in np.where(point_rows(table), np.where(among, "plants", names), "section")]

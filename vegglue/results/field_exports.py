@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from vegglue.arrays import Array
-from vegglue.case.grid import Grid, heading_at, on_map
+from vegglue.case.grid import Grid, edges, heading_at, on_map
 from vegglue.case.site_schema import Frame
 from vegglue.case.text_files import names_in_files, write_text
 from vegglue.errors import InputError
@@ -172,11 +172,9 @@ def write_mesh(
 def _mesh(grid: Grid, frame: Frame | None) -> dict[str, Any]:
     """Topology, nodes and faces; faces in the order of cells, the last axis fastest, their nodes anticlockwise."""
     nx, ny = grid.x.size, grid.y.size
-    edges_x = np.append(grid.x - 0.5 * grid.dx, grid.x[-1] + 0.5 * grid.dx)
-    edges_y = np.append(grid.y - 0.5 * grid.dy, grid.y[-1] + 0.5 * grid.dy)
     first = (np.arange(nx)[:, None] * (ny + 1) + np.arange(ny)[None, :]).ravel()
     corners = np.column_stack([first, first + ny + 1, first + ny + 2, first + 1])
-    node_x, node_y = _placed(edges_x, edges_y, grid, frame)
+    node_x, node_y = _placed(edges(grid.x, grid.dx), edges(grid.y, grid.dy), grid, frame)
     face_x, face_y = _placed(grid.x, grid.y, grid, frame)
     topology = {
         "cf_role": "mesh_topology", "topology_dimension": np.int32(2), "node_coordinates": "node_x node_y",

@@ -18,7 +18,7 @@ from vegglue.arrays import Array
 from vegglue.calibration.baseline import Baseline, baseline, for_prediction, kept_baseline, log_evidence
 from vegglue.calibration.fit import fit
 from vegglue.case.gridded_site import Site, build_site
-from vegglue.case.parameter_space import theta_at, z_at
+from vegglue.case.parameter_space import thetas_at, z_at
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.case.size_limits import MOST_MEMBERS
@@ -316,7 +316,7 @@ def calibrated_anew(model: Model, known: Array | None, aside: pd.DataFrame) -> B
 
 def best_parameters(base: Baseline) -> dict[str, float]:
     """The parameters of a calibrated model by name, in their units."""
-    return {name: float(value[0]) for name, value in theta_at(base.model.case, base.fitted.point.z).items()}
+    return thetas_at(base.model.case, base.fitted.point.z[None])[0]
 
 
 def calibrated(run: CaseRun, aside: pd.DataFrame) -> Baseline:

@@ -13,7 +13,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.calibration.baseline import CommandPlace, command_place
-from vegglue.case.parameter_space import theta_at, z_at
+from vegglue.case.parameter_space import thetas_at, z_at
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
@@ -224,9 +224,7 @@ def command_tried(model: Model, folder: Path) -> CommandTried:
     middle, runs = np.zeros(len(bare.names)), command_runs(case, folder)
 
     def run_at(points: Array) -> dict[int, CommandEnd]:
-        thetas = theta_at(bare.case, points)
-        each = [{name: float(value[row]) for name, value in thetas.items()} for row in range(len(points))]
-        return dict(ended_runs(runs, bare.case, model.station, each))
+        return dict(ended_runs(runs, bare.case, model.station, thetas_at(bare.case, points)))
 
     end = run_at(middle[None])[0]
     if end.prediction is None:

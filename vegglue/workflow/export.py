@@ -11,7 +11,7 @@ import numpy as np
 
 from vegglue.arrays import Array
 from vegglue.case.grid import build_grid
-from vegglue.case.parameter_space import refuse_without_parameters, sobol_sample, theta_at
+from vegglue.case.parameter_space import refuse_without_parameters, sobol_sample, thetas_at
 from vegglue.case.resolved_config import case_hash, resolved_yaml, simulation_hash
 from vegglue.case.schema import Case
 from vegglue.case.text_files import LONGEST_IN_FILES, names_in_files
@@ -229,9 +229,8 @@ def flow_to_export(run: CaseRun) -> tuple[dict[str, FlowFields], Array | None, s
         return median_flow(sized, posterior), predicted, phrase("flow_of", "posterior", False, case.engine is not None)
     best = kept_best_fit(case, folder)
     z = np.zeros(len(case.parameters)) if best is None else best
-    theta = {name: float(value[0]) for name, value in theta_at(case, z[None]).items()}
     words = phrase(
         "flow_of", "prior" if best is None else "best-fit", (folder / "posterior.h5").exists(), case.engine is not None
     )
     point = linearise(run.model, z)
-    return solve_flow(case, theta), None if point is None else point.prediction, words
+    return solve_flow(case, thetas_at(case, z[None])[0]), None if point is None else point.prediction, words

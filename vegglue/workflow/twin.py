@@ -20,7 +20,7 @@ from vegglue.case.schema import Case
 from vegglue.case.text_files import LARGEST_JSON, case_name, read_text
 from vegglue.effects.grammar import LAWS
 from vegglue.errors import InputError, path_from, shown_command, shown_path
-from vegglue.measurements.kinds import KINDS, kind_of
+from vegglue.measurements.kinds import KINDS, point_rows
 from vegglue.parallel import one_thread
 from vegglue.results.diagnosis import Diagnosis
 from vegglue.results.result_files import diagnosis_that_fits
@@ -76,7 +76,7 @@ def write_twin(case: Case, folder: Path, station: pd.DataFrame, seal: str, force
     name = case_name(folder.resolve().name, "twin")
     used, line = station[station["used"]], centreline_in(case)
     if line is not None:  # files of stations have points on the map
-        at_point = np.array([kind_of(kind).at_point for kind in used["kind"]])
+        at_point = point_rows(used)
         x, y = on_map(line, used["x"].to_numpy(float), used["y"].to_numpy(float))
         used = used.assign(x=used["x"].where(~at_point, x), y=used["y"].where(~at_point, y))
     kinds = [kind for kind in KINDS.values() if (used["kind"] == kind.name).any()]
