@@ -3,7 +3,7 @@
 import re
 import sys
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from hashlib import sha256
 from multiprocessing import current_process
 from pathlib import Path
@@ -69,17 +69,16 @@ def _cached(loop: Callable[..., Any], **flags: Any) -> Any:
     index: Any = getattr(getattr(kept, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):  # documented nowhere: a numba without it caches as it always does
         index._source_stamp = (index._source_stamp, _stamp(Path(loop.__code__.co_filename)))
-        index.save = partial(_save, index)
+
+        def save(key: tuple[Any, ...], code: Any) -> None:
+            # In a file named after its types: two processes that number files may give two of them one name, and the
+            # index of one then leads to the code of the other.
+            types = sha256(repr(key).encode()).hexdigest()[:16]
+            index._data_name_pattern = f"{index._index_name}.{types}.{{number:d}}.nbc"
+            type(index).save(index, key, code)
+
+        index.save = save
     return kept
-
-
-def _save(index: Any, key: tuple[Any, ...], code: Any) -> None:
-    """Keep machine code in a file named after its types: two processes that number files may give two of them one name,
-    and the index of one then leads to the code of the other.
-    """
-    types = sha256(repr(key).encode()).hexdigest()[:16]
-    index._data_name_pattern = f"{index._index_name}.{types}.{{number:d}}.nbc"
-    type(index).save(index, key, code)
 
 
 @cache

@@ -177,7 +177,7 @@ def test_a_set_is_worth_at_least_what_equally_spaced_transects_are(model: Model,
     budget, flows = 9.0, frozenset({"low"})
     chosen = search.best_set(budget)
     assert 0.0 < search.hours(chosen, frozenset()) <= budget + 1e-6
-    spaced = search._equally_spaced(budget, flows)
+    spaced = search.equally_spaced(budget, flows)
     x = [sorted({wide.pieces[j].x for j in some}) for some in spaced]
     assert [len(some) for some in x] == list(range(1, len(x) + 1))
     assert x[1] == pytest.approx(np.array([1, 2]) * model.case.grid.x[1] / 3.0, abs=1.0)

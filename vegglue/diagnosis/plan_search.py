@@ -450,18 +450,10 @@ class PlanSearch:
             sets = in_threads(self._best_in, [(budget, more) for more in others])
             found, more = max(zip(sets, others, strict=True), key=lambda one: self.worth(one[0]), default=(best, flows))
             if self.worth(found) <= self.worth(best) + LEAST_PLAN_GAIN:
-                return self._exchanged(budget, best, flows)
+                break
             best, flows = found, more
-
-    def _best_in(self, budget: float, flows: Flows[str]) -> list[int]:
-        """Pieces in some flows by gain per hour, from nothing, or from the best equally spaced transects that fit."""
-        spaced = max(self._equally_spaced(budget, flows), key=self.worth, default=[])
-        return max(in_threads(self._filled, [(budget, some, flows) for some in ([], spaced)]), key=self.worth)
-
-    def _exchanged(self, budget: float, best: list[int], flows: Flows[str]) -> list[int]:
-        """Each piece in turn left out, and its hours filled, while that helps."""
         before = self.worth(best)
-        for _ in range(EXCHANGES):
+        for _ in range(EXCHANGES):  # each piece in turn left out, and its hours filled, while that helps
             helped = False
             for j in best:
                 again = self._filled(budget, [k for k in best if k != j], flows)
@@ -471,12 +463,12 @@ class PlanSearch:
                 break
         return best
 
-    def _left(self, budget: float, pieces: Sequence[int], flows: Flows[str]) -> float:
-        """Hours that are left of a budget in some flows, all of them measured in."""
-        further = len(flows - self.present) - (0 if self.present else 1)
-        return budget - self.another * max(further, 0) - sum(self.wide.pieces[j].hours for j in pieces) + 1e-9
+    def _best_in(self, budget: float, flows: Flows[str]) -> list[int]:
+        """Pieces in some flows by gain per hour, from nothing, or from the best equally spaced transects that fit."""
+        spaced = max(self.equally_spaced(budget, flows), key=self.worth, default=[])
+        return max(in_threads(self._filled, [(budget, some, flows) for some in ([], spaced)]), key=self.worth)
 
-    def _equally_spaced(self, budget: float, flows: Flows[str]) -> list[list[int]]:
+    def equally_spaced(self, budget: float, flows: Flows[str]) -> list[list[int]]:
         """Transects at places of equal distance, with a gauge at each, in all of some flows; all that fit."""
         pieces, (low, high) = self.wide.pieces, self.wide.case.grid.x
         # Of a transect and the same with every second vertical the whole one, which stands first.
@@ -491,6 +483,11 @@ class PlanSearch:
                 break
             found.append(some)
         return found
+
+    def _left(self, budget: float, pieces: Sequence[int], flows: Flows[str]) -> float:
+        """Hours that are left of a budget in some flows, all of them measured in."""
+        further = len(flows - self.present) - (0 if self.present else 1)
+        return budget - self.another * max(further, 0) - sum(self.wide.pieces[j].hours for j in pieces) + 1e-9
 
     def _filled(self, budget: float, chosen: list[int], flows: Flows[str]) -> list[int]:
         """More pieces in some flows, or of none, by gain per hour."""

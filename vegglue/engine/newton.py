@@ -181,8 +181,24 @@ def _point(model: Model, z: Array, flows: Mapping[str, tuple[SteadyFlow, Array]]
         prediction[model.rows[experiment]] = values
     if not wanted(prediction):
         return None
-    tasks = [(model, experiment, z, flow) for experiment, (flow, _) in flows.items()]
-    sloping = dict(zip(flows, in_threads(_with_slopes, tasks), strict=True))
+    p, steps = z.size, DIFFERENCE_STEP * np.eye(z.size)
+
+    def with_slopes(experiment: str, flow: SteadyFlow) -> tuple[SteadyFlow, Array]:
+        """The flow with its slopes d state / dz, and those of its predictions (stations of the experiment, p)."""
+        ends = problem_at(model, experiment, np.concatenate([z + steps, z - steps]))  # ahead in each z, then behind
+        rates = residual(crop(ends, *flow.band), np.repeat(flow.state, 2 * p, axis=3))
+        causes = (rates[..., :p] - rates[..., p:]) / (2.0 * DIFFERENCE_STEP)
+        base = crop(problem_at(model, experiment, z), *flow.band)
+        if flow.moved >= CLOSE:  # made only now: of a flow that is not wanted none are
+            flow = replace(flow, factors=factors(base, flow.state), moved=0.0)
+        slopes = tangents(base, flow.state, flow.factors, causes, TANGENT_TOLERANCE)
+        moved = DIFFERENCE_STEP * slopes
+        states = np.concatenate([flow.state + moved, flow.state - moved], axis=3)
+        read = _read_stations(model, experiment, ends, states, flow.band)
+        return replace(flow, slopes=slopes), (read[:p] - read[p:]).T / (2.0 * DIFFERENCE_STEP)
+
+    tasks = [(experiment, flow) for experiment, (flow, _) in flows.items()]
+    sloping = dict(zip(flows, in_threads(with_slopes, tasks), strict=True))
     for experiment, (_, slopes) in sloping.items():
         slope[model.rows[experiment]] = slopes
     if np.isnan(slope[np.isfinite(prediction)]).any():  # an effect of a user's file gives no numbers beside this flow
@@ -273,22 +289,6 @@ def _step_of_known(known: Array, z: Array) -> Array:
     added since has the last of z.
     """
     return z[: known.size] - known if known.size <= z.size else np.zeros(0)
-
-
-def _with_slopes(model: Model, experiment: str, z: Array, flow: SteadyFlow) -> tuple[SteadyFlow, Array]:
-    """The flow with its slopes d state / dz, and those of its predictions (stations of the experiment, p)."""
-    p, steps = z.size, DIFFERENCE_STEP * np.eye(z.size)
-    ends = problem_at(model, experiment, np.concatenate([z + steps, z - steps]))  # ahead in each z, then behind
-    rates = residual(crop(ends, *flow.band), np.repeat(flow.state, 2 * p, axis=3))
-    causes = (rates[..., :p] - rates[..., p:]) / (2.0 * DIFFERENCE_STEP)
-    base = crop(problem_at(model, experiment, z), *flow.band)
-    if flow.moved >= CLOSE:  # made only now: of a flow that is not wanted none are
-        flow = replace(flow, factors=factors(base, flow.state), moved=0.0)
-    slopes = tangents(base, flow.state, flow.factors, causes, TANGENT_TOLERANCE)
-    moved = DIFFERENCE_STEP * slopes
-    states = np.concatenate([flow.state + moved, flow.state - moved], axis=3)
-    read = _read_stations(model, experiment, ends, states, flow.band)
-    return replace(flow, slopes=slopes), (read[:p] - read[p:]).T / (2.0 * DIFFERENCE_STEP)
 
 
 def _predict_members(model: Model, points: Sequence[Point], z: Array) -> Array:

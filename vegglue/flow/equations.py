@@ -79,7 +79,23 @@ def residual_of(
         problem.dy,
         problem.bend,
     )
-    _add_confluences(problem, out, state[:, ALONG], depth)
+    u = state[:, ALONG]
+    for inflow in boundaries.inflows:
+        if inflow.side == "west":
+            continue
+        # What joins has to be brought from its own u_in to that of the flow: c (u - u_in) / dy beside inflows through
+        # the sides, c their speed. Speeds of an east face are those of both its cells.
+        row, part = 0 if inflow.side == "south" else -1, slice(inflow.start, inflow.stop)
+        entering, brought = np.zeros((2, problem.shape[0] + 1, problem.members))
+        flux = _inflow_flux(problem, inflow, depth[part, row])
+        lift = _stretch_of(problem, inflow, 0.0) / _stretch_of(problem, inflow, 0.5)
+        entering[:-1][part] = flux * lift
+        brought[:-1][part] = flux**2 / depth[part, row] * inflow.along * lift
+        entering[-1], brought[-1] = entering[-2], brought[-2]  # the last face has one cell alone
+        h = np.concatenate([depth[:, row], depth[-1:, row]])
+        both = problem.dy * (h[:-1] + h[1:])
+        missing = (entering[:-1] + entering[1:]) * u[:, row] - (brought[:-1] + brought[1:])
+        out[:, ALONG, row] += missing / both
     for row, rate in wall_rates(problem, depth):
         along = state[:, ALONG, row]
         out[:, ALONG, row] += rate * np.sqrt(along**2 + kernels.REST_SPEED**2) * along
@@ -209,23 +225,3 @@ def _stretch_of(problem: Problem, inflow: InflowSegment, rows: float) -> Array:
     from_south = rows if inflow.side == "south" else problem.shape[1] - rows
     y = problem.bend.south + from_south * problem.dy
     return np.asarray(1.0 - y * problem.bend.at_cells[inflow.start : inflow.stop, None])
-
-
-def _add_confluences(problem: Problem, out: Array, u: Array, depth: Array) -> None:
-    """Add c (u - u_in) / dy to R_u (nx, 3, ny, m) beside inflows through the sides, c their speed: what joins has to be
-    brought from its own u_in to that of the flow. Speeds of an east face are those of both its cells.
-    """
-    for inflow in problem.boundaries.inflows:
-        if inflow.side == "west":
-            continue
-        row, part = 0 if inflow.side == "south" else -1, slice(inflow.start, inflow.stop)
-        entering, brought = np.zeros((2, problem.shape[0] + 1, problem.members))
-        flux = _inflow_flux(problem, inflow, depth[part, row])
-        lift = _stretch_of(problem, inflow, 0.0) / _stretch_of(problem, inflow, 0.5)
-        entering[:-1][part] = flux * lift
-        brought[:-1][part] = flux**2 / depth[part, row] * inflow.along * lift
-        entering[-1], brought[-1] = entering[-2], brought[-2]  # the last face has one cell alone
-        h = np.concatenate([depth[:, row], depth[-1:, row]])
-        both = problem.dy * (h[:-1] + h[1:])
-        missing = (entering[:-1] + entering[1:]) * u[:, row] - (brought[:-1] + brought[1:])
-        out[:, ALONG, row] += missing / both
