@@ -295,6 +295,6 @@ def test_no_more_water_enters_over_a_field_than_flows(monkeypatch: pytest.Monkey
     search: Any = SimpleNamespace(model=model, point=point)
     screening: Any = SimpleNamespace(search=search, base=SimpleNamespace(model=model))
     misfit: Any = SimpleNamespace(p=0.0)
-    found, _ = conclusion._field(screening, screening, SearchState(), misfit)
+    found, _ = conclusion.explaining_field(screening, screening, SearchState(), misfit)
     assert found is not None
     assert found.term == kept

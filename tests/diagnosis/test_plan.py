@@ -13,7 +13,7 @@ from vegglue.calibration.detection import trace_lengths
 from vegglue.case.config import load_case
 from vegglue.case.resolved_config import case_hash
 from vegglue.case.schema import Planned
-from vegglue.diagnosis.plan import _after_survey, needed_evidence, plan_measurements, shown_by
+from vegglue.diagnosis.plan import after_survey, needed_evidence, plan_measurements, shown_by
 from vegglue.diagnosis.plan_model import (
     PlanModel,
     bending_of,
@@ -214,7 +214,7 @@ def test_a_line_of_bed_levels_makes_errors_smaller_as_conditioning_does(wide: Pl
     lines = [rows for piece, rows in zip(wide.pieces, wide.rows, strict=True) if piece.work is Work.SURVEY_LINE]
     assert lines
     shared, known, rows = wide.draws[0].shared, wide.known, lines[3]
-    after = _after_survey(shared, known, rows, wide.error)
+    after = after_survey(shared, known, rows, wide.error)
     across = shared[known] @ shared[rows].T
     inner = shared[rows] @ shared[rows].T + np.diag(wide.error[rows] ** 2)
     expected = shared[known] @ shared[known].T - across @ np.linalg.solve(inner, across.T)

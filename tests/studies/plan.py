@@ -35,8 +35,8 @@ from vegglue.case.schema import Case, Planned, PlannedGauge, PlannedTransect
 from vegglue.case.zones import corners_of
 from vegglue.decision_constants import constants
 from vegglue.diagnosis.competition import hypotheses_of
-from vegglue.diagnosis.diagnose import _best_branch
-from vegglue.diagnosis.plan import _effects, needed_evidence, plan_measurements, shown_by
+from vegglue.diagnosis.diagnose import best_branch
+from vegglue.diagnosis.plan import needed_evidence, plan_measurements, planned_effects, shown_by
 from vegglue.diagnosis.plan_model import place_along, plan_model, planned_pieces, possible_pieces, with_chosen
 from vegglue.diagnosis.plan_search import plan_search
 from vegglue.diagnosis.search_state import SearchState, Undecided, with_alarm
@@ -158,7 +158,7 @@ def first_step(model: Model) -> SearchState:
     found = with_alarm(screening, SearchState())
     if not found.alarmed:
         return found
-    branch = _best_branch(screening, hypotheses_of(screening, silent), found, silent)
+    branch = best_branch(screening, hypotheses_of(screening, silent), found, silent)
     return replace(found, undecided=branch) if isinstance(branch, Undecided) else branch.found
 
 
@@ -233,7 +233,7 @@ def compare(config: Path, hours: float) -> None:
 
     def counted(chosen: list[int]) -> tuple[int, float]:
         chosen_ones = with_chosen(wide, chosen)
-        effects = [one for one in _effects(chosen_ones, shown_by(chosen_ones)) if one.name in general]
+        effects = [one for one in planned_effects(chosen_ones, shown_by(chosen_ones)) if one.name in general]
         return sum(one.testable for one in effects), hours_of([wide.pieces[j] for j in chosen], planned.costs.discharge)
 
     best = (0, 0.0)

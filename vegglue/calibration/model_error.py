@@ -241,7 +241,7 @@ def model_error_columns(model: Model, point: Point, allowed: ModelError, cells: 
             allowed.friction * field_columns(cells, "friction", friction),
             allowed.bed * field_columns(cells, "bed", bed),
             survey_error_columns(model, cells),
-            *(_columns_of_shape(model, point, cells, key, TERM_OF[effect]) for key, effect in objects),
+            *(shape_error_columns(model, point, cells, key, TERM_OF[effect]) for key, effect in objects),
             site_error_columns(model, point, allowed, cells),
         ]
     )
@@ -299,7 +299,7 @@ def survey_error_columns(model: Model, cells: CellResponses) -> Array:
     return np.hstack(parts)
 
 
-def _columns_of_shape(model: Model, point: Point, cells: CellResponses, key: str, term: Term) -> Array:
+def shape_error_columns(model: Model, point: Point, cells: CellResponses, key: str, term: Term) -> Array:
     """S_k of the basis functions around the spot of an effect, without what looks like another size."""
     effect, entry, theta = effect_of(model.case, key), model.case.effects[key], theta_at(model.case, point.z[None])
 

@@ -194,7 +194,7 @@ def assemble_diagnosis(
     misfit, errors = misfit_of(first, last, found.flagged), estimated_errors(last, found)
     model_error = _model_error(last)
     likely = laws is not None and laws.likelier and not found.accepted
-    field, field_map = (None, None) if likely else _field(first, last, found, misfit)
+    field, field_map = (None, None) if likely else explaining_field(first, last, found, misfit)
     undecided = () if found.undecided is None else rivals_in(found.undecided)
     doubts, beside = doubts_of(first, last, found, held_out), significant_effects(last, found)
     bed_map, of_bed = measured_bed()
@@ -686,7 +686,7 @@ def _model_error(screening: Screening) -> ModelErrorUsed | None:
     return ModelErrorUsed(allowed.friction, allowed.bed, ERROR_SHARES[best], gained)
 
 
-def _field(
+def explaining_field(
     first: Screening, last: Screening, found: SearchState, misfit: Misfit
 ) -> tuple[FieldFound, FieldMapKept] | tuple[None, None]:
     """A smooth field of one term and its map, where it explains the misfit of the first model better than all that was

@@ -172,7 +172,7 @@ def diagnose_model(model: Model, watch: Watch = silent, held_out: Model | None =
             break
         hypotheses = hypotheses or hypotheses_of(screening, watch)
         effects |= refitted(hypotheses, tested)
-        branch = _best_branch(screening, hypotheses, found, watch)
+        branch = best_branch(screening, hypotheses, found, watch)
         if isinstance(branch, Undecided):
             found = replace(found, undecided=branch)
             break
@@ -192,7 +192,7 @@ def diagnose_model(model: Model, watch: Watch = silent, held_out: Model | None =
     return assemble_diagnosis(first, screening, found, effects, held_out, laws, watch)
 
 
-def _best_branch(
+def best_branch(
     screening: Screening, hypotheses: Sequence[Hypothesis], found: SearchState, watch: Watch
 ) -> SearchBranch | Undecided:
     """What is found with the likeliest hypothesis, and the model that follows; undecided when it leads to nothing, or

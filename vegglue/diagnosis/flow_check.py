@@ -29,6 +29,7 @@ from vegglue.measurements.section_discharge import (
     carried_discharges,
     changing_discharge,
     discharge_mismatches,
+    fall_of_floor,
     mismatched_discharges,
 )
 from vegglue.normal_range import NORMAL95
@@ -370,16 +371,11 @@ def remarks_on_measured_discharges(case: Case, site: Site, observations: Observa
 
 def remarks_on_steep_flow(case: Case, site: Site) -> Iterator[Supercritical]:
     """Experiments whose even flow on the slope of the floor would be supercritical."""
-    slope = floor_slope(site)
+    slope = fall_of_floor(site.grid.x, site.bed.min(axis=1))
     for name, experiment in case.experiments.items():
         froude = even_froude(case, site, experiment, slope)
         if froude > 1.0:
             yield Supercritical(name, slope, froude)
-
-
-def floor_slope(site: Site) -> float:
-    """S = -dz/dx of the lowest bed of each cross-section, by least squares [-]."""
-    return float(-np.polyfit(site.grid.x, site.bed.min(axis=1), 1)[0])
 
 
 def even_froude(case: Case, site: Site, experiment: Experiment, slope: float) -> float:

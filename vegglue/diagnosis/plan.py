@@ -147,7 +147,7 @@ def plan_measurements(
         hours=hours,
         budget=planned.hours,
         draws=len(shown.relative),
-        effects=_effects(wide, shown),
+        effects=planned_effects(wide, shown),
         places=places,
         instruments=_instruments(wide, shown),
         parameters=_parameters(model.case, shown),
@@ -230,7 +230,7 @@ def shown_by(wide: PlanModel) -> ShownByPlan:
     model = replace(draw.model, case=there, station=station)
     point = Point(draw.point.z, draw.point.prediction[known], draw.point.slope[known], flows)
     noise = with_grid_error(noise_of(station), wide.grid_error[known] / constants().grid_error_share)
-    noise = with_model_error(noise, _after_survey(draw.shared, known, wide.surveyed, wide.error))
+    noise = with_model_error(noise, after_survey(draw.shared, known, wide.surveyed, wide.error))
     tried = [one.settings() for one in wide.candidates]
     drawn = [SETTINGS_BETWEEN if len(settings) > 1 else 0 for settings in tried]
     columns, others = consecutive_columns([len(settings) for settings in tried]), consecutive_columns(drawn)
@@ -296,7 +296,7 @@ def shown_by(wide: PlanModel) -> ShownByPlan:
     )
 
 
-def _after_survey(shared: Array, known: np.ndarray, surveyed: np.ndarray, error: Array) -> Array:
+def after_survey(shared: Array, known: np.ndarray, surveyed: np.ndarray, error: Array) -> Array:
     """Columns of the shared errors of known stations, given lines of bed levels: U L, L L' = (1 + V' V / s^2)^-1."""
     if not surveyed.size:
         return shared[known]
@@ -306,7 +306,7 @@ def _after_survey(shared: Array, known: np.ndarray, surveyed: np.ndarray, error:
     return np.asarray(shared[known] - ((shared[known] @ right.T) * less) @ right)
 
 
-def _effects(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedEffect, ...]:
+def planned_effects(wide: PlanModel, shown: ShownByPlan) -> tuple[PlannedEffect, ...]:
     """Each effect, averaged over places of the priors and its shapes."""
     kind, prints = shown.kinds[0], shown.fingerprints
     cosines = np.abs(kind.projected.units.T @ kind.projected.units)

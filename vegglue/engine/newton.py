@@ -138,7 +138,7 @@ def _read_stations(model: Model, experiment: str, problem: Problem, state: Array
     return predictions_at_sensors(problem, wide, model.site.grid, model.stations[experiment])
 
 
-def _linearised(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
+def linearised(model: Model, z: Array, near: Point | None, wanted: Wanted) -> Point | None:
     """f(z) and df/dz, see `Engine.linearise`; experiments side by side, their slopes once all flows are known."""
     experiments = list(model.case.experiments)
     found = in_threads(_steady, [(model, experiment, z, near) for experiment in experiments])
@@ -146,7 +146,7 @@ def _linearised(model: Model, z: Array, near: Point | None, wanted: Wanted) -> P
     return None if len(flows) < len(found) else _point(model, z, flows, wanted)
 
 
-def _linearised_around(model: Model, z: Array, near: Point) -> list[Point | None]:
+def linearised_around(model: Model, z: Array, near: Point) -> list[Point | None]:
     """See `Engine.linearise_around`: chord steps of all (m, p) with the factors of the point, and each by itself where
     these do not lead there.
     """
@@ -161,7 +161,7 @@ def _linearised_around(model: Model, z: Array, near: Point) -> list[Point | None
 
     def point(k: int) -> Point | None:
         if not all(end.converged[k] for _, end in ends):
-            return _linearised(model, z[k], near, always) or _linearised(model, z[k], None, always)
+            return linearised(model, z[k], near, always) or linearised(model, z[k], None, always)
         found = {}
         for (experiment, flow), (problem, end) in zip(flows.items(), ends, strict=True):
             state = np.ascontiguousarray(end.state[..., [k]])
@@ -291,7 +291,7 @@ def _step_of_known(known: Array, z: Array) -> Array:
     return z[: known.size] - known if known.size <= z.size else np.zeros(0)
 
 
-def _predict_members(model: Model, points: Sequence[Point], z: Array) -> Array:
+def predict_members(model: Model, points: Sequence[Point], z: Array) -> Array:
     """f(z) of many members, see `Engine.predict`: from the nearest point, and on their own where that fails.
 
     Sets of members that are as far from their point are solved together, the same whatever the number of cores.
@@ -365,7 +365,7 @@ def _predict_alone(model: Model, near: Point, experiment: str, z: Array) -> Arra
     return prediction
 
 
-def _responses_by_tangents(model: Model, points: Sequence[Point], causes: Sequence[Cause]) -> Array:
+def responses_by_tangents(model: Model, points: Sequence[Point], causes: Sequence[Cause]) -> Array:
     """df/dg of each cause, see `Engine.responses`: tangents, those of one experiment side by side."""
     found, tasks = np.zeros((len(points), len(model.station), len(causes))), []
     for experiment in points[0].flows:
@@ -425,7 +425,7 @@ def _responses_in(model: Model, points: Sequence[Point], experiment: str, causes
     return np.asarray(((now - before[:, None]) / gains[:, None]).swapaxes(1, 2))
 
 
-def _responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> StationsOfCells:
+def responses_by_adjoints(model: Model, point: Point, experiment: str, terms: Sequence[Term]) -> StationsOfCells:
     """df/da_c of each cell, see `Engine.responses_to_cells`; in single precision, one solve for each station."""
     flow, grid, station = point.flows[experiment], model.site.grid, model.stations[experiment]
     problem = problem_at(model, experiment, point.z[None])
@@ -502,7 +502,7 @@ def sum_windows(sensitivity: Single, change: Single, found: Single) -> None:
                                 found[i, j, station] -= sensitivity[a, k, b, station] * weight
 
 
-def _with_own_factors(model: Model, point: Point) -> Point:
+def with_own_factors(model: Model, point: Point) -> Point:
     """See `Engine.relinearised`: with factors of a flow nearby responses to cells are off by some 5 %, with its own by
     0.5 %.
     """
@@ -551,12 +551,12 @@ def centre_flow(model: Model, point: Point, experiment: str) -> CentreFlow:
 
 NEWTON = Engine(
     name="newton",
-    linearise=_linearised,
-    linearise_around=_linearised_around,
-    predict=_predict_members,
-    responses=_responses_by_tangents,
-    responses_to_cells=_responses_by_adjoints,
+    linearise=linearised,
+    linearise_around=linearised_around,
+    predict=predict_members,
+    responses=responses_by_tangents,
+    responses_to_cells=responses_by_adjoints,
     flow_at_centres=centre_flow,
-    relinearised=_with_own_factors,
+    relinearised=with_own_factors,
     with_coarse_correction=with_coarse_correction,
 )
