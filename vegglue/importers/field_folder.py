@@ -125,10 +125,9 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     # Files that the site file names and that hold no measurements.
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
     used += [given.file] if isinstance(given, FileOfSite) else []
-    of_result = None
+    parameters, finished = Tree(), Tree()
     if isinstance(found, SiteOfResult):
-        of_result = ground_of_result(target, found)
-        ground = of_result.ground
+        ground, parameters, finished = ground_of_result(target, found)
         used += [one.name for one in found.paths.values()]
     elif site.bed is not None or site.channel is None:
         ground = surveyed_ground(folder, target, site, place)
@@ -139,7 +138,7 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     stated, factor = site.eddy_viscosity_m2_s, site.viscosity_factor
     if "eddy_viscosity_m2_s" not in site.model_fields_set:
         stated = usual_viscosity(site, ground)
-    if of_result is None:
+    if not finished:
         classes = ground.tree["friction"]["classes"]
         of_bed = bed_prior(*(BED_OF_STREAM if site.walls is None else BED_OF_FLUME))
         parameters = {"n_b": of_bed} | {
@@ -149,8 +148,6 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         }
         if BANK_CLASS in classes.values():
             parameters["k_s"] = loguniform_prior(0.01, 5.0, "m", "k_s", phrase("meaning_of_parameter", "banks"))
-    else:
-        parameters = of_result.parameters
     if factor > 1:
         parameters = parameters | {VISCOSITY: viscosity_prior(stated, factor)}
     measured.imported.extend([*ground.imported, *drawn_patches])
@@ -166,8 +163,8 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         "observations": measured.observations,
         **FIRST_LOOK,
     }
-    if of_result is not None:
-        tree["finished_result"] = of_result.key
+    if finished:
+        tree["finished_result"] = finished
     if site.walls is not None:  # a smoother bed than a stream's, and one that is known better
         tree["friction"] = tree["friction"] | {"walls": {"law": "manning", "n": "n_w"}}
         tree["parameters"] = tree["parameters"] | {"n_w": wall_prior(site.walls.n)}

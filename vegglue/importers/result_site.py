@@ -100,23 +100,6 @@ class SiteOfResult:
     grid: Tree
 
 
-@dataclass(frozen=True, eq=False)
-class GroundOfResult:
-    """The ground of the first finished result.
-
-    Attributes
-    ----------
-    parameters : Tree
-        Priors of its friction.
-    key : Tree
-        `finished_result` of the case.
-    """
-
-    ground: Ground
-    parameters: Tree
-    key: Tree
-
-
 def site_of(folder: Path) -> SiteOfResult | FieldSite:
     """The site of a folder: that of its site file, completed by a result if the folder holds one.
 
@@ -177,8 +160,17 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
     return SiteOfResult(site, place, paths, placed, stated, terrain, tree)
 
 
-def ground_of_result(target: Path, found: SiteOfResult) -> GroundOfResult:
-    """Grid, bed and friction of the first result, and the flows of all, to be written beside the config."""
+def ground_of_result(target: Path, found: SiteOfResult) -> tuple[Ground, Tree, Tree]:
+    """Grid, bed and friction of the first result, and the flows of all, to be written beside the config.
+
+    Returns
+    -------
+    Ground
+    Tree
+        Priors of its friction.
+    Tree
+        `finished_result` of the case.
+    """
     name, placed = next(iter(found.placed.items()))
     friction, parameters, values, texts, words = _friction_of_result(target, placed, found)
     imported: list[Tree] = []
@@ -203,7 +195,7 @@ def ground_of_result(target: Path, found: SiteOfResult) -> GroundOfResult:
     ground = ground_on_grid(target, found.terrain, found.grid, friction, found.place)
     ground = Ground(ground.tree, imported, {**ground.texts, **texts}, ground.level)
     key = {"code": placed.result.code, "files": files, "parameters": values | dict(found.stated.parameters)}
-    return GroundOfResult(ground, parameters, key)
+    return ground, parameters, key
 
 
 def _result_files(folder: Path, given: Mapping[str, Any], stated: ResultEntry) -> dict[str, Path]:
