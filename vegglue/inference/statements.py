@@ -70,6 +70,8 @@ class EnsembleWeighed:
 
 @dataclass(frozen=True)
 class SearchSummary:
+    """Where a search began, at members or in the prior, the modes that it found, and the members drawn from these."""
+
     starts: int
     from_prior: bool
     modes: int
@@ -99,6 +101,8 @@ class ValidationProposed:
 
 @dataclass(frozen=True)
 class ModeFound:
+    """A mode: values in the units of the parameters, its chi2 [-] and its share of the posterior [-]."""
+
     number: int
     values: tuple[tuple[NamedParameter, float], ...]
     chi2: float
@@ -132,16 +136,22 @@ class ErrorsStated:
 
 @dataclass(frozen=True)
 class ErrorsScaled:
+    """Errors over the stated ones [-]."""
+
     scale: float
 
 
 @dataclass(frozen=True)
 class ErrorsCorrelated:
+    """Correlation of the errors of neighbours [-]."""
+
     correlation: float
 
 
 @dataclass(frozen=True)
 class WeightSummary:
+    """Effective number of members, the largest weight [-], and Pareto k with the largest that is trusted [-]."""
+
     effective_size: float
     members: int
     largest: float
@@ -151,6 +161,8 @@ class WeightSummary:
 
 @dataclass(frozen=True)
 class NoPosteriorClaimed:
+    """An effective number of members below the one needed."""
+
     effective_size: float
     refined: bool
     needed: int = CLAIMED_FROM
@@ -158,6 +170,8 @@ class NoPosteriorClaimed:
 
 @dataclass(frozen=True)
 class WeightTailHeavy:
+    """Pareto k beyond the largest that is trusted [-]."""
+
     pareto_k: float
     limit: float = TRUSTED_K_HAT
 
@@ -187,6 +201,8 @@ class ParameterEstimated:
 
 @dataclass(frozen=True)
 class ParameterNotIdentified:
+    """95 % interval [its unit], its width over that of the prior, and from which share on nothing is known [-]."""
+
     parameter: NamedParameter
     low: float
     high: float
@@ -196,6 +212,8 @@ class ParameterNotIdentified:
 
 @dataclass(frozen=True)
 class ParameterAtBound:
+    """A bound [its unit] with the share of the posterior within `near` of the range from it [-]."""
+
     parameter: NamedParameter
     side: str
     bound: float
@@ -205,6 +223,8 @@ class ParameterAtBound:
 
 @dataclass(frozen=True)
 class ParameterOffPrior:
+    """95 % interval of the prior that the median lies outside [its unit]."""
+
     parameter: NamedParameter
     low: float
     high: float
@@ -219,6 +239,8 @@ class ParametersAtBounds:
 
 @dataclass(frozen=True)
 class ParametersCorrelated:
+    """Two parameters and their correlation [-]."""
+
     first: NamedParameter
     second: NamedParameter
     correlation: float
@@ -226,6 +248,8 @@ class ParametersCorrelated:
 
 @dataclass(frozen=True)
 class MedianFit:
+    """Root mean square misfit of the median by kind, and how many of the used stations lie outside the total band."""
+
     sizes: Sizes
     outside: int
     used: int
@@ -233,12 +257,16 @@ class MedianFit:
 
 @dataclass(frozen=True)
 class ReadingsExcluded:
+    """How many readings a diagnosis excluded, of all stations."""
+
     excluded: int
     stations: int
 
 
 @dataclass(frozen=True)
 class BestMemberFit:
+    """chi2 of the best member at the used stations [-]."""
+
     chi2: float
     used: int
 
@@ -264,6 +292,8 @@ class MisfitTested:
 
 @dataclass(frozen=True)
 class StationsLeftOut:
+    """ln density of stations that are left out in turn, with its standard error [-]; doubtful: those of k > limit."""
+
     elpd: float
     error: float
     used: int
@@ -293,11 +323,15 @@ class GroupsLeftOutScore:
 
 @dataclass(frozen=True)
 class GroupsUntrusted:
+    """Sections and experiments whose k is beyond the largest that is trusted."""
+
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class BandCoverage:
+    """Shares of the stations within the 50 and the 95 % band, and P that they are as even as bands should be [-]."""
+
     inside50: float
     inside95: float
     p: float
@@ -328,7 +362,7 @@ class StationsStandOut:
 
 @dataclass(frozen=True)
 class NothingToCompare:
-    pass
+    """No parameter is constrained by two experiments."""
 
 
 @dataclass(frozen=True)
@@ -362,6 +396,8 @@ class ParameterBetweenExperiments:
 
 @dataclass(frozen=True)
 class ParametersAlike:
+    """Parameters of which one value fits all experiments, with the P of the worst [-]."""
+
     parameters: tuple[NamedParameter, ...]
     p: float
 
@@ -393,13 +429,15 @@ class MisfitOfExperiments:
 
 @dataclass(frozen=True)
 class ErrorsOfComparison:
+    """Whether errors are estimated, and by what they are scaled [-]."""
+
     estimated: bool
     scale: float
 
 
 @dataclass(frozen=True)
 class CalibrationTransfers:
-    pass
+    """One set of parameters fits all experiments."""
 
 
 @dataclass(frozen=True)
@@ -412,6 +450,8 @@ class CalibrationDiffers:
 
 @dataclass(frozen=True)
 class CanopyCorrected:
+    """Plant drag at another canopy height: heights and depth [m], median before and after [-], log10 of the latter."""
+
     parameter: NamedParameter
     from_height: float
     to_height: float
