@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+from described_constants import described
 
-from vegglue.decision_constants import CHOSEN, constants, described, using
+from vegglue.decision_constants import CHOSEN, constants, using
 from vegglue.diagnosis.odds import tempered_probabilities
 
 

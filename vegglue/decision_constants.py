@@ -6,7 +6,7 @@ holds the table.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -30,7 +30,7 @@ DERIVED, MEASURED, CHOSEN = Provenance.DERIVED, Provenance.MEASURED, Provenance.
 
 @dataclass(frozen=True)
 class DecisionConstants:
-    """All of them; `described` lists unit, provenance and basis of each."""
+    """All of them; `dataclasses.fields` has unit, provenance and basis of each as its metadata."""
 
     # The errors of what is compared.
     fingerprint_error: float = _constant(
@@ -245,24 +245,6 @@ class DecisionConstants:
     needed_errors: float = _constant(
         2.0, "standard errors", CHOSEN, "distance of an amplitude from off below which an earlier effect is dropped"
     )
-
-
-@dataclass(frozen=True)
-class Described:
-    """A constant with its name, value, unit, provenance and basis."""
-
-    name: str
-    value: float
-    unit: str
-    provenance: Provenance
-    basis: str
-    near_one: bool
-
-
-def described(values: DecisionConstants | None = None) -> list[Described]:
-    """Every constant as it stands in `values`, the ones in use if not given."""
-    chosen = values or constants()
-    return [Described(one.name, getattr(chosen, one.name), **one.metadata) for one in fields(chosen)]
 
 
 _in_use = DecisionConstants()

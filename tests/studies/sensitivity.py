@@ -25,13 +25,14 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any, cast
 
-from vegglue.decision_constants import DecisionConstants, Described, described, using
+from vegglue.decision_constants import DecisionConstants, using
 from vegglue.diagnosis.diagnose import diagnose_model
 from vegglue.errors import InputError
 from vegglue.parallel import at_most, one_thread
 from vegglue.workflow.case_run import case_run
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from described_constants import Described, described
 from open_cases import OPEN_CASES, on_larger_cells
 
 ROOT = Path(__file__).parents[2]

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 import sensitivity
-
-from vegglue.decision_constants import described
+from described_constants import described
 
 BY_NAME = {one.name: one for one in described()}
 
