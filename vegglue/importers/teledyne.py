@@ -122,8 +122,12 @@ def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
         drift = _drift_of_bottom(boat, moved, against)
         boat = np.where(np.isfinite(boat) & (drift == 0.0), boat, moved)
         reference = (ImportNote(Noted.BY_GPS, drift),)
-    elif (way := _way_while_lost(boat[known], time[known], time)) > LONGEST_WAY:
-        reference = (ImportNote(Noted.BOTTOM_BRIDGED, way),)
+    else:
+        # The longest way [m] between ensembles with bottom track, others between them, at the velocity after it.
+        lost = np.diff(np.searchsorted(time, time[known])) > 1
+        way = float((np.hypot(*boat[known][1:].T) * np.diff(time[known]))[lost].max(initial=0.0))
+        if way > LONGEST_WAY:
+            reference = (ImportNote(Noted.BOTTOM_BRIDGED, way),)
     profiles = []
     for one, deep, at, own_velocity, water in zip(found, draft.tolist(), place.tolist(), boat, against, strict=True):
         if not np.isfinite([*at, *own_velocity]).all():
@@ -202,14 +206,6 @@ def _fixes(data: Any) -> Array:
     return np.column_stack(
         [np.interp(seconds, at[sound][order], part[sound][order], np.nan, np.nan) for part in places.T]
     )
-
-
-def _way_while_lost(boat: Array, known: Array, time: Array) -> float:
-    """The longest way [m] of a boat (n, 2) [m/s] between ensembles with bottom track, at times known (n,) [s], that has
-    some of `time` between them: at its velocity after that.
-    """
-    lost = np.diff(np.searchsorted(time, known)) > 1
-    return float((np.hypot(*boat[1:].T) * np.diff(known))[lost].max(initial=0.0))
 
 
 def _metres_from_first(fixes: Array) -> Array:

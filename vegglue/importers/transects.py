@@ -87,8 +87,19 @@ def stations_of_transect(
         )
     places = np.array([one.place for one in used]) + np.array(options.start)
     velocities = np.array([depth_mean(one) for one in used])
-    x, y, mean, error = _along_the_section(places, velocities)
-    numbers = {"x": x, "y": y, "east_velocity": mean[:, 0], "north_velocity": mean[:, 1]}
+    # Means and their standard errors s / sqrt(n) in equal parts of the line through the places.
+    middle = places.mean(axis=0)
+    direction = np.linalg.svd(places - middle, full_matrices=False)[2][0]
+    along = (places - middle) @ direction
+    part = np.digitize(along, np.linspace(along.min(), along.max() + 1e-9, STATIONS + 1)) - 1
+    parts = [rows for number in range(STATIONS) if (rows := part == number).sum() >= FEWEST_ENSEMBLES]
+    at, mean, error = places, velocities, np.full(velocities.shape, np.nan)
+    if parts:  # else a short transect: each ensemble for itself
+        at = middle + np.outer([along[rows].mean() for rows in parts], direction)
+        mean = np.array([velocities[rows].mean(axis=0) for rows in parts])
+        scatter = np.array([velocities[rows].std(axis=0, ddof=1) / np.sqrt(rows.sum()) for rows in parts])
+        error = np.maximum(scatter, LEAST_ERROR_OF_MEAN)
+    numbers = {"x": at[:, 0], "y": at[:, 1], "east_velocity": mean[:, 0], "north_velocity": mean[:, 1]}
     numbers |= {"u_se": error[:, 0], "v_se": error[:, 1]}
     notes = [*form, ImportNote(Noted.ENSEMBLES, len(used))]
     for dropped, what in ((len(placed) - len(used), "velocities"), (len(profiles) - len(placed), "a place")):
@@ -133,19 +144,3 @@ def depth_mean(ensemble: BoatProfile) -> tuple[float, float]:
     a = ensemble.velocity.mean(axis=0) / shape.mean()
     east, north = a * ensemble.depth**PROFILE_POWER / (PROFILE_POWER + 1.0)
     return float(east), float(north)
-
-
-def _along_the_section(places: Array, velocities: Array) -> tuple[Array, Array, Array, Array]:
-    """Means and their standard errors in equal parts of the line through the places, s / sqrt(n) of n ensembles."""
-    middle = places.mean(axis=0)
-    direction = np.linalg.svd(places - middle, full_matrices=False)[2][0]
-    along = (places - middle) @ direction
-    edges = np.linspace(along.min(), along.max() + 1e-9, STATIONS + 1)
-    part = np.digitize(along, edges) - 1
-    used = [number for number in range(STATIONS) if (part == number).sum() >= FEWEST_ENSEMBLES]
-    if not used:  # a short transect: each ensemble for itself
-        return places[:, 0], places[:, 1], velocities, np.full(velocities.shape, np.nan)
-    at = middle + np.outer([along[part == number].mean() for number in used], direction)
-    mean = np.array([velocities[part == number].mean(axis=0) for number in used])
-    scatter = np.array([velocities[part == n].std(axis=0, ddof=1) / np.sqrt((part == n).sum()) for n in used])
-    return at[:, 0], at[:, 1], mean, np.maximum(scatter, LEAST_ERROR_OF_MEAN)
