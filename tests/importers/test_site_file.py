@@ -84,11 +84,11 @@ def test_whatever_stands_in_it_is_read_or_refused(tmp_path: Path, site: dict[str
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[" * 100_000, "site.json: keys"),
+        ("[" * 100_000, "site.json: expected parts nested less deeply"),
         ("[1, 2", "expected a comma"),
         ("[]", "`site.json` expected"),
         ("9" * 5000, "digits"),
-        ('{"channel": {"bed_slope": 0.001, "bed_slope": 0.01}}', "`bed_slope` stands twice"),
+        ('{"channel": {"bed_slope": 0.001, "bed_slope": 0.01}}', "`bed_slope` once, got it twice"),
         (json.dumps(put(SITE, ("channel", "bed_slope"), 3)), "`channel.bed_slope`"),
         (json.dumps(put(SITE, ("patches", 0, "x"), [4, 2])), "`patches[0].x`"),
         (json.dumps(put(SITE, ("patches", 1), {"x": [1, 2]})), "`patches[1].y`"),

@@ -258,7 +258,7 @@ def test_rows_left_out_are_counted(tmp_path: Path, row: str, counts: list[str]) 
 )  # fmt: skip
 def test_units_that_are_not_stated_are_reported(tmp_path: Path, heading: str, assumed: str | None) -> None:
     taken = taken_of(tmp_path / "brook", heading, *ROWS, "none")
-    assert (f"of {assumed}" in taken) if assumed else ("SI" not in taken)
+    assert (f"for {assumed}" in taken) if assumed else ("SI" not in taken)
 
 
 SURVEY = [f"low,A,12,{number / 10},{0.4 + number / 100},0.012" for number in range(12)]

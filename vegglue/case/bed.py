@@ -65,7 +65,9 @@ def read_raster(path: Path) -> Raster:
     lines, header, first = read_text(path, LARGEST_DATA).splitlines(), dict[str, float](), 0
     while first < len(lines) and (words := lines[first].split()) and words[0].lower() in HEADER:
         if len(words) != 2:
-            raise InputError(f"{path}, line {first + 1}: expected `{words[0]}` and one number, got {lines[first]!r}.")
+            raise InputError(
+                f"{path}, line {first + 1}: expected `{words[0]}` and one number, got {lines[first]!r}; correct it."
+            )
         key = words[0].lower()
         if key == "nodata_value" and WORDS_FOR_NO_LEVEL.fullmatch(words[1]):
             header[key] = math.nan
@@ -77,7 +79,8 @@ def read_raster(path: Path) -> Raster:
     for key in ("ncols", "nrows", "cellsize"):
         if header.get(key, 0.0) <= 0:
             raise InputError(
-                f"{path}: expected an ESRI ASCII grid whose header has a `{key}` above 0, got {header or 'no header'}."
+                f"{path}: expected an ESRI ASCII grid whose header has a `{key}` above 0, got {header or 'no header'}; "
+                "export it anew."
             )
         if key != "cellsize" and header[key] != int(header[key]):
             raise InputError(
@@ -87,7 +90,9 @@ def read_raster(path: Path) -> Raster:
     corner = {}
     for axis in "xy":
         if f"{axis}llcorner" not in header and f"{axis}llcenter" not in header:
-            raise InputError(f"{path}: expected `{axis}llcorner` or `{axis}llcenter` in the header, got neither.")
+            raise InputError(
+                f"{path}: expected `{axis}llcorner` or `{axis}llcenter` in the header, got neither; add one."
+            )
         corner[axis] = header.get(f"{axis}llcorner", header.get(f"{axis}llcenter", 0.0) - 0.5 * size)
     found = [np.empty(0)]  # a line at a time, so that a large file takes little more than its numbers do
     for number, line in enumerate(lines[first:], first + 1):
@@ -95,14 +100,15 @@ def read_raster(path: Path) -> Raster:
             found.append(_levels_in(line))
         except ValueError as error:
             word = str(error).rpartition(": ")[2]
-            raise InputError(f"{path}, line {number}: expected numbers, got {word}.") from None
+            raise InputError(f"{path}, line {number}: expected numbers, got {word}; correct it.") from None
         if np.isinf(found[-1]).any():
             word = line.split()[int(np.isinf(found[-1]).argmax())]
-            raise InputError(f"{path}, line {number}: expected finite numbers, got {word!r}.")
+            raise InputError(f"{path}, line {number}: expected finite numbers, got {word!r}; correct it.")
     values = np.concatenate(found)
     if len(values) != rows * columns:
         raise InputError(
-            f"{path}: expected nrows x ncols = {rows * columns} values after the header, got {len(values)}."
+            f"{path}: expected nrows x ncols = {rows * columns} values after the header, got {len(values)}; export it "
+            "anew."
         )
     values = values.reshape(rows, columns)[::-1].T
     values = np.where(values == header.get("nodata_value", -9999.0), np.nan, values)
@@ -190,7 +196,8 @@ def read_points(path: Path, columns: Sequence[str] = ("x", "y", "z")) -> Array:
         rows = csv.DictReader(lines)
         if any(name not in (rows.fieldnames or ()) for name in columns):
             wanted = f"{', '.join(columns[:-1])} and {columns[-1]}"
-            raise InputError(f"{path}: expected a header with the columns {wanted}, got {rows.fieldnames}.")
+            found = ", ".join(rows.fieldnames or ["none"])
+            raise InputError(f"{path}: expected the columns {wanted}, got {found}; correct the heading.")
         for number, row in enumerate(rows, 1):
             if any(text.strip() for text in row.get(None, ())):  # where `csv` keeps what goes beyond the heading
                 raise InputError(
@@ -231,7 +238,7 @@ def _number(path: Path, row: int, text: str | None, name: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{path}, data row {row}: column {name} expected a number in m, got {text!r}.")
+        raise InputError(f"{path}, data row {row}: expected a number in m in column {name}, got {text!r}; correct it.")
     return number
 
 

@@ -320,13 +320,13 @@ def show_ladder(found: Comparison) -> None:
     rows, heterogeneous = [], []
     for before, one in zip([None, *scores[:-1]], scores, strict=True):
         seen, held = one.in_sample, one.predictive
-        # By how much held-out squares fell [(mm/s)^2]; the error of that is unknown if one section alone was held out.
-        gain, of_gain = (1e6 * part for part in improvement(before, one)) if before else (np.nan, np.nan)
-        known = "-" if np.isnan(of_gain) else in_digits(of_gain, 1)
+        # By what share held-out squares fell; the error of that is unknown if one section alone was held out.
+        gain, of_gain = np.array(improvement(before, one)) / held_out_rmse(before) ** 2 if before else (np.nan, np.nan)
+        known = "" if np.isnan(of_gain) else f" ± {in_digits(100.0 * of_gain, 1)}"
         rows.append((
             one.name, str(len(one.values)), error(seen.rmse[STREAMWISE]), error(seen.rmse[WATER_LEVEL]),
             *(error(seen.rmse[kind.name]) for kind in others), f"{seen.chi2:.0f} / {seen.stations}",
-            error(held_out_rmse(one)), "" if np.isnan(gain) else f"{in_digits(gain, 2)} ± {known}",
+            error(held_out_rmse(one)), "" if np.isnan(gain) else f"{100.0 * gain:.0f}{known} %",
             error(held_out_rmse(one, "experiments")), error(held.log_score, ".2f"), error(held.inside50, ".0%"),
             error(held.inside95, ".0%"), *([error(one.validation)] if validated else []),
             *([error(one.validation_inside95, ".0%")] if banded else []),

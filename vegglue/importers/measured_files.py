@@ -311,8 +311,8 @@ def _converted(
     for path, options in group:
         if options.flip and place.line is not None and options.coordinates != "channel":
             raise InputError(
-                f"{shown_path(path)}: expected no `flip` of places on the map of a centreline; where velocities run "
-                "upstream, draw the line from its other end: `reverse: true`, or its points upstream first."
+                f"{shown_path(path)}: expected no `flip` of places on the map of a centreline, got one; take it out. "
+                "If velocities run upstream, reverse the centreline: `reverse: true`, or its points upstream first."
             )
     read = [with_experiments(reader_of(path)(path, options), known.names) for path, options in group]
     for one, (path, options) in zip(read, group, strict=True):

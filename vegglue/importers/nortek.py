@@ -169,7 +169,10 @@ def _record_mean(
     """
     trusted = _trusted_samples(velocity, correlation)
     if not trusted.any():
-        raise InputError(f"{shown_path(path)}: no sample has a correlation of {LEAST_CORRELATION:g} %; leave it out.")
+        raise InputError(
+            f"{shown_path(path)}: expected samples with a correlation of {LEAST_CORRELATION:g} % or more, got none; "
+            "leave the file out."
+        )
     numbers = {axis: np.array([one]) for axis, one in zip("xyz", options.position or (), strict=True)}
     numbers |= {axis: part[trusted].mean(keepdims=True) for axis, part in zip("uvw", velocity.T, strict=True)}
     numbers["u_std"] = velocity[trusted, 0].std(ddof=1, keepdims=True)
@@ -208,7 +211,10 @@ def read_samples(path: Path, options: FileOptions) -> MeasuredRows:
     correlation = np.array([one for one in beams if one is not None]).reshape(-1, taken.size).T
     trusted = _trusted_samples(velocity, correlation)
     if not trusted.any():
-        raise InputError(f"{shown_path(path)}: no sample has a correlation of {LEAST_CORRELATION:g} %; leave it out.")
+        raise InputError(
+            f"{shown_path(path)}: expected samples with a correlation of {LEAST_CORRELATION:g} % or more, got none; "
+            "leave the file out."
+        )
     kept = replace(taken.only(trusted), of_probe="u" in moving)
     at = {axis: np.full(kept.size, one) for axis, one in zip("xyz", options.position, strict=True)}
     lost = taken.size - kept.size

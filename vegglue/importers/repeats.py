@@ -233,7 +233,7 @@ def refuse_confounded_replicates(taken: MeasuredRows, places: Sequence[Hashable]
                 raise InputError(
                     f"{file}: expected repeats that differ by chance, got velocities that differ with {heading!r} "
                     f"({listed([*known[:MOST_TEXTS], *more])}); name it in `columns`, by what it holds "
-                    "(`experiment`, `section`, `y`, `z`), or keep one."
+                    "(`experiment`, `section`, `y`, `z`), or leave one of them in the file."
                 )
 
 

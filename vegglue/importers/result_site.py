@@ -261,7 +261,7 @@ def _along_channel(path: Path, result: ModelResult, place: Placement, stated: Re
     there = np.isfinite(along) & np.isfinite(across)
     flow = TheirFlow(*(one[there] for one in (along, across, result.bed, result.depth, u, v)))
     if not (flow.depth > 0.0).any():
-        raise InputError(f"{shown_path(path)}: expected a flow, got a result that is dry at its end; give one at rest.")
+        raise InputError(f"{shown_path(path)}: expected water in the last time step, got none; run it anew.")
     return PlacedResult(result, flow, corners[np.isfinite(corners).all(axis=1)], manning[there])
 
 
@@ -278,13 +278,14 @@ def _boundary_values(path: Path, flow: TheirFlow, grid: Grid, straight: bool) ->
     spread = float(np.std(along) / np.mean(along))
     if spread > MOST_SPREAD:
         raise InputError(
-            f"{shown_path(path)}: expected one discharge all along, got {along.min():.3g} to {along.max():.3g} m3/s; "
-            "give a flow at rest, and a grid that holds the whole river."
+            f"{shown_path(path)}: expected the same discharge along the channel, got {along.min():.3g} to "
+            f"{along.max():.3g} m3/s; run the model until it is steady, and let `grid` hold the whole river."
         )
     last = flow.at(np.full(grid.y.size, grid.x[-1]), grid.y)["level"]
     if not np.isfinite(last).any():
         raise InputError(
-            f"{shown_path(path)}: expected water at the outlet, x = {grid.x[-1]:.4g} m, got none; end `grid.x` before."
+            f"{shown_path(path)}: expected water at the outlet, x = {grid.x[-1]:.4g} m, got none; let `grid.x` end "
+            "upstream of it."
         )
     return round(float(np.median(along)), 5), round(float(np.nanmean(last)), 4)
 

@@ -93,7 +93,7 @@ def _last_frame(path: Path, file: BinaryIO, order: str) -> ModelResult:
     frame = (8 + width) + len(names) * (8 + width * int(points))
     frames = (size - begin) // frame
     if frames < 1:
-        raise InputError(f"{shown_path(path)}: expected a result, got a file without a whole frame; run it anew.")
+        raise InputError(f"{shown_path(path)}: expected a time step of all values, got none; run the model anew.")
     file.seek(begin + (frames - 1) * frame)
     seconds = float(np.frombuffer(_record(file, order, size), real)[0])
     values = {name: np.frombuffer(_record(file, order, size), real).astype(np.float64) for name in names}

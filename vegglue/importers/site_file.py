@@ -416,13 +416,13 @@ def read_keys(path: Path) -> Any:
     def each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         for number, (key, _) in enumerate(pairs):
             if key in dict(pairs[:number]):  # json keeps the last one and says nothing
-                raise InputError(f"{shown_path(path)}: the key `{key}` stands twice; take one of the two out.")
+                raise InputError(f"{shown_path(path)}: expected the key `{key}` once, got it twice; take one out.")
         return dict(pairs)
 
     try:
         return json.loads(text, object_pairs_hook=each_once)
     except RecursionError:
-        raise InputError(f"{shown_path(path)}: keys stand within keys too often: write them flatter.") from None
+        raise InputError(f"{shown_path(path)}: expected parts nested less deeply; use fewer levels.") from None
     except json.JSONDecodeError as error:
         found = next((one for start, one in JSON_PROBLEMS.items() if error.msg.startswith(start)), None)
         raise InputError("invalid_json", file=path, line=error.lineno, column=error.colno, problem=found) from None

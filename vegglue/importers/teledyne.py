@@ -104,8 +104,8 @@ def read_pd0(path: Path, options: FileOptions) -> MeasuredRows:
     has_gps = np.count_nonzero(by_gps) >= FEWEST_ENSEMBLES
     if not (known.any() or has_gps):
         raise InputError(
-            f"{shown_path(path)}: expected bottom track or GPS, got none in {known.size} ensembles; without it no boat "
-            "has a place. Export classic ASCII output with GPS as reference from WinRiver."
+            f"{shown_path(path)}: expected bottom track or GPS, got none in {known.size} ensembles; where the boat "
+            "was is unknown. Export classic ASCII output with GPS as reference from WinRiver."
         )
     own = np.array([one.draft for one in found])
     usual = float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0
@@ -155,7 +155,7 @@ def _raw_ensembles(path: Path, group: list[bytes]) -> tuple[str, list[_RawEnsemb
     if missing := {"vel", "vel_bt", "dist_bt"} - set(data):
         raise InputError(
             f"{shown_path(path)}: expected velocities and bottom track, got none of {', '.join(sorted(missing))}; "
-            "without bottom track no boat has a place."
+            "without bottom track the way of the boat is unknown: leave the file out."
         )
     lost = np.abs(data["vel_bt"]) > FASTEST  # -32.768 m/s marks a lost bottom; the reader keeps it
     data["vel_bt"] = data["vel_bt"].where(~lost)

@@ -276,7 +276,7 @@ def grid_of_terrain(path: Path, terrain: Terrain, asked: SiteGrid | None, place:
         if not high > low:
             raise InputError(
                 f"{shown_path(path)}: expected a bed that reaches along and across the channel, got one from {key} = "
-                f"{low:g} to {high:g} m ({terrain.taken}); say `grid.{key}` in the site file, or name sections by a "
+                f"{low:g} to {high:g} m ({terrain.taken}); state `grid.{key}` in the site file, or name sections by a "
                 "column `section`."
             )
     dy = (y[1] - y[0]) / SURVEYED_ROWS
@@ -286,7 +286,7 @@ def grid_of_terrain(path: Path, terrain: Terrain, asked: SiteGrid | None, place:
     if levels > MOST_LEVELS:
         raise InputError(
             f"{shown_path(path)}: expected a bed of at most {MOST_LEVELS:,} levels on squares as small as the cells, "
-            f"got {levels:.3g}; say larger cells by `grid.cell` in the site file, or less of the bed by `grid.x` and "
+            f"got {levels:.3g}; state larger cells by `grid.cell` in the site file, or less of the bed by `grid.x` and "
             "`grid.y`."
         )
     return {"x": x, "y": y, "cell": cell}

@@ -120,9 +120,9 @@ def refuse_leaps(path: Path, profiles: Sequence[BoatProfile]) -> None:
     if (steps > allowed).any():
         worst = int(np.argmax(steps - allowed))
         raise InputError(
-            f"{shown_path(path)}: expected a boat that moves on by up to {allowed[worst]:.3g} m, got a leap of "
-            f"{steps[worst]:.3g} m from ensemble {known[worst] + 1} to {known[worst + 1] + 1}; leave out what the "
-            "instrument lost, and export it anew."
+            f"{shown_path(path)}: expected the boat to move by up to {allowed[worst]:.3g} m, got {steps[worst]:.3g} m "
+            f"from ensemble {known[worst] + 1} to {known[worst + 1] + 1}; remove ensembles whose place was lost, and "
+            "export it anew."
         )
 
 

@@ -77,7 +77,7 @@ def infer(
     observations = replace(run.observations, table=without_stations(run.observations.table, aside))
     if not observations.table["used"].any():
         raise InputError(
-            f"{sized.name}: expected a station in use, got none: nothing can be inferred; "
+            f"{sized.name}: expected a station in use, got none, so that nothing can be inferred; "
             f"{shown_command('check', sized.source)} reports why."
         )
     chosen = chosen_method(sized, method)
