@@ -135,21 +135,19 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
     )
     polygons = []
     for number, (ring, properties) in enumerate(features, 1):
-        of_density = next(
-            (one for one in properties if DENSITY.fullmatch(words_of(one)) and _holds(properties[one])), None
-        )
+        held = {heading: value for heading, value in properties.items() if value not in (None, "")}
+        of_density = next((one for one in held if DENSITY.fullmatch(words_of(one))), None)
+        of_name, of_class = _first_heading(held, NAMES), _first_heading(held, CLASSES)
         if "stems" in named:
-            of_density = named["stems"] if _holds(properties.get(named["stems"])) else None
-        of_name = _first_heading(properties, NAMES)
+            of_density = named["stems"] if named["stems"] in held else None
         if "name" in named:
-            of_name = named["name"] if _holds(properties.get(named["name"])) else None
-        of_class = _first_heading(properties, CLASSES)
+            of_name = named["name"] if named["name"] in held else None
         unread = {str(one): value for one, value in properties.items() if one not in (of_density, of_class, of_name)}
-        words = {
-            heading: words_of(heading)
+        words = [
+            (heading, words_of(heading))
             for heading, value in unread.items()
             if isinstance(value, int | float) or (isinstance(value, str) and is_number(value))
-        }
+        ]
         density = None
         if of_density is not None:
             try:
@@ -168,7 +166,7 @@ def read_polygons(path: Path, frame: Frame | None, columns: Mapping[str, str] = 
                 density_from=of_density,
                 unread=tuple(unread),
                 like_density=tuple(
-                    one for one, text in words.items() if LIKE_DENSITY.search(text) and not NO_DENSITY.search(text)
+                    one for one, text in words if LIKE_DENSITY.search(text) and not NO_DENSITY.search(text)
                 ),
                 unitless=unitless,
             )
@@ -254,13 +252,9 @@ def _area_named(heading: str) -> str:
     return last if last in ("m2", "ft2") else ""
 
 
-def _holds(value: Any) -> bool:
-    return value not in (None, "")
-
-
 def _first_heading(properties: Properties, names: Iterable[str]) -> str | None:
     """The heading that is the first of these names and holds something; None if there is none."""
-    known = {words_of(heading): heading for heading in properties if _holds(properties[heading])}
+    known = {words_of(heading): heading for heading, value in properties.items() if value not in (None, "")}
     return next((known[name] for name in names if name in known), None)
 
 
