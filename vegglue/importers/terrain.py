@@ -361,32 +361,59 @@ def read_terrain(path: Path, place: Placement, options: FileOptions, sections: b
     InputError
         For another file, coordinate system or unit, and too few points.
     """
-    ending = path.suffix.lower()
-    if ending in RASTERS:
-        if ending not in (".tif", ".tiff") and (system := path.with_suffix(".prj")).is_file():
+    if path.suffix.lower() in RASTERS:
+        return terrain_of_raster(path, place)
+    return terrain_of_points(path, place, options, sections)
+
+
+def terrain_of_raster(path: Path, place: Placement) -> Terrain:
+    """The bed in a GeoTIFF or an ESRI ASCII grid, without levels that are none, declared or not; as `read_terrain`.
+
+    Beyond LOWEST and HIGHEST lies no river; a usual mark of no value is one if it lies further from all other levels
+    than APART_FROM_LEVELS and than ten times what they span.
+    """
+    scaled = filled_up = ""
+    if path.suffix.lower() in (".tif", ".tiff"):
+        raster = read_geotiff(path, place.frame)
+    else:
+        if (system := path.with_suffix(".prj")).is_file():
             refuse_other_system(path, system_of_wkt(readable_text(system)), place.frame)
-        raster = read_geotiff(path, place.frame) if ending in (".tif", ".tiff") else read_raster(path)
-        scaled = ""
+        raster = read_raster(path)
         beside = path.with_name(f"{path.name}.aux.xml")  # what GDAL keeps of a format that has no room for it
-        if ending not in (".tif", ".tiff") and beside.is_file():
+        if beside.is_file():
             with read_by_library(beside, "GDAL"):
                 stated = dict(re.findall(r"<(Scale|Offset)>([^<]+)<", readable_text(beside)))
                 scale, offset = float(stated.get("Scale", 1.0)), float(stated.get("Offset", 0.0))
             raster = replace(raster, values=raster.values * scale + offset)
             scaled = f", times {scale:g} plus {offset:g} m" if stated else ""
-        raster, filled_up = _without_fill(raster)
-        reader = RegularGridInterpolator((raster.x, raster.y), raster.values, bounds_error=False, fill_value=np.nan)
-        known = np.argwhere(~np.isnan(raster.values))
-        if not len(known):
-            raise InputError("no_levels", file=path)
-        shown = known if place.line is None else known[:: max(len(known) // MOST_FOR_EXTENT, 1)]
-        refuse_far_places(shown_path(path), raster.x[shown[:, 0]], raster.y[shown[:, 1]], place)
-        along, across = place.to_channel(raster.x[shown[:, 0]], raster.y[shown[:, 1]])
-        return Terrain(
-            lambda x, y: np.asarray(reader(np.column_stack(place.to_map(x, y)))),
-            _extent(along, across),
-            f"grid of {len(known):,} levels, {raster.size:g} m apart{scaled}{filled_up}",
-        )
+    values = raster.values
+    wrong = np.isfinite(values) & ~((values >= LOWEST) & (values <= HIGHEST)) | np.isinf(values)
+    for mark in FILL_VALUES:
+        rest = values[np.isfinite(values) & ~wrong & (values != mark)]
+        if rest.size and (values == mark).any():
+            apart = max(float(rest.min()) - mark, mark - float(rest.max()))
+            if apart > max(APART_FROM_LEVELS, 10.0 * float(np.ptp(rest))):
+                wrong |= values == mark
+    if wrong.any():
+        marks = listed([f"{value:g}" for value in np.unique(values[wrong])[:3]])
+        filled_up = f", {so_many(int(wrong.sum()), 'undeclared fill value')} left out ({marks})"
+        values = np.where(wrong, np.nan, values)
+    reader = RegularGridInterpolator((raster.x, raster.y), values, bounds_error=False, fill_value=np.nan)
+    known = np.argwhere(~np.isnan(values))
+    if not len(known):
+        raise InputError("no_levels", file=path)
+    shown = known if place.line is None else known[:: max(len(known) // MOST_FOR_EXTENT, 1)]
+    refuse_far_places(shown_path(path), raster.x[shown[:, 0]], raster.y[shown[:, 1]], place)
+    along, across = place.to_channel(raster.x[shown[:, 0]], raster.y[shown[:, 1]])
+    return Terrain(
+        lambda x, y: np.asarray(reader(np.column_stack(place.to_map(x, y)))),
+        _extent(along, across),
+        f"grid of {len(known):,} levels, {raster.size:g} m apart{scaled}{filled_up}",
+    )
+
+
+def terrain_of_points(path: Path, place: Placement, options: FileOptions, sections: bool) -> Terrain:
+    """The bed in a table of points, which a survey has; as `read_terrain`."""
     with path.open("rb") as file:
         of_ras = file.read(len(GEOMETRY_OF_RAS)) == GEOMETRY_OF_RAS
     if of_ras:
@@ -456,27 +483,6 @@ def _between_points(terrain: Terrain, survey: BedSurvey, without: Callable[[NDAr
 
 def _extent(x: Array, y: Array) -> tuple[float, float, float, float]:
     return float(x.min()), float(x.max()), float(y.min()), float(y.max())
-
-
-def _without_fill(raster: Raster) -> tuple[Raster, str]:
-    """The raster without levels that are none, declared or not, and a note on them.
-
-    Beyond LOWEST and HIGHEST lies no river; a usual mark of no value is one if it lies further from all other levels
-    than APART_FROM_LEVELS and than ten times what they span.
-    """
-    values = raster.values
-    wrong = np.isfinite(values) & ~((values >= LOWEST) & (values <= HIGHEST)) | np.isinf(values)
-    for mark in FILL_VALUES:
-        rest = values[np.isfinite(values) & ~wrong & (values != mark)]
-        if rest.size and (values == mark).any():
-            apart = max(float(rest.min()) - mark, mark - float(rest.max()))
-            if apart > max(APART_FROM_LEVELS, 10.0 * float(np.ptp(rest))):
-                wrong |= values == mark
-    if not wrong.any():
-        return raster, ""
-    marks = listed([f"{value:g}" for value in np.unique(values[wrong])[:3]])
-    note = f", {so_many(int(wrong.sum()), 'undeclared fill value')} left out ({marks})"
-    return replace(raster, values=np.where(wrong, np.nan, values)), note
 
 
 def read_geotiff(path: Path, frame: Frame | None = None) -> Raster:
