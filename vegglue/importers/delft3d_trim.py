@@ -59,14 +59,9 @@ def read_delft3d_trim(path: Path) -> ModelResult:
         depth_down, level = (variables[name].values(times) for name in (bed_name, "S1"))
         bed = -depth_down
         along, across = (_of_layers(variables, name, times, shape) for name in ("U1", "V1"))
-        open_u, open_v = (
-            variables[name].values(times).reshape(shape) > 0 if name in variables else np.ones(shape, bool)
-            for name in ("KFU", "KFV")
-        )
-        # Where nothing states which faces are closed, those without a value are.
-        open_u, open_v = (
-            is_open if name in variables else is_open & np.isfinite(speed)
-            for name, is_open, speed in (("KFU", open_u, along), ("KFV", open_v, across))
+        open_u, open_v = (  # where nothing states which faces are closed, those without a value are
+            variables[name].values(times).reshape(shape) > 0 if name in variables else np.isfinite(speed)
+            for name, speed in (("KFU", along), ("KFV", across))
         )
         along, across = np.where(open_u, along, 0.0), np.where(open_v, across, 0.0)
         before_u, before_v = _before(along, 0), _before(across, 1)
