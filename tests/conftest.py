@@ -13,6 +13,7 @@ from reach import Say, said_to
 from threadpoolctl import threadpool_limits
 
 import vegglue.parallel
+from vegglue.__main__ import OBJECTS_BETWEEN_COLLECTIONS
 
 TESTS = Path(__file__).parent
 # Files that take minutes, or a third of one: begun last, one of them would keep a process at work while others wait.
@@ -53,8 +54,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Half a million objects of modules and tests live to the end: garbage is not looked for among them."""
+    """Half a million objects of modules and tests live to the end: garbage is not looked for among them. Among others
+    it is looked for as seldom as in a command.
+    """
     gc.freeze()
+    gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
     gc.enable()
 
 

@@ -14,7 +14,6 @@ from functools import partial
 from itertools import combinations_with_replacement
 
 import numpy as np
-import scipy.linalg
 from scipy.special import chdtri, gammaln, logsumexp, ndtri
 
 from vegglue.arrays import Array
@@ -102,18 +101,23 @@ def log_density(mixture: Mixture, z: Array) -> Array:
     -------
     ndarray (m,)
     """
-    return np.asarray(logsumexp(_parts(mixture, z)[0], axis=1))
+    return _log_of_sum(_parts(mixture, z)[0])
+
+
+def _log_of_sum(logs: Array) -> Array:
+    """ln sum_k exp(l_k), (k, m) -> (m,), all finite: the library's own, for any values, takes several times as long."""
+    highest = logs.max(axis=0)
+    return np.asarray(highest + np.log(np.exp(logs - highest).sum(axis=0)))
 
 
 def _parts(mixture: Mixture, z: Array) -> tuple[Array, Array]:
-    """ln share_k t_k(z) and the squared distance from each centre, (m, k) both."""
+    """ln share_k t_k(z) and the squared distance from each centre, (k, m) both."""
     p = z.shape[1]
-    pairs = zip(mixture.centre, mixture.lower, strict=True)
-    inside = [scipy.linalg.solve_triangular(lower, (z - centre).T, lower=True) for centre, lower in pairs]
-    away = np.stack([np.sum(one**2, axis=0) for one in inside], axis=1)
+    inside = np.linalg.inv(mixture.lower) @ (z.T - mixture.centre[:, :, None])
+    away = np.einsum("kpm,kpm->km", inside, inside)
     scale = np.log(np.diagonal(mixture.lower, axis1=1, axis2=2)).sum(axis=1)
     constant = gammaln(0.5 * (FREEDOM + p)) - gammaln(0.5 * FREEDOM) - 0.5 * p * np.log(FREEDOM * np.pi)
-    logs = np.log(mixture.share) + constant - scale - 0.5 * (FREEDOM + p) * np.log1p(away / FREEDOM)
+    logs = (np.log(mixture.share) + constant - scale)[:, None] - 0.5 * (FREEDOM + p) * np.log1p(away / FREEDOM)
     return logs, away
 
 
@@ -139,7 +143,7 @@ def pooled_weights(log_target: Array, z: Array, rounds: list[tuple[int, Mixture]
     """
     sizes = np.array([size for size, _ in rounds], float)
     logs = np.stack([log_density(mixture, z) for _, mixture in rounds])
-    log_weight = log_target - logsumexp(logs, axis=0, b=(sizes / sizes.sum())[:, None])
+    log_weight = log_target - _log_of_sum(logs + np.log(sizes / sizes.sum())[:, None])
     weights = np.exp(log_weight - np.max(log_weight))
     return np.asarray(weights / weights.sum())
 
@@ -221,13 +225,13 @@ def _expectation_maximisation(mixture: Mixture, z: Array, effective: float) -> M
     most of its shape.
     """
     logs, away = _parts(mixture, z)
-    belongs = np.exp(logs - logsumexp(logs, axis=1, keepdims=True)) / len(z)
-    share, p = belongs.sum(axis=0), z.shape[1]
+    belongs = np.exp(logs - _log_of_sum(logs)) / len(z)
+    share, p = belongs.sum(axis=1), z.shape[1]
     gain = belongs * (FREEDOM + p) / (FREEDOM + away)
     centre, lower = mixture.centre.copy(), mixture.lower.copy()
     for k in np.flatnonzero(share * effective > 1.0):
-        centre[k] = gain[:, k] @ z / gain[:, k].sum()
-        scatter = (z - centre[k]).T @ ((z - centre[k]) * gain[:, k, None])
+        centre[k] = gain[k] @ z / gain[k].sum()
+        scatter = (z - centre[k]).T @ ((z - centre[k]) * gain[k, :, None])
         kept = 2.0 * p / effective
         lower[k] = np.linalg.cholesky((scatter + kept * lower[k] @ lower[k].T) / (share[k] + kept))
     share = (share + SHARED_EVENLY / share.size) / (1.0 + SHARED_EVENLY)
