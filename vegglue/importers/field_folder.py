@@ -29,7 +29,6 @@ from vegglue.importers.config_parts import (
     PLACE_OF_VERTICAL,
     POLYGON_SIDES,
     VISCOSITY,
-    bed_prior,
     even,
     loguniform_prior,
     normal_prior,
@@ -43,8 +42,8 @@ from vegglue.importers.result_site import SiteOfResult, ground_of_result, site_o
 from vegglue.importers.site_file import Channel, FieldSite, FileOfSite, MeasuredFlow, PlantedPatch, SiteGrid, site_file
 from vegglue.importers.terrain import (
     BANK,
-    BANK_CLASS,
     Ground,
+    friction_priors,
     mapped_classes,
     slope_of_banks,
     surveyed_ground,
@@ -76,8 +75,6 @@ BY_EYE = 0.12
 # Transverse mixing over h u* [-] (Fischer et al. 1979, chapter 5): of straight flumes and of streams. Points each
 # way at which the bed is sampled for it.
 MIXING_OF_FLUME, MIXING_OF_STREAM, SAMPLED = 0.15, 0.6, 48
-# Manning's n of the bed [s m^(-1/3)]: of streams, and of flumes from plaster and glass up to cobbles.
-BED_OF_STREAM, BED_OF_FLUME = (0.01, 0.2), (0.005, 0.05)
 
 
 @dataclass(frozen=True)
@@ -125,9 +122,9 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     # Files that the site file names and that hold no measurements.
     used = [one.file for one in (site.bed, site.classes, *site.patches) if one is not None and one.file is not None]
     used += [given.file] if isinstance(given, FileOfSite) else []
-    parameters, finished = Tree(), Tree()
+    finished: Tree = {}
     if isinstance(found, SiteOfResult):
-        ground, parameters, finished = ground_of_result(target, found)
+        ground, finished = ground_of_result(target, found)
         used += [one.name for one in found.paths.values()]
     elif site.bed is not None or site.channel is None:
         ground = surveyed_ground(folder, target, site, place)
@@ -138,18 +135,7 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
     stated, factor = site.eddy_viscosity_m2_s, site.viscosity_factor
     if "eddy_viscosity_m2_s" not in site.model_fields_set:
         stated = usual_viscosity(site, ground)
-    if not finished:
-        classes = ground.tree["friction"]["classes"]
-        of_bed = bed_prior(*(BED_OF_STREAM if site.walls is None else BED_OF_FLUME))
-        parameters = {"n_b": of_bed} | {
-            one["n"]: of_bed | {"symbol": one["n"], "meaning": phrase("meaning_of_parameter", "bed_class", name)}
-            for name, one in classes.items()
-            if one.get("n", "n_b") != "n_b"
-        }
-        if BANK_CLASS in classes.values():
-            parameters["k_s"] = loguniform_prior(0.01, 5.0, "m", "k_s", phrase("meaning_of_parameter", "banks"))
-    if factor > 1:
-        parameters = parameters | {VISCOSITY: viscosity_prior(stated, factor)}
+    of_viscosity = {VISCOSITY: viscosity_prior(stated, factor)} if factor > 1 else {}
     measured.imported.extend([*ground.imported, *drawn_patches])
     tree: Tree = {
         "name": case_name(folder.resolve().name),
@@ -159,7 +145,7 @@ def case_from_folder(folder: Path, target: Path) -> FolderCase:
         "outlet": {},
         "eddy_viscosity": VISCOSITY if factor > 1 else stated,
         "experiments": {name: _experiment(flow) for name, flow in site.experiments.items()},
-        "parameters": parameters,
+        "parameters": ground.parameters | of_viscosity,
         "observations": measured.observations,
         **FIRST_LOOK,
     }
@@ -374,7 +360,8 @@ def _straight_ground(folder: Path, site: FieldSite, channel: Channel, place: Pla
         bank_rise = np.maximum(np.abs(across) - 0.5 * channel.bottom_width_m, 0.0) * trapezoid["bank_slope"]
         return floor - channel.bed_slope * along + bank_rise
 
-    return Ground({"grid": grid, "bed": [{"trapezoid": trapezoid}], "friction": friction}, imported, {}, level)
+    tree = {"grid": grid, "bed": [{"trapezoid": trapezoid}], "friction": friction}
+    return Ground(tree, imported, {}, level, friction_priors(friction, site))
 
 
 def _experiment(given: MeasuredFlow) -> Tree:

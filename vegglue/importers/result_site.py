@@ -6,7 +6,7 @@ classes, discharge and outlet level are those of the result.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -160,14 +160,12 @@ def site_of(folder: Path) -> SiteOfResult | FieldSite:
     return SiteOfResult(site, place, paths, placed, stated, terrain, tree)
 
 
-def ground_of_result(target: Path, found: SiteOfResult) -> tuple[Ground, Tree, Tree]:
+def ground_of_result(target: Path, found: SiteOfResult) -> tuple[Ground, Tree]:
     """Grid, bed and friction of the first result, and the flows of all, to be written beside the config.
 
     Returns
     -------
     Ground
-    Tree
-        Priors of its friction.
     Tree
         `finished_result` of the case.
     """
@@ -192,10 +190,10 @@ def ground_of_result(target: Path, found: SiteOfResult) -> tuple[Ground, Tree, T
         taken = FlowTaken(one.result.code, one.result.time, places, wet, *boundary)
         notes = [taken, *one.result.notes, *([words] if experiment == name else [])]
         imported.append(record(found.paths[experiment], None, "; ".join(sentences(notes))))
-    ground = ground_on_grid(target, found.terrain, found.grid, friction, found.place)
-    ground = Ground(ground.tree, imported, {**ground.texts, **texts}, ground.level)
+    ground = ground_on_grid(target, found.terrain, found.grid, friction, parameters, found.place)
+    ground = replace(ground, imported=imported, texts={**ground.texts, **texts})
     key = {"code": placed.result.code, "files": files, "parameters": values | dict(found.stated.parameters)}
-    return ground, parameters, key
+    return ground, key
 
 
 def _result_files(folder: Path, given: Mapping[str, Any], stated: ResultEntry) -> dict[str, Path]:

@@ -28,7 +28,7 @@ from vegglue.case.text_files import case_name, told_apart
 from vegglue.case.zones import beyond_slope_break, slope
 from vegglue.errors import InputError, shown_path
 from vegglue.importers.column_names import UNITS, role_of, unit_named, words_of
-from vegglue.importers.config_parts import MANNING_BED, even
+from vegglue.importers.config_parts import MANNING_BED, bed_prior, even, loguniform_prior
 from vegglue.importers.coordinate_systems import StatedSystem, refuse_other_system, system_of_wkt
 from vegglue.importers.file_options import FileOptions, read_file_options
 from vegglue.importers.import_notes import BanksOfBed, FileNote, ImportNote, Noted
@@ -40,7 +40,7 @@ from vegglue.importers.stations import ONE_PLACE
 from vegglue.importers.table_parser import parse_table
 from vegglue.importers.vector_files import read_polygons, refuse_far_polygons, units_assumed
 from vegglue.wording.numbers import listed, so_many
-from vegglue.wording.sentences import sentences
+from vegglue.wording.sentences import phrase, sentences
 
 # Endings of files of levels on a grid.
 RASTERS = (".tif", ".tiff", ".asc", ".grd")
@@ -82,6 +82,8 @@ LEAST_BED_ERROR = 1e-4
 BANK = "bank"
 TAKEN_NAMES = ("n_b", "n_w")  # parameters of the bed and of walls
 BANK_CLASS = {"law": "keulegan", "k_s": "k_s"}
+# Manning's n of the bed [s m^(-1/3)]: of streams, and of flumes from plaster and glass up to cobbles.
+BED_OF_STREAM, BED_OF_FLUME = (0.01, 0.2), (0.005, 0.05)
 
 
 @dataclass(frozen=True)
@@ -98,12 +100,15 @@ class Ground:
         Of files to be written beside the config, by their paths.
     level : callable
         Of the bed, from x and y (n,) to z (n,) in the channel [m].
+    parameters : Tree
+        Priors of the coefficients of friction.
     """
 
     tree: Tree
     imported: list[Tree]
     texts: Mapping[Path, str]
     level: Callable[[Array, Array], Array]
+    parameters: Tree
 
 
 @dataclass(frozen=True)
@@ -185,15 +190,18 @@ def surveyed_ground(folder: Path, target: Path, site: FieldSite, place: Placemen
         friction = with_banks(friction, steeper) if banks.any() else friction
         notes.append(BanksOfBed(steeper, floor, site.channel.bottom_width_m))
     tree = {"grid": grid, "bed": [layer], "friction": friction}
-    return Ground(tree, [record(path, None, "; ".join(sentences(notes))), *imported], texts, terrain.level)
+    taken = [record(path, None, "; ".join(sentences(notes))), *imported]
+    return Ground(tree, taken, texts, terrain.level, friction_priors(friction, site))
 
 
-def ground_on_grid(target: Path, terrain: Terrain, grid: Tree, friction: Tree, place: Placement) -> Ground:
+def ground_on_grid(
+    target: Path, terrain: Terrain, grid: Tree, friction: Tree, parameters: Tree, place: Placement
+) -> Ground:
     """The ground of a terrain on a grid with this friction; its bed is written beside the config `target`."""
     kind, file = BED_FILES[place.line is not None]
     text, _ = _bed_text(terrain, grid, place)
     tree = {"grid": grid, "bed": [{kind: f"{data_folder(target).name}/{file}"}], "friction": friction}
-    return Ground(tree, [], {data_folder(target) / file: text}, terrain.level)
+    return Ground(tree, [], {data_folder(target) / file: text}, terrain.level, parameters)
 
 
 def mapped_classes(folder: Path, site: FieldSite, place: Placement) -> tuple[Tree, list[Tree]]:
@@ -214,6 +222,19 @@ def mapped_classes(folder: Path, site: FieldSite, place: Placement) -> tuple[Tre
         zones.append({"class": name, "polygon": [list(corner) for corner in polygon.corners]})
     notes = sentences([f"friction classes: {so_many(len(zones), 'polygon')}", units_assumed(polygons)])
     return friction | {"zones": zones}, [record(path, None, "; ".join(notes))]
+
+
+def friction_priors(friction: Tree, site: FieldSite) -> Tree:
+    """Priors of the coefficients of all classes: of a flume's bed between walls, else of a stream's; and of banks."""
+    of_bed = bed_prior(*(BED_OF_STREAM if site.walls is None else BED_OF_FLUME))
+    found = {"n_b": of_bed} | {
+        one["n"]: of_bed | {"symbol": one["n"], "meaning": phrase("meaning_of_parameter", "bed_class", name)}
+        for name, one in friction["classes"].items()
+        if one.get("n", "n_b") != "n_b"
+    }
+    if BANK_CLASS in friction["classes"].values():
+        found["k_s"] = loguniform_prior(0.01, 5.0, "m", "k_s", phrase("meaning_of_parameter", "banks"))
+    return found
 
 
 def slope_of_banks(site: FieldSite) -> float | None:
