@@ -17,19 +17,14 @@ CASE = load_case(Path(__file__).parents[1] / "configs" / "twin.yaml")
 
 
 @lru_cache
-def coarse_twin() -> tuple[Model, Point]:
+def coarse_twin(*left_out: str) -> tuple[Model, Point]:
+    """left_out: experiments; without "mid" a diagnosis takes half the time."""
     model = coarser(model_of(CASE, read_observations(CASE)))
     assert model is not None
+    experiments = {name: one for name, one in CASE.experiments.items() if name not in left_out}
+    case = model.case.model_copy(update={"experiments": experiments})
+    station = model.station[model.station["experiment"].isin(list(experiments))].reset_index(drop=True)
+    model = replace(model, case=case, station=station, site=build_site(case))
     point = linearise(model, np.zeros(len(model.names)))
     assert point is not None
     return model, point
-
-
-@lru_cache
-def coarse_twin_in_two_flows() -> Model:
-    """Without the experiment between the lowest and the highest: a diagnosis takes half the time."""
-    model, _ = coarse_twin()
-    experiments = {name: one for name, one in model.case.experiments.items() if name != "mid"}
-    case = model.case.model_copy(update={"experiments": experiments})
-    station = model.station[model.station["experiment"] != "mid"].reset_index(drop=True)
-    return replace(model, case=case, station=station, site=build_site(case))

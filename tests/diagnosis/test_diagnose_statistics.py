@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from coarse_twin import coarse_twin_in_two_flows
+from coarse_twin import coarse_twin
 
 from vegglue.calibration.candidates import candidates_of
 from vegglue.diagnosis.diagnose import diagnose_model
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def model() -> Model:
     """On larger cells: how often a diagnosis is right does not hang on them, for the truth is made on smaller ones."""
-    return coarse_twin_in_two_flows()
+    return coarse_twin("mid")[0]
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,7 @@ OBJECT, BARRIER = library()["unlisted_object"], library()["unlisted_barrier"]
 
 def measured_with(place: dict[str, float], size: float, effect: Effect = OBJECT) -> Screening:
     """A screening of the coarse twin, measured without errors where something lies."""
-    model, point = coarse_twin()
+    model, point = coarse_twin("mid")
     candidate = place_candidate(effect, place, 1.0)
     case = with_effect(CASE, candidate, place)
     there = np.append(point.z, z_of(case.parameters[candidate.parameter], size))
@@ -141,7 +141,7 @@ def test_nothing_more_is_looked_for_where_something_acts_already() -> None:
 
 def test_a_bed_moves_by_the_depth_at_most_and_no_more_enters_than_flows() -> None:
     """A tidal reach lay 7 m lower in 3.6 m of water, and a flume of 2 m had a bed 2.8 m higher."""
-    model, point = coarse_twin()
+    model, point = coarse_twin("mid")
     scales, grid = site_scales(model.case, model.site), model.site.grid
     depth = np.max([flow_at_centres(model, point, name).depth for name in point.flows], axis=0)
     i, j = grid.x.size // 2, grid.y.size // 2

@@ -165,7 +165,7 @@ def test_a_law_with_which_no_name_would_be_believed_is_not_clear(share: float) -
 @pytest.mark.slow
 def test_a_law_that_is_in_no_list_is_not_nothing() -> None:
     """The example of docs/discover.md, on larger cells. `diagnose` alone once said that nothing was missing."""
-    model, _ = coarse_twin()
+    model, _ = coarse_twin("mid")
     ground = twin_base(model, true_place(len(model.names), 2))
     station, _ = measured_twin(ground, ["law_viscosity_offset_step=-1.12"], 8.0, "white", 2)
     found = diagnose_model(replace(model, station=station))

@@ -32,7 +32,7 @@ TREE = {"x": 26.0, "y": -0.6, "length": 0.5, "width": 0.45}
 
 def measured_with(candidate: Candidate, amplitude: float) -> Screening:
     """A screening of the coarse twin, measured where this acts, with the errors that the data state."""
-    model, point = coarse_twin()
+    model, point = coarse_twin("mid")
     case = with_effect(CASE, candidate, {})
     z = np.append(point.z, z_of(case.parameters[candidate.parameter], amplitude))
     truth = linearise_from(replace(model, case=case), z, point)
