@@ -10,7 +10,6 @@ from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
-from pydantic import TypeAdapter
 
 from vegglue.measurements.section_discharge import CarriedDischarge
 from vegglue.results.causes import (
@@ -52,6 +51,7 @@ from vegglue.results.layout import (
     stations_from,
     table_group,
 )
+from vegglue.results.type_adapters import type_adapter
 from vegglue.results.verdict import (
     ChiSquare,
     EffectFound,
@@ -239,7 +239,7 @@ def diagnosis_from(groups: Mapping[str, Mapping[str, Any]], attributes: Mapping[
         predictions=Predictions(stations_from(stations), *(stations[name] for name in AT_STATIONS)),
         place_map=PlaceMap(stated_as(str, attributes, "mapped_term"), places["x"], places["y"], places["score"]),
         places=_parsed(tuple[LocalAnomaly, ...], attributes["locations"]),
-        instruments=TypeAdapter(tuple[FaultyInstrument, ...]).validate_python([nowhere | tree for tree in off]),
+        instruments=type_adapter(tuple[FaultyInstrument, ...]).validate_python([nowhere | tree for tree in off]),
         field=_parsed(FieldFound | None, attributes["field"]),
         model_error=_parsed(ModelErrorUsed | None, attributes["model_error"]),
         field_map=FieldMapKept(**fitting(groups["field"], FIELD_MAP)) if "field" in groups else None,
@@ -264,7 +264,7 @@ def _table_from(group: ReadGroup, dim: str, columns: Mapping[str, Stored]) -> pd
 
 def _parsed(kind: Any, text: str) -> Any:
     """A value of this kind from JSON. Errors: ValueError where it is none."""
-    return TypeAdapter(kind).validate_json(text)
+    return type_adapter(kind).validate_json(text)
 
 
 def _untagged(tree: Any) -> Any:
@@ -277,4 +277,4 @@ def _untagged(tree: Any) -> Any:
     tag = "tag" if "tag" in own else "kind"
     if own.get(tag) not in VERDICT_VALUES:
         return own
-    return TypeAdapter(VERDICT_VALUES[own.pop(tag)]).validate_python(own)
+    return type_adapter(VERDICT_VALUES[own.pop(tag)]).validate_python(own)

@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import Annotated, Any, get_args
 
 import numpy as np
-from pydantic import BeforeValidator, PlainValidator, TypeAdapter
+from pydantic import BeforeValidator, PlainValidator
 
 from vegglue.arrays import Array
 from vegglue.case.text_files import LARGEST_JSON, read_text, write_text
 from vegglue.measurements.kinds import KINDS
 from vegglue.plain_json import plain
+from vegglue.results.type_adapters import type_adapter
 from vegglue.wording.numbers import in_short, in_short_html, so_many
 from vegglue.wording.remedies import MAKE_ROOM
 from vegglue.wording.sentences import phrase, sentence, tag_of, tagged
@@ -26,9 +27,9 @@ from vegglue.wording.sentences import phrase, sentence, tag_of, tagged
 # Numbers of JSON, which has null for what is none.
 KeptNumber = Annotated[float, BeforeValidator(lambda kept: math.nan if kept is None else kept)]
 KeptErrors = Annotated[
-    Array, PlainValidator(lambda kept: np.array(TypeAdapter(list[KeptNumber]).validate_python(kept)))
+    Array, PlainValidator(lambda kept: np.array(type_adapter(list[KeptNumber]).validate_python(kept)))
 ]
-KeptFlags = Annotated[np.ndarray, PlainValidator(lambda kept: np.array(TypeAdapter(list[bool]).validate_python(kept)))]
+KeptFlags = Annotated[np.ndarray, PlainValidator(lambda kept: np.array(type_adapter(list[bool]).validate_python(kept)))]
 
 
 @dataclass(frozen=True)
@@ -245,7 +246,7 @@ class HiddenLaw:
 
 Subject = RivalEffects | OneOfRivals | HiddenEffect | HiddenLaw
 SUBJECTS: dict[str, type] = {tag_of(one): one for one in get_args(Subject)}
-KeptSubject = PlainValidator(lambda kept: TypeAdapter(SUBJECTS[kept["kind"]]).validate_python(kept))
+KeptSubject = PlainValidator(lambda kept: type_adapter(SUBJECTS[kept["kind"]]).validate_python(kept))
 
 
 @dataclass(frozen=True)
@@ -381,6 +382,6 @@ def _read_if_it_fits(path: Path, file_format: str, config_hash: str, kind: Any) 
         tree = json.loads(read_text(path, LARGEST_JSON))
         if (tree["format"], tree["config_hash"]) != (file_format, config_hash):
             return None
-        return TypeAdapter(kind).validate_python(tree["told"])
+        return type_adapter(kind).validate_python(tree["told"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         return None
