@@ -110,23 +110,18 @@ def hypotheses_of(screening: Screening, watch: Watch, elsewhere: float = -np.inf
     columns = [int(some[np.argmax(linear[some])]) for some in prints.columns]
     of_each = np.array([linear[column] for column in columns])
     best = max(*(one.total for one in screening.kinds), float(linear.max(initial=-np.inf)), elsewhere)
-    found = [
-        Hypothesis(one.name, one.name, one.total, one.best, screening.instruments[one.name][one.best])
-        for one in screening.kinds
-        if one.name in screening.instruments
-    ]
-    for j, of_kind in enumerate(found):
-        line = of_kind.what.line if isinstance(of_kind.what, Instrument) else None
-        if line is None or not _within_reach(of_kind.log_evidence, best):
+    found = list[Hypothesis]()
+    for of_kind in screening.kinds:
+        if of_kind.name not in screening.instruments:
             continue
-        lines = kind_named(screening.kinds, of_kind.kind)
-        by_score = float(lines.log_evidence[of_kind.column] - lines.log_prior[of_kind.column])
-        if by_score < 0.0:  # an offset acts linearly: where its score speaks against it, so does the calibration
-            continue
-        watch(Progress(COMPARING_LINE.format(line.x)))
-        if (without := relevelled(screening.base, line)) is not None:
-            refitted = of_kind.log_evidence + without.log_factor - by_score
-            found[j] = replace(of_kind, log_evidence=refitted, without=without)
+        instrument, total, without = screening.instruments[of_kind.name][of_kind.best], of_kind.total, None
+        by_score = float(of_kind.log_evidence[of_kind.best] - of_kind.log_prior[of_kind.best])
+        # An offset acts linearly: where its score speaks against it, so does the calibration.
+        if instrument.line is not None and by_score >= 0.0 and _within_reach(total, best):
+            watch(Progress(COMPARING_LINE.format(instrument.line.x)))
+            if (without := relevelled(screening.base, instrument.line)) is not None:
+                total = total + without.log_factor - by_score
+        found.append(Hypothesis(of_kind.name, of_kind.name, total, of_kind.best, instrument, without=without))
     tried: set[str] = set()
     while True:
         effects = [j for j in worth_refitting(of_each, best) if prints.candidates[j].name not in tried]
