@@ -34,7 +34,7 @@ def imbalance(reach: Reach, ends: Ends, flow: Flow) -> Field:
 def newton_of(reach: Reach, ends: Ends, flow: Flow) -> Callable[[Flow], Flow]:
     """Newton's step with the slopes at this flow, for flows near it. Errors: RuntimeError where they are singular."""
     live = flow.h > SHALLOW
-    # Cells act on each other both ways: an order made for that has half the factors of the usual one, in half the time.
+    # Cells act on each other both ways: an order made for that leaves 0.6 to 0.8 of the entries, in half the time.
     ordered = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.1, "options": {"SymmetricMode": True}}
     factors = splu(_slopes(reach, ends, flow, live), **ordered)
 
