@@ -54,8 +54,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Half a million objects of modules and tests live to the end: garbage is not looked for among them. Among others
-    it is looked for as seldom as in a command.
+    """Half a million objects of modules and tests live to the end and are not searched for garbage; others are searched
+    as seldom as in a command.
     """
     gc.freeze()
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
