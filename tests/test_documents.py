@@ -1,9 +1,11 @@
 """The documents are true: commands shown are run, numbers shown are what they print, links lead somewhere."""
 
 import json
+import os
 import re
 import shlex
 import shutil
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -162,6 +164,21 @@ def test_the_folder_of_the_page_becomes_a_case(tmp_path: Path) -> None:
     case = vegglue.import_folder(folder, tmp_path / "my-site.yaml")
     assert list(case.experiments) == list(json.loads(site)["experiments"])
     assert len(case.plants.patches) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the pages show a POSIX shell")
+@pytest.mark.parametrize("page", SHOWN, ids=lambda page: page.name)
+def test_the_commands_of_a_page_find_the_config_that_import_writes(tmp_path: Path, page: Path) -> None:
+    """In a clone, as the lines before them say: beside `configs`, `import` writes into that folder."""
+    shell = re.search(r"^```sh\nsource [^\n]*\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert shell
+    (tmp_path / "configs").mkdir()
+    shutil.copytree(ROOT / "data" / "open_cases" / "open-b", tmp_path / "data" / "open_cases" / "open-b")
+    went = subprocess.run(["sh", "-ec", f"{shell[1]}\npwd"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    folder = Path(went.stdout.splitlines()[-1])
+    first, second, *_ = shown_in(page)
+    printed(first.command, folder)
+    assert (folder / second.command.split()[-1]).is_file()
 
 
 def shown_on_first_pages() -> list[Shown]:
